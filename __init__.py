@@ -31,7 +31,7 @@ _HOMES = {
     "kernel": "mathematics.kernel",
     **dict.fromkeys(("Array1D", "Array2D"), "mathematics.arrays"),
     "Clock": "runtime.language.context",
-    "write_recording": "logs.recording.finished_run",
+    "write_recording": "logs.recording.writer",
     **dict.fromkeys(("Block", "Input", "Output", "State"), "runtime.language.block"),
     **dict.fromkeys(("AloftError", "BlockError", "RunError"), "runtime.language.errors"),
     **dict.fromkeys(("Graph", "load"), "runtime.graph"),

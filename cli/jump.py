@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,7 +114,8 @@ def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> d
     """What the command line says of the task, in SI units, by the task's parameters.
 
     Raises:
-        AloftError: a quantity has no unit or a wrong one, or two contradict each other.
+        AloftError: a quantity has no unit or a wrong one, is beyond what a task may ask for, or two
+            contradict each other.
     """
     found: dict[str, float] = {}
     said: dict[str, str] = {}
@@ -125,10 +127,13 @@ def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> d
             raise AloftError(f"--{said[field]} and --{name} contradict each other: give one")
         said[field] = name
         found[field] = sign * quantity(name, text, "m", "20cm")
+        check_limits(name, text, field, found[field], "m")
     if turn:
         found["twist"] = quantity("turn", turn, "rad", "30deg")
+        check_limits("turn", turn, "twist", found["twist"], "rad")
     if rise:
         found["rise"] = quantity("rise", rise, "m", "12cm")
+        check_limits("rise", rise, "rise", found["rise"], "m")
     elif found.get("landing_height", 0.0) > 0.0:
         usual = usual_rise(path)
         needed = round(found["landing_height"] + ABOVE_A_STEP, 6)
@@ -155,6 +160,20 @@ def quantity(name: str, text: str, unit: str, example: str) -> float:
         raise AloftError(
             f"--{name} {text}: {error}; expected such as --{name} {example}"
         ) from error
+
+
+def check_limits(name: str, text: str, field: str, value: float, unit: str) -> None:
+    """Raise ``AloftError`` for a quantity that is beyond the limits of the task's parameter."""
+    from ..planner.task.task import JumpTask
+
+    for limit in JumpTask.model_fields[field].metadata:
+        most, least = getattr(limit, "le", None), getattr(limit, "ge", None)
+        if (most is not None and value > most) or (least is not None and value < least):
+            edge = abs(most if most is not None and value > most else least)
+            shown = f"{math.degrees(edge):.0f} deg" if unit == "rad" else f"{edge:g} {unit}"
+            raise AloftError(f"--{name} {text}: no jump is planned beyond {shown}")
+        if getattr(limit, "gt", None) is not None and value <= limit.gt:
+            raise AloftError(f"--{name} {text}: it must be more than {limit.gt:g} {unit}")
 
 
 def usual_rise(path: Path) -> float | None:

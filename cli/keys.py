@@ -31,8 +31,8 @@ def keys(
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
     from ..runtime.loading import load
     from ..runtime.placement.placed import place
-    from ..runtime.transports.access import keys_from
     from ..runtime.transports.keys import make_keys
+    from ..runtime.transports.zenoh_session import keys_from
 
     with errors_reported(as_json):
         placed = place(load(graph, overrides or []))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,11 @@ new = typer.Typer(
 )
 
 Folder = Annotated[Path, typer.Option("--in", help="The folder to write into.")]
+
+
+def run_tests() -> str:
+    """The command that runs tests; pytest comes with what is for development, not with aloft."""
+    return "pytest" if find_spec("pytest") is not None else "pip install pytest; pytest"
 
 
 @new.command("project")
@@ -42,7 +48,7 @@ def project(
             **_block_files("Smoother"),
         }
         _write(folder, files)
-    typer.echo(f"next: cd {folder}; aloft run graph.yaml; pytest")
+    typer.echo(f"next: cd {folder}; aloft run graph.yaml; {run_tests()}")
 
 
 @new.command("block")
@@ -55,7 +61,7 @@ def block(
         files = _block_files(name)
         _write(folder, files)
     module = next(iter(files)).removesuffix(".py")
-    typer.echo(f"next: pytest test_{module}.py; a graph uses it as {module}:{name}")
+    typer.echo(f"next: {run_tests()} test_{module}.py; a graph uses it as {module}:{name}")
 
 
 @new.command("graph")

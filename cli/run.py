@@ -81,6 +81,13 @@ def run(
         bool,
         typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
     ] = False,
+    check_bounds: Annotated[
+        bool,
+        typer.Option(
+            "--check-bounds",
+            help="Check every index of a kernel: compile nothing, so that one beyond its array fails.",
+        ),
+    ] = False,
     fuse: Annotated[
         bool, typer.Option(help="Run blocks of kernels that follow each other as one call.")
     ] = True,
@@ -100,6 +107,7 @@ def run(
     from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
     from ..studies.batch.seeds import parse_seeds
 
+    plain = plain or check_bounds
     settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json, traceback=traceback):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +19,7 @@ from .shared.output import console, errors_reported, print_json, print_warning, 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..robots.robot_description import RobotDescription
     from ..runtime.language.block import Block
 
 Row = tuple[str, str, str]
@@ -44,7 +47,10 @@ def test(
     ] = None,
     rtol: Annotated[float, typer.Option(min=0.0, help="With --from: relative tolerance.")] = 0.0,
     atol: Annotated[float, typer.Option(min=0.0, help="With --from: absolute tolerance.")] = 0.0,
-    robot: Annotated[str, typer.Option(help="The robot for blocks that need one.")] = "bruce",
+    robot: Annotated[
+        str,
+        typer.Option(help="The robot for blocks that need one; by default the graph's, or bruce."),
+    ] = "",
     folder: Annotated[
         Path | None,
         typer.Option(help="With --from: where the graph file's folder is now, if it has moved."),
@@ -66,7 +72,7 @@ def test(
         if block or ticks or output:
             raise AloftError("--block, --ticks and --output go with --from RECORDING")
         blocks, paths = sort_targets(targets or [])
-        rows = [row for each in blocks for row in check(*each, robot)]
+        rows = [row for each in blocks for row in check(each, robot)]
     passed = report(rows, out)
     code = run_pytest(paths, as_json) if paths or not targets else None
     good = passed and code in (None, 0)
@@ -76,10 +82,20 @@ def test(
     raise typer.Exit(ExitCode.SUCCESS if good else ExitCode.NOT_SUCCESSFUL)
 
 
-def sort_targets(
-    targets: list[str],
-) -> tuple[list[tuple[str, type[Block], dict[str, Any] | None]], list[str]]:
-    """Blocks with their parameters (``None``: examples), and paths for pytest.
+@dataclass(frozen=True)
+class Target:
+    """A block to test: with example parameters, or as a graph sets it and with the graph's robot."""
+
+    name: str
+    block_type: type[Block]
+    params: dict[str, Any] | None = None
+    robot: RobotDescription | str | None = "bruce"
+    rate: float = 500.0
+    dimensions: Mapping[str, int] = field(default_factory=dict)
+
+
+def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
+    """Blocks, and paths for pytest.
 
     Raises:
         LoadError: a graph may not run.
@@ -89,40 +105,55 @@ def sort_targets(
     from ..runtime.loading import load
     from ..runtime.loading.checking.parameters import plain_parameters
 
-    blocks: list[tuple[str, type[Block], dict[str, Any] | None]] = []
+    blocks: list[Target] = []
     paths = []
     for target in targets:
         path = Path(target.partition("::")[0])
         if path.suffix in (".yaml", ".yml"):
+            graph = load(path)
             blocks += [
-                (f"{spec.path} ({spec.block_type.__name__})", spec.block_type,
-                 plain_parameters(spec.params))
-                for spec in load(path).blocks
+                Target(
+                    f"{spec.path} ({spec.block_type.__name__})",
+                    spec.block_type,
+                    plain_parameters(spec.params),
+                    graph.robot,
+                    graph.base_rate / spec.period_ticks,
+                    spec.dimensions,
+                )
+                for spec in graph.blocks
                 if "~" not in spec.path
-            ]  # fmt: skip
+            ]
         elif path.exists():
             paths.append(target)
         else:
-            blocks.append((target, find_block(target, Path.cwd()), None))
+            blocks.append(Target(target, find_block(target, Path.cwd())))
     return blocks, paths
 
 
-def check(
-    name: str, block_type: type[Block], params: dict[str, Any] | None, robot: str
-) -> list[Row]:
-    """The checks of one block, one for each thing that every block promises."""
+def check(target: Target, robot: str) -> list[Row]:
+    """The checks of one block, one for each thing that every block promises.
+
+    A ``robot`` that is named takes the place of the target's own.
+    """
     from ..runtime.testing.conformance import ConformanceError, check_block, conformance_cases
 
     rows = []
     for case in conformance_cases():
         problem = ""
         try:
-            check_block(block_type, params, robot=robot, cases=[case])
+            check_block(
+                target.block_type,
+                target.params,
+                robot=robot or target.robot,
+                rate=target.rate,
+                dimensions=target.dimensions,
+                cases=[case],
+            )
         except ConformanceError as error:
             problem = str(error)
         except Exception as error:  # noqa: BLE001  the other checks still count
             problem = f"{type(error).__name__}: {error}"
-        rows.append((name, case, problem))
+        rows.append((target.name, case, problem))
     return rows
 
 

@@ -47,12 +47,12 @@ def twin(
     from ..hal.twin.faults import read_fault
     from ..hal.twin.server import TwinServer
     from ..hal.twin.twin import standing_twin
-    from ..robots.description import find_robot
+    from ..robots.description import RobotError, find_robot
 
     with errors_reported(as_json):
         try:
             description = find_robot(robot)
-        except LookupError as error:
+        except (LookupError, RobotError) as error:
             raise AloftError(str(error.args[0])) from error
         settings = _settings(set_ or [])
         params = SimulatorParameters.model_validate(settings)

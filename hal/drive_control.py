@@ -27,7 +27,7 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Array1D, Array2D
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
@@ -119,11 +119,11 @@ def _some(gains: MotorGains, limit: int = 4) -> str:
 class Targets(NamedTuple):
     """What some commands say of the joints: ``JointTargets``, each (n_commands, n_joints)."""
 
-    torque: Array
-    position: Array
-    velocity: Array
-    stiffness: Array
-    damping: Array
+    torque: Array2D
+    position: Array2D
+    velocity: Array2D
+    stiffness: Array2D
+    damping: Array2D
 
 
 class Gears(NamedTuple):
@@ -131,49 +131,49 @@ class Gears(NamedTuple):
     gains of the joints that the drives were set for, ``stiffness`` and ``damping`` (n,), the drives' own
     gains at the motors' outputs, ``motor_stiffness`` and ``motor_damping`` (n,), and the ``lead`` [s]."""
 
-    to_motor: Array
-    torque_to_motor: Array
-    torque_to_joint: Array
-    stiffness: Array
-    damping: Array
-    motor_stiffness: Array
-    motor_damping: Array
+    to_motor: Array2D
+    torque_to_motor: Array2D
+    torque_to_joint: Array2D
+    stiffness: Array1D
+    damping: Array1D
+    motor_stiffness: Array1D
+    motor_damping: Array1D
     lead: float
 
 
 class Goals(NamedTuple):
     """The goals of every motor [N m, rad, rad/s], each (n,)."""
 
-    torque: Array
-    position: Array
-    velocity: Array
+    torque: Array1D
+    position: Array1D
+    velocity: Array1D
 
 
 class MeasuredMotion(NamedTuple):
     """The measured motion of motors and joints [rad, rad/s], each (n,)."""
 
-    position: Array
-    velocity: Array
-    joint_position: Array
-    joint_velocity: Array
+    position: Array1D
+    velocity: Array1D
+    joint_position: Array1D
+    joint_velocity: Array1D
 
 
 class TrackingErrors(NamedTuple):
     """Scratch, each (n,): the joints' errors, and the torque that is asked of them."""
 
-    position: Array
-    velocity: Array
-    torque: Array
+    position: Array1D
+    velocity: Array1D
+    torque: Array1D
 
 
 @kernel
-def smallest_share(gears: Gears, motor: int, commanded: Array, drives: Array) -> float:
+def smallest_share(gears: Gears, motor: int, commanded: Array1D, drives: Array1D) -> float:
     """Of a motor, the least share of the drives' gains among the joints it moves."""
     share = 1.0
     for joint in range(commanded.shape[0]):
-        own = float(drives[joint])
+        own = drives[joint]
         if gears.to_motor[motor, joint] != 0.0 and own > 0.0:
-            share = min(share, float(commanded[joint]) / own)
+            share = min(share, commanded[joint] / own)
     return share
 
 

@@ -17,7 +17,13 @@ from ..blocks.signals import (
     RobotHealth,
 )
 from ..blocks.signals.drive_conditions import HEALTHY
-from ..mathematics.arrays import Array, Counts, Flags
+from ..mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags0D,
+    Indices0D,
+    Indices1D,
+)
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..robots.description import RobotDescription
@@ -33,23 +39,23 @@ _DRIVING = int(DrivePhase.DRIVING)
 class HealthFields(NamedTuple):
     """The fields of ``RobotHealth``, for kernels."""
 
-    state: Counts
-    voltage: Array
-    temperature: Array
-    current: Array
-    condition: Counts
-    age: Array
-    imu_age: Array
-    stamp: Array
-    joints_valid: Flags
-    imu_valid: Flags
-    contacts_valid: Flags
-    late_cycles: Counts
-    lost_answers: Counts
+    state: Indices0D
+    voltage: Array1D
+    temperature: Array1D
+    current: Array1D
+    condition: Indices1D
+    age: Array1D
+    imu_age: Array0D
+    stamp: Array0D
+    joints_valid: Flags0D
+    imu_valid: Flags0D
+    contacts_valid: Flags0D
+    late_cycles: Indices0D
+    lost_answers: Indices0D
 
 
 @kernel
-def report_healthy(tick: Counts, base_period: float, health: HealthFields) -> None:
+def report_healthy(tick: Indices1D, base_period: float, health: HealthFields) -> None:
     """Report healthy drives and sensors in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
     health.state[()] = _DRIVING
     for k in range(health.condition.shape[0]):
@@ -57,7 +63,7 @@ def report_healthy(tick: Counts, base_period: float, health: HealthFields) -> No
         health.voltage[k] = health.temperature[k] = health.current[k] = health.age[k] = 0.0
     health.imu_age[()] = 0.0
     health.late_cycles[()] = health.lost_answers[()] = 0
-    health.stamp[()] = int(tick[0]) * base_period
+    health.stamp[()] = tick[0] * base_period
     health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
 
 

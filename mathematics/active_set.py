@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, Flags, Indices
+from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .kernel import kernel
 
 INFEASIBLE = -1
@@ -38,10 +38,10 @@ _FEASIBLE = 1e-10
 class Program(NamedTuple):
     """The program's data: P (n, n), q (n,), G (m, n), h (m,), in arrays that may be larger."""
 
-    hessian: Array
-    gradient: Array
-    matrix: Array
-    bound: Array
+    hessian: Array2D
+    gradient: Array1D
+    matrix: Array2D
+    bound: Array1D
 
 
 class ActiveSetMemory(NamedTuple):
@@ -54,15 +54,15 @@ class ActiveSetMemory(NamedTuple):
     (m,) the norms of the rows of G.
     """
 
-    inverse: Array
-    triangle: Array
-    multipliers: Array
-    along: Array
-    step: Array
-    exchange: Array
-    size: Array
-    active: Indices
-    is_active: Flags
+    inverse: Array2D
+    triangle: Array2D
+    multipliers: Array1D
+    along: Array1D
+    step: Array1D
+    exchange: Array1D
+    size: Array1D
+    active: Indices1D
+    is_active: Flags1D
 
 
 def active_set_memory(n: int, m: int) -> ActiveSetMemory:
@@ -74,7 +74,7 @@ def active_set_memory(n: int, m: int) -> ActiveSetMemory:
 
 
 @kernel
-def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array) -> int:
+def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> int:
     """Write the solution (n,) to ``x``.
 
     Args:
@@ -98,7 +98,7 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
 
 @kernel
 def fulfil(
-    n: int, m: int, count: int, program: Program, memory: ActiveSetMemory, x: Array
+    n: int, m: int, count: int, program: Program, memory: ActiveSetMemory, x: Array1D
 ) -> tuple[int, int]:
     """Add violated constraints to the ``count`` active ones until x fulfils all.
 
@@ -140,7 +140,7 @@ def fulfil(
 
 
 @kernel
-def start_unconstrained(n: int, program: Program, memory: ActiveSetMemory, x: Array) -> bool:
+def start_unconstrained(n: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> bool:
     """The minimum without constraints, and J = L^-T of the Cholesky factor P = L L'.
 
     Returns whether P is positive definite.
@@ -184,7 +184,7 @@ def start_unconstrained(n: int, program: Program, memory: ActiveSetMemory, x: Ar
 
 
 @kernel
-def polish(n: int, gradient: Array, memory: ActiveSetMemory, x: Array) -> None:
+def polish(n: int, gradient: Array1D, memory: ActiveSetMemory, x: Array1D) -> None:
     """Improve a solution by one Newton step along the active constraints.
 
     This corrects the rounding errors of P and q where the caller knows the gradient more exactly
@@ -200,17 +200,17 @@ def polish(n: int, gradient: Array, memory: ActiveSetMemory, x: Array) -> None:
     for j in range(count, n):
         value = 0.0
         for k in range(n):
-            value += float(memory.inverse[k, j]) * float(gradient[k])
+            value += float(memory.inverse[k, j]) * gradient[k]
         memory.along[j] = value
     for i in range(n):
         value = 0.0
         for j in range(count, n):
             value += float(memory.inverse[i, j]) * float(memory.along[j])
-        x[i] = float(x[i]) - value
+        x[i] = x[i] - value
 
 
 @kernel
-def price_again(n: int, count: int, gradient: Array, memory: ActiveSetMemory) -> None:
+def price_again(n: int, count: int, gradient: Array1D, memory: ActiveSetMemory) -> None:
     """Compute the multipliers of the ``count`` active constraints from the gradient at the solution.
 
     They are as exact as the gradient is, so more so than those of the search where P has lost digits.
@@ -222,23 +222,23 @@ def price_again(n: int, count: int, gradient: Array, memory: ActiveSetMemory) ->
     for j in range(count - 1, -1, -1):
         value = 0.0
         for k in range(n):
-            value += float(memory.inverse[k, j]) * float(gradient[k])
+            value += float(memory.inverse[k, j]) * gradient[k]
         for k in range(j + 1, count):
             value -= float(memory.triangle[j, k]) * float(memory.multipliers[k])
         memory.multipliers[j] = value / float(memory.triangle[j, j])
 
 
 @kernel
-def violation(n: int, program: Program, row: int, x: Array) -> float:
+def violation(n: int, program: Program, row: int, x: Array1D) -> float:
     """By how much x violates a constraint; negative where it does not."""
     total = -float(program.bound[row])
     for k in range(n):
-        total += float(program.matrix[row, k]) * float(x[k])
+        total += float(program.matrix[row, k]) * x[k]
     return total
 
 
 @kernel
-def most_violated(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array) -> int:
+def most_violated(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> int:
     """The constraint that x violates by the longest distance; -1 where it violates none."""
     found, largest = -1, 0.0
     for i in range(m):

@@ -1,7 +1,7 @@
 """The types of the arrays that the whole package computes with, named once.
 
 A kernel that is written as equations says of each array how many dimensions it has: ``Array1D`` is a
-vector, ``Array2D`` a matrix. ``Array``, ``Flags`` and ``Indices`` leave it open.
+vector, ``Array2D`` a matrix, ``Vector3`` a vector of three. ``Array``, ``Flags`` and ``Indices`` leave it open.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 
 class Rank(NamedTuple):
-    """How many dimensions an array has, and the type of its elements for Python."""
+    """How many dimensions an array has, the type of its elements for Python, and known sizes."""
 
     dimensions: int
     element: type
+    sizes: tuple[int | None, ...] = ()
 
 
 Array: TypeAlias = NDArray[np.float64]
@@ -35,3 +36,10 @@ Flags2D: TypeAlias = Annotated[Flags, Rank(2, bool)]
 Indices0D: TypeAlias = Annotated[Indices, Rank(0, int)]
 Indices1D: TypeAlias = Annotated[Indices, Rank(1, int)]
 Indices2D: TypeAlias = Annotated[Indices, Rank(2, int)]
+
+Vector2: TypeAlias = Annotated[Array, Rank(1, float, (2,))]
+Vector3: TypeAlias = Annotated[Array, Rank(1, float, (3,))]
+Vector4: TypeAlias = Annotated[Array, Rank(1, float, (4,))]
+Matrix3: TypeAlias = Annotated[Array, Rank(2, float, (3, 3))]
+Rows3: TypeAlias = Annotated[Array, Rank(2, float, (None, 3))]
+"""Rows of three, such as the places of some points."""

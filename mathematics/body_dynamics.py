@@ -14,7 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, Flags, Indices
+from .arrays import (
+    Array1D,
+    Array2D,
+    Array3D,
+    Flags1D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from .constants import GRAVITY
 from .kernel import kernel
 
@@ -29,13 +38,13 @@ class BodyTree(NamedTuple):
     the body's frame. Frames have the base's axes while all joints are at zero.
     """
 
-    parent: Indices
-    origin: Array
-    axis: Array
-    slides: Flags
-    mass: Array
-    com: Array
-    inertia: Array
+    parent: Indices1D
+    origin: Rows3
+    axis: Rows3
+    slides: Flags1D
+    mass: Array1D
+    com: Rows3
+    inertia: Array2D
 
 
 class BodyMotion(NamedTuple):
@@ -47,11 +56,11 @@ class BodyMotion(NamedTuple):
     ``rotation`` and ``velocity``; the base's place is zero, and so is its acceleration.
     """
 
-    rotation: Array
-    place: Array
-    joint: Array
-    velocity: Array
-    acceleration: Array
+    rotation: Array3D
+    place: Rows3
+    joint: Array2D
+    velocity: Array2D
+    acceleration: Array2D
 
 
 def body_motion(n_joints: int) -> BodyMotion:
@@ -69,22 +78,22 @@ def body_motion(n_joints: int) -> BodyMotion:
 
 
 @kernel
-def turn_about(base: Array, axis: Array, angle: float, out: Array) -> None:
+def turn_about(base: Matrix3, axis: Vector3, angle: float, out: Matrix3) -> None:
     """``base`` (3, 3) times the rotation by ``angle`` [rad] about the unit vector ``axis``."""
-    x, y, z = float(axis[0]), float(axis[1]), float(axis[2])
+    x, y, z = axis[0], axis[1], axis[2]
     cos, sin = math.cos(angle), math.sin(angle)
     rest = 1.0 - cos
     xx, yy, zz = cos + x * x * rest, cos + y * y * rest, cos + z * z * rest
     xy, xz, yz = x * y * rest, x * z * rest, y * z * rest
     for row in range(3):
-        a, b, c = float(base[row, 0]), float(base[row, 1]), float(base[row, 2])
+        a, b, c = base[row, 0], base[row, 1], base[row, 2]
         out[row, 0] = a * xx + b * (xy + z * sin) + c * (xz - y * sin)
         out[row, 1] = a * (xy - z * sin) + b * yy + c * (yz + x * sin)
         out[row, 2] = a * (xz + y * sin) + b * (yz - x * sin) + c * zz
 
 
 @kernel
-def place_bodies(tree: BodyTree, position: Array, motion: BodyMotion) -> None:
+def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
     """Where all bodies are at the joints' positions [rad, or m for a slide], (n_joints,)."""
     for k in range(position.shape[0]):
         carrier = int(tree.parent[k])
@@ -95,7 +104,7 @@ def place_bodies(tree: BodyTree, position: Array, motion: BodyMotion) -> None:
             a, b, c = float(rotation[row, 0]), float(rotation[row, 1]), float(rotation[row, 2])
             place[row] = float(motion.place[carrier, row]) + (a * x + b * y + c * z)
             joint[3 + row] = a * u + b * v + c * w
-        angle = float(position[k])
+        angle = position[k]
         if tree.slides[k]:
             for row in range(3):
                 for column in range(3):
@@ -111,14 +120,14 @@ def place_bodies(tree: BodyTree, position: Array, motion: BodyMotion) -> None:
 
 
 @kernel
-def move_bodies(tree: BodyTree, speed: Array, motion: BodyMotion) -> None:
+def move_bodies(tree: BodyTree, speed: Array1D, motion: BodyMotion) -> None:
     """The velocities of all placed bodies at the joints' speeds [rad/s or m/s], (n_joints,), and
     their accelerations while no generalised velocity changes.
 
     V = V_parent + S q', and as S moves with the parent, A = A_parent + V_parent x S q'.
     """
     for k in range(speed.shape[0]):
-        carrier, rate = int(tree.parent[k]), float(speed[k])
+        carrier, rate = int(tree.parent[k]), speed[k]
         before, joint = motion.velocity[carrier], motion.joint[k]
         x, y, z = float(joint[0]) * rate, float(joint[1]) * rate, float(joint[2]) * rate
         u, v, w = float(joint[3]) * rate, float(joint[4]) * rate, float(joint[5]) * rate
@@ -137,9 +146,9 @@ def move_bodies(tree: BodyTree, speed: Array, motion: BodyMotion) -> None:
 
 
 @kernel
-def place_of(motion: BodyMotion, body: int, local: Array, out: Array) -> None:
+def place_of(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> None:
     """The place (3,) of a body's point that is at ``local`` (3,) in the body's frame [m]."""
-    x, y, z = float(local[0]), float(local[1]), float(local[2])
+    x, y, z = local[0], local[1], local[2]
     for row in range(3):
         turned = (
             float(motion.rotation[body, row, 0]) * x
@@ -150,9 +159,9 @@ def place_of(motion: BodyMotion, body: int, local: Array, out: Array) -> None:
 
 
 @kernel
-def velocity_at(motion: BodyMotion, body: int, place: Array, out: Array) -> None:
+def velocity_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> None:
     """The velocity (3,) of a body's point at ``place`` (3,) [m/s]: v + w x r."""
-    x, y, z = float(place[0]), float(place[1]), float(place[2])
+    x, y, z = place[0], place[1], place[2]
     spatial = motion.velocity[body]
     p, q, r = float(spatial[3]), float(spatial[4]), float(spatial[5])
     out[0] = float(spatial[0]) + (q * z - r * y)
@@ -161,11 +170,11 @@ def velocity_at(motion: BodyMotion, body: int, place: Array, out: Array) -> None
 
 
 @kernel
-def acceleration_at(motion: BodyMotion, body: int, place: Array, out: Array) -> None:
+def acceleration_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> None:
     """The acceleration (3,) of a body's point at ``place`` (3,) [m/s^2]: a + w' x r + w x v_r."""
     velocity_at(motion, body, place, out)
-    u, v, w = float(out[0]), float(out[1]), float(out[2])
-    x, y, z = float(place[0]), float(place[1]), float(place[2])
+    u, v, w = out[0], out[1], out[2]
+    x, y, z = place[0], place[1], place[2]
     p, q, r = (
         float(motion.velocity[body, 3]),
         float(motion.velocity[body, 4]),
@@ -187,26 +196,26 @@ class Inertias(NamedTuple):
     ``centre`` (3,) and ``turned`` (3, 3) are scratch.
     """
 
-    mass: Array
-    moment: Array
-    inertia: Array
-    force: Array
-    spatial: Array
-    centre: Array
-    turned: Array
+    mass: Array1D
+    moment: Rows3
+    inertia: Array2D
+    force: Array2D
+    spatial: Array1D
+    centre: Vector3
+    turned: Matrix3
 
 
 class MotionTerms(NamedTuple):
     """The terms of the equations of motion, as in ``DynamicsTerms``; ``com`` is a place."""
 
-    mass_matrix: Array
-    nonlinear_effects: Array
-    com: Array
-    com_velocity: Array
-    centroidal_matrix: Array
-    centroidal_drift: Array
-    linear_momentum: Array
-    angular_momentum: Array
+    mass_matrix: Array2D
+    nonlinear_effects: Array1D
+    com: Vector3
+    com_velocity: Vector3
+    centroidal_matrix: Array2D
+    centroidal_drift: Array1D
+    linear_momentum: Vector3
+    angular_momentum: Vector3
 
 
 def inertias(n_joints: int) -> Inertias:
@@ -219,12 +228,12 @@ def inertias(n_joints: int) -> Inertias:
 
 
 @kernel
-def turn_inertia(inertia: Array, rotation: Array, turned: Array, out: Array) -> None:
+def turn_inertia(inertia: Array1D, rotation: Matrix3, turned: Matrix3, out: Array1D) -> None:
     """R I R' of an inertia (6,): xx, yy, zz, xy, xz, yz. ``turned`` (3, 3) is scratch."""
-    xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
-    xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+    xx, yy, zz = inertia[0], inertia[1], inertia[2]
+    xy, xz, yz = inertia[3], inertia[4], inertia[5]
     for row in range(3):
-        a, b, c = float(rotation[row, 0]), float(rotation[row, 1]), float(rotation[row, 2])
+        a, b, c = rotation[row, 0], rotation[row, 1], rotation[row, 2]
         turned[row, 0] = a * xx + b * xy + c * xz
         turned[row, 1] = a * xy + b * yy + c * yz
         turned[row, 2] = a * xz + b * yz + c * zz
@@ -237,22 +246,22 @@ def turn_inertia(inertia: Array, rotation: Array, turned: Array, out: Array) -> 
 
 
 @kernel
-def _product(a: Array, b: Array, row: int, other: int) -> float:
+def _product(a: Array2D, b: Array2D, row: int, other: int) -> float:
     """Row ``row`` of ``a`` times row ``other`` of ``b``, both (3, 3)."""
-    first = float(a[row, 0]) * float(b[other, 0]) + float(a[row, 1]) * float(b[other, 1])
+    first = a[row, 0] * b[other, 0] + a[row, 1] * b[other, 1]
     return first + float(a[row, 2]) * float(b[other, 2])
 
 
 @kernel
-def momentum_of(inertias: Inertias, body: int, spatial: Array, out: Array) -> None:
+def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -> None:
     """The spatial momentum (6,) of a body, with all that it carries, at a spatial velocity (6,)."""
     mass, moment, inertia = (
         float(inertias.mass[body]),
         inertias.moment[body],
         inertias.inertia[body],
     )
-    a, b, c = float(spatial[0]), float(spatial[1]), float(spatial[2])
-    p, q, r = float(spatial[3]), float(spatial[4]), float(spatial[5])
+    a, b, c = spatial[0], spatial[1], spatial[2]
+    p, q, r = spatial[3], spatial[4], spatial[5]
     x, y, z = float(moment[0]), float(moment[1]), float(moment[2])
     xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
     xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
@@ -320,7 +329,7 @@ def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> Non
 
 @kernel
 def write_column(
-    column: int, spatial: Array, com: Array, rotation: Array, scale: float, terms: MotionTerms
+    column: int, spatial: Array1D, com: Vector3, rotation: Matrix3, scale: float, terms: MotionTerms
 ) -> None:
     """Write one column of the mass matrix's base rows and of the centroidal matrix.
 
@@ -329,33 +338,33 @@ def write_column(
         com: the place of the centre of mass, (3,).
         rotation: of the base, (3, 3).
     """
-    a, b, c = float(spatial[0]) * scale, float(spatial[1]) * scale, float(spatial[2]) * scale
-    p, q, r = float(spatial[3]) * scale, float(spatial[4]) * scale, float(spatial[5]) * scale
-    x, y, z = float(com[0]), float(com[1]), float(com[2])
+    a, b, c = spatial[0] * scale, spatial[1] * scale, spatial[2] * scale
+    p, q, r = spatial[3] * scale, spatial[4] * scale, spatial[5] * scale
+    x, y, z = com[0], com[1], com[2]
     centroidal = terms.centroidal_matrix
     centroidal[0, column], centroidal[1, column], centroidal[2, column] = a, b, c
     centroidal[3, column] = p - (y * c - z * b)
     centroidal[4, column] = q - (z * a - x * c)
     centroidal[5, column] = r - (x * b - y * a)
     for k in range(3):
-        u, v, w = float(rotation[0, k]), float(rotation[1, k]), float(rotation[2, k])
+        u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
         linear, angular = u * a + v * b + w * c, u * p + v * q + w * r
         terms.mass_matrix[k, column] = terms.mass_matrix[column, k] = linear
         terms.mass_matrix[3 + k, column] = terms.mass_matrix[column, 3 + k] = angular
 
 
 @kernel
-def inner(a: Array, b: Array) -> float:
+def inner(a: Array1D, b: Array1D) -> float:
     """The inner product of two spatial vectors (6,)."""
     total = 0.0
     for k in range(6):
-        total += float(a[k]) * float(b[k])
+        total += a[k] * b[k]
     return total
 
 
 @kernel
 def write_matrices(
-    tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array, scale: float,
+    tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array2D, scale: float,
     terms: MotionTerms,
 ) -> None:  # fmt: skip
     """The mass matrix, with the inertia of the rotors, and the centroidal matrix.
@@ -393,8 +402,8 @@ def write_matrices(
         i = j
         while i >= 0:
             shared = scale * inner(motion.joint[i], spatial)
-            terms.mass_matrix[first + i, first + j] = float(rotors[i, j]) + shared
-            terms.mass_matrix[first + j, first + i] = float(rotors[j, i]) + shared
+            terms.mass_matrix[first + i, first + j] = rotors[i, j] + shared
+            terms.mass_matrix[first + j, first + i] = rotors[j, i] + shared
             i = int(tree.parent[i]) - 1
 
 
@@ -429,7 +438,7 @@ def write_forces(motion: BodyMotion, composite: Inertias, scale: float, terms: M
 
 
 @kernel
-def write_momentum(velocity: Array, scale: float, mass: float, terms: MotionTerms) -> None:
+def write_momentum(velocity: Array1D, scale: float, mass: float, terms: MotionTerms) -> None:
     """The momentum about the centre of mass, and its velocity, from the centroidal matrix.
 
     Args:
@@ -439,8 +448,8 @@ def write_momentum(velocity: Array, scale: float, mass: float, terms: MotionTerm
     for k in range(3):
         linear, angular = 0.0, 0.0
         for j in range(velocity.shape[0]):
-            linear += float(terms.centroidal_matrix[k, j]) * float(velocity[j])
-            angular += float(terms.centroidal_matrix[3 + k, j]) * float(velocity[j])
+            linear += float(terms.centroidal_matrix[k, j]) * velocity[j]
+            angular += float(terms.centroidal_matrix[3 + k, j]) * velocity[j]
         terms.linear_momentum[k], terms.angular_momentum[k] = linear, angular
         terms.com_velocity[k] = linear / (scale * mass)
 
@@ -450,9 +459,9 @@ def equations_of_motion(
     tree: BodyTree,
     motion: BodyMotion,
     composite: Inertias,
-    rotors: Array,
+    rotors: Array2D,
     scale: float,
-    velocity: Array,
+    velocity: Array1D,
     terms: MotionTerms,
 ) -> None:
     """All terms of the equations of motion, of bodies that have been placed and moved.

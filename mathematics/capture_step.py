@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Flags, Indices
+from .arrays import Array1D, Array2D, Flags1D, Indices1D, Vector2
 from .constants import GRAVITY
 from .kernel import kernel
 
@@ -28,7 +28,13 @@ _SHORTEST = 0.03
 
 @kernel
 def capture_point(
-    com: Array, velocity: Array, angular: Array, mass: float, height: float, turn: float, out: Array
+    com: Array1D,
+    velocity: Array1D,
+    angular: Array1D,
+    mass: float,
+    height: float,
+    turn: float,
+    out: Array1D,
 ) -> float:
     """Compute the capture point ``out`` (2,) [m]; returns the pendulum's frequency w [1/s].
 
@@ -40,14 +46,14 @@ def capture_point(
     """
     rate = math.sqrt(GRAVITY / max(height, 0.05))
     way = turn * rate / (mass * GRAVITY)
-    out[0] = float(com[0]) + float(velocity[0]) / rate + way * float(angular[1])
-    out[1] = float(com[1]) + float(velocity[1]) / rate - way * float(angular[0])
+    out[0] = com[0] + velocity[0] / rate + way * angular[1]
+    out[1] = com[1] + velocity[1] / rate - way * angular[0]
     return rate
 
 
 @kernel
 def nearest_in_foot(
-    points: Array, foot_of_point: Indices, foot: int, place: Array, out: Array
+    points: Array2D, foot_of_point: Indices1D, foot: int, place: Array1D, out: Array1D
 ) -> float:
     """The place ``out`` (2,) nearest to a ``place`` (2,) between two contact points of a ``foot``.
 
@@ -58,16 +64,16 @@ def nearest_in_foot(
     Returns:
         The distance [m].
     """
-    x, y = float(place[0]), float(place[1])
+    x, y = place[0], place[1]
     least = math.inf
     for i in range(points.shape[0]):
         if foot_of_point[i] != foot:
             continue
-        ax, ay = float(points[i, 0]), float(points[i, 1])
+        ax, ay = points[i, 0], points[i, 1]
         for j in range(i, points.shape[0]):
             if foot_of_point[j] != foot:
                 continue
-            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
+            dx, dy = points[j, 0] - ax, points[j, 1] - ay
             square = dx * dx + dy * dy
             share = 0.0
             if square > 1e-12:
@@ -82,7 +88,7 @@ def nearest_in_foot(
 
 @kernel
 def farthest_foot(
-    points: Array, foot_of_point: Indices, n_feet: int, place: Array, scratch: Array
+    points: Array2D, foot_of_point: Indices1D, n_feet: int, place: Array1D, scratch: Array1D
 ) -> int:
     """The foot that is farthest from a ``place`` (2,): the one that carries least there.
 
@@ -98,17 +104,17 @@ def farthest_foot(
 
 @kernel
 def choose_foothold(
-    capture: Array,
+    capture: Vector2,
     rate: float,
     left: float,
     beyond: float,
-    points: Array,
-    foot_of_point: Indices,
+    points: Array2D,
+    foot_of_point: Indices1D,
     swing: int,
     n_feet: int,
-    nearest: Array,
-    scratch: Array,
-    out: Array,
+    nearest: Vector2,
+    scratch: Vector2,
+    out: Array1D,
 ) -> None:
     """Where the foot ``swing`` should land: at the capture point of that instant, and beyond.
 
@@ -132,18 +138,18 @@ def choose_foothold(
             nearest[0], nearest[1] = scratch[0], scratch[1]
     grown = (1.0 + beyond) * math.exp(rate * left)
     for k in range(2):
-        out[k] = float(nearest[k]) + grown * (float(capture[k]) - float(nearest[k]))
+        out[k] = nearest[k] + grown * (capture[k] - nearest[k])
 
 
 @kernel
 def limit_foothold(
-    stance: Array,
+    stance: Array1D,
     heading: float,
     side: float,
     ahead: float,
     nearest: float,
     farthest: float,
-    out: Array,
+    out: Array1D,
 ) -> None:
     """Move a foothold to where the legs reach and do not cross.
 
@@ -156,15 +162,15 @@ def limit_foothold(
         out: the foothold, (3,), changed.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
-    dx, dy = float(out[0]) - float(stance[0]), float(out[1]) - float(stance[1])
+    dx, dy = out[0] - stance[0], out[1] - stance[1]
     along = min(max(cosine * dx + sine * dy, -ahead), ahead)
     across = cosine * dy - sine * dx
     if side != 0.0:
         across = side * min(max(side * across, nearest), farthest)
     else:
         across = min(max(across, -farthest), farthest)
-    out[0] = float(stance[0]) + cosine * along - sine * across
-    out[1] = float(stance[1]) + sine * along + cosine * across
+    out[0] = stance[0] + cosine * along - sine * across
+    out[1] = stance[1] + sine * along + cosine * across
 
 
 @kernel
@@ -177,7 +183,7 @@ def approach(place: float, speed: float, goal: float, left: float) -> float:
 
 
 @kernel
-def spread_to_feet(stance: Flags, foot: Indices, n_feet: int, out: Flags) -> int:
+def spread_to_feet(stance: Flags1D, foot: Indices1D, n_feet: int, out: Flags1D) -> int:
     """All points of the feet that have a point in ``stance``; returns how many feet these are."""
     count = 0
     for number in range(n_feet):
@@ -195,18 +201,18 @@ def spread_to_feet(stance: Flags, foot: Indices, n_feet: int, out: Flags) -> int
 @kernel
 def swing_points(
     swing: int,
-    foot: Indices,
-    offset: Array,
-    place: Array,
+    foot: Indices1D,
+    offset: Array2D,
+    place: Array1D,
     heading: float,
     elapsed: float,
     duration: float,
     height: float,
-    position: Array,
-    velocity: Array,
-    stance: Flags,
-    stepping: Flags,
-    acceleration: Array,
+    position: Array2D,
+    velocity: Array2D,
+    stance: Flags1D,
+    stepping: Flags1D,
+    acceleration: Array2D,
 ) -> None:
     """The acceleration of the points of the foot ``swing`` to its place, with a flat sole.
 
@@ -230,15 +236,15 @@ def swing_points(
         if foot[i] != swing:
             continue
         stance[i], stepping[i] = False, True
-        x = float(place[0]) + cosine * float(offset[i, 0]) - sine * float(offset[i, 1])
-        y = float(place[1]) + sine * float(offset[i, 0]) + cosine * float(offset[i, 1])
-        z, until = float(place[2]) - height, left
+        x = place[0] + cosine * offset[i, 0] - sine * offset[i, 1]
+        y = place[1] + sine * offset[i, 0] + cosine * offset[i, 1]
+        z, until = place[2] - height, left
         if rises:
-            z = float(place[2]) + height
+            z = place[2] + height
             until = max(0.5 * duration - elapsed, _SHORTEST)
-        acceleration[i, 0] = approach(float(position[i, 0]), float(velocity[i, 0]), x, left)
-        acceleration[i, 1] = approach(float(position[i, 1]), float(velocity[i, 1]), y, left)
-        acceleration[i, 2] = approach(float(position[i, 2]), float(velocity[i, 2]), z, until)
+        acceleration[i, 0] = approach(position[i, 0], velocity[i, 0], x, left)
+        acceleration[i, 1] = approach(position[i, 1], velocity[i, 1], y, left)
+        acceleration[i, 2] = approach(position[i, 2], velocity[i, 2], z, until)
 
 
 @kernel

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from .arrays import Array
+from .arrays import Array1D, Array2D, Rows3, Vector3
 from .kernel import kernel
 from .rotations import exponential as rotation_exponential
 from .rotations import logarithm as rotation_logarithm
@@ -23,14 +23,14 @@ _SMALL = 1e-4
 
 
 @kernel
-def bend(phi: Array, vector: Array, out: Array) -> None:
+def bend(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     """Multiply a vector by the left Jacobian J of SO(3) at ``phi``: ``out`` = J v, (3,).
 
     J v = v + (1 - cos a) / a^2 phi x v + (a - sin a) / a^3 phi x (phi x v), with the angle
     a = |phi|. J v is the integral of v while it is rotated by phi at a constant rate.
     """
-    x, y, z = float(phi[0]), float(phi[1]), float(phi[2])
-    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    x, y, z = phi[0], phi[1], phi[2]
+    a, b, c = vector[0], vector[1], vector[2]
     square = x * x + y * y + z * z
     angle = math.sqrt(square)
     if angle < _SMALL:
@@ -45,13 +45,13 @@ def bend(phi: Array, vector: Array, out: Array) -> None:
 
 
 @kernel
-def unbend(phi: Array, vector: Array, out: Array) -> None:
+def unbend(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     """Multiply a vector by the inverse of the left Jacobian of SO(3), for angles below 2 pi.
 
     J^-1 v = v - phi x v / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) phi x (phi x v).
     """
-    x, y, z = float(phi[0]), float(phi[1]), float(phi[2])
-    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    x, y, z = phi[0], phi[1], phi[2]
+    a, b, c = vector[0], vector[1], vector[2]
     square = x * x + y * y + z * z
     angle = math.sqrt(square)
     if angle < _SMALL:
@@ -67,7 +67,7 @@ def unbend(phi: Array, vector: Array, out: Array) -> None:
 
 
 @kernel
-def exponential(tangent: Array, orientation: Array, vectors: Array) -> None:
+def exponential(tangent: Array1D, orientation: Array1D, vectors: Array2D) -> None:
     """The exponential map: the group element of a tangent vector (3 + 3 m).
 
     The result is written to ``orientation`` (4,) and ``vectors`` (m, 3).
@@ -78,7 +78,7 @@ def exponential(tangent: Array, orientation: Array, vectors: Array) -> None:
 
 
 @kernel
-def logarithm(orientation: Array, vectors: Array, tangent: Array) -> None:
+def logarithm(orientation: Array1D, vectors: Array2D, tangent: Array1D) -> None:
     """The logarithm: the tangent vector (3 + 3 m) of a group element; its angle is at most pi."""
     rotation_logarithm(orientation, tangent)
     for k in range(vectors.shape[0]):
@@ -87,8 +87,8 @@ def logarithm(orientation: Array, vectors: Array, tangent: Array) -> None:
 
 @kernel
 def divide(
-    left: Array, left_vectors: Array, right: Array, right_vectors: Array,
-    orientation: Array, vectors: Array, spare: Array,
+    left: Array1D, left_vectors: Rows3, right: Array1D, right_vectors: Rows3,
+    orientation: Array1D, vectors: Rows3, spare: Array1D,
 ) -> None:  # fmt: skip
     """``left`` times the inverse of ``right``: the right-invariant error of ``left``.
 
@@ -97,17 +97,18 @@ def divide(
         spare: scratch (4,).
     """
     for i in range(3):
-        spare[i] = -float(right[i])
-    spare[3] = float(right[3])
+        spare[i] = -right[i]
+    spare[3] = right[3]
     multiply(left, spare, orientation)
     for k in range(vectors.shape[0]):
         rotate(orientation, right_vectors[k], vectors[k])
-        for i in range(3):
-            vectors[k, i] = float(left_vectors[k, i]) - float(vectors[k, i])
+        vectors[k, :] = left_vectors[k] - vectors[k]
 
 
 @kernel
-def retract(tangent: Array, orientation: Array, vectors: Array, turn: Array, spare: Array) -> None:
+def retract(
+    tangent: Array1D, orientation: Array1D, vectors: Rows3, turn: Array1D, spare: Vector3
+) -> None:
     """Replace the element X by exp(``tangent``) X: a correction that is expressed in the world.
 
     Args:
@@ -119,5 +120,4 @@ def retract(tangent: Array, orientation: Array, vectors: Array, turn: Array, spa
     for k in range(vectors.shape[0]):
         bend(tangent, tangent[3 * k + 3 : 3 * k + 6], spare)
         rotate(turn, vectors[k], vectors[k])
-        for i in range(3):
-            vectors[k, i] += spare[i]
+        vectors[k, :] += spare

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .arrays import Array, Flags
+from .arrays import Array1D, Array2D, Flags1D, Rows3, Vector3
 from .constants import GRAVITY
 from .kernel import kernel
 from .rotations import integrate, normalise, rotate
@@ -19,15 +19,15 @@ from .rotations import integrate, normalise, rotate
 
 @kernel
 def propagate(
-    orientation: Array,
-    position: Array,
-    velocity: Array,
-    last_rate: Array,
-    rate: Array,
-    specific_force: Array,
+    orientation: Array1D,
+    position: Vector3,
+    velocity: Vector3,
+    last_rate: Vector3,
+    rate: Vector3,
+    specific_force: Vector3,
     period: float,
-    middle: Array,
-    acceleration: Array,
+    middle: Array1D,
+    acceleration: Vector3,
 ) -> None:
     """Integrate the inertial measurements over one period T.
 
@@ -42,28 +42,28 @@ def propagate(
             [m/s^2, world] afterwards.
     """
     for i in range(3):
-        last_rate[i] = 0.5 * (float(last_rate[i]) + float(rate[i]))
+        last_rate[i] = 0.5 * (last_rate[i] + rate[i])
     integrate(orientation, last_rate, 0.5 * period, middle)
     integrate(orientation, last_rate, period, orientation)
     rotate(middle, specific_force, acceleration)
     acceleration[2] -= GRAVITY
     for i in range(3):
-        gained = period * float(acceleration[i])
-        position[i] += period * (float(velocity[i]) + 0.5 * gained)
+        gained = period * acceleration[i]
+        position[i] += period * (velocity[i] + 0.5 * gained)
         velocity[i] += gained
 
 
 @kernel
-def turn(orientation: Array, x: float, y: float, z: float) -> None:
+def turn(orientation: Array1D, x: float, y: float, z: float) -> None:
     """Rotate an orientation by a small rotation vector [rad, world], to second order.
 
     The quaternion is normalised afterwards.
     """
     qx, qy, qz, qw = (
-        float(orientation[0]),
-        float(orientation[1]),
-        float(orientation[2]),
-        float(orientation[3]),
+        orientation[0],
+        orientation[1],
+        orientation[2],
+        orientation[3],
     )
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     w = 1.0 - 0.5 * (x * x + y * y + z * z)
@@ -75,7 +75,7 @@ def turn(orientation: Array, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) -> None:
+def right_up(orientation: Array1D, specific_force: Array1D, gain: float, up: Array1D) -> None:
     """Correct the tilt of an orientation by the specific force, which should point straight up.
 
     Args:
@@ -83,7 +83,7 @@ def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) 
         up: scratch (3,).
     """
     rotate(orientation, specific_force, up)
-    x, y, z = float(up[0]), float(up[1]), float(up[2])
+    x, y, z = up[0], up[1], up[2]
     size = math.sqrt(x * x + y * y + z * z)
     if size < 1e-3:
         return
@@ -91,9 +91,9 @@ def right_up(orientation: Array, specific_force: Array, gain: float, up: Array) 
 
 
 @kernel
-def upright(specific_force: Array, orientation: Array) -> None:
+def upright(specific_force: Array1D, orientation: Array1D) -> None:
     """The orientation, with no rotation about the vertical, whose specific force points upwards."""
-    x, y, z = float(specific_force[0]), float(specific_force[1]), float(specific_force[2])
+    x, y, z = specific_force[0], specific_force[1], specific_force[2]
     size = math.sqrt(x * x + y * y + z * z)
     orientation[0] = orientation[1] = orientation[2] = 0.0
     orientation[3] = 1.0
@@ -108,7 +108,7 @@ def upright(specific_force: Array, orientation: Array) -> None:
 
 @kernel
 def misalignment(
-    orientation: Array, points: Array, forward: Array, out: Array, place: Array
+    orientation: Array1D, points: Array2D, forward: Array1D, out: Array1D, place: Array1D
 ) -> bool:
     """The rotation (3,) [rad, world] that brings all points to one height and ``forward`` to x.
 
@@ -124,13 +124,13 @@ def misalignment(
     mean_x, mean_y, mean_z = 0.0, 0.0, 0.0
     for i in range(n):
         rotate(orientation, points[i], place)
-        mean_x += float(place[0]) / n
-        mean_y += float(place[1]) / n
-        mean_z += float(place[2]) / n
+        mean_x += place[0] / n
+        mean_y += place[1] / n
+        mean_z += place[2] / n
     xx, xy, yy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         rotate(orientation, points[i], place)
-        x, y, z = float(place[0]) - mean_x, float(place[1]) - mean_y, float(place[2]) - mean_z
+        x, y, z = place[0] - mean_x, place[1] - mean_y, place[2] - mean_z
         xx, xy, yy, xz, yz = xx + x * x, xy + x * y, yy + y * y, xz + x * z, yz + y * z
     determinant = xx * yy - xy * xy
     out[0] = out[1] = out[2] = 0.0
@@ -139,12 +139,14 @@ def misalignment(
     out[0] = (xy * xz - xx * yz) / determinant
     out[1] = (yy * xz - xy * yz) / determinant
     rotate(orientation, forward, place)
-    out[2] = -math.atan2(float(place[1]), float(place[0]))
+    out[2] = -math.atan2(place[1], place[0])
     return True
 
 
 @kernel
-def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weights: Array) -> float:
+def weigh(
+    world_rates: Array2D, active: Flags1D, velocity: Array1D, gate: float, weights: Array1D
+) -> float:
     """Weigh each active point by how likely it stands still; returns the largest weight.
 
     A point's velocity is ``velocity`` plus its rate [m/s, world]. Its weight is
@@ -155,9 +157,9 @@ def weigh(world_rates: Array, active: Flags, velocity: Array, gate: float, weigh
     for i in range(weights.shape[0]):
         weights[i] = 0.0
         if active[i]:
-            x = float(velocity[0]) + float(world_rates[i, 0])
-            y = float(velocity[1]) + float(world_rates[i, 1])
-            z = float(velocity[2]) + float(world_rates[i, 2])
+            x = velocity[0] + world_rates[i, 0]
+            y = velocity[1] + world_rates[i, 1]
+            z = velocity[2] + world_rates[i, 2]
             ratio = 1.0 + (x * x + y * y + z * z) / (gate * gate)
             weights[i] = weight = 1.0 / (ratio * ratio)
             largest = max(largest, weight)
@@ -173,12 +175,12 @@ class StandingPoints(NamedTuple):
     positions where they stand [m, world], and ``anchored`` (n,) says which points have one.
     """
 
-    places: Array
-    rates: Array
-    active: Flags
-    weights: Array
-    anchors: Array
-    anchored: Flags
+    places: Rows3
+    rates: Rows3
+    active: Flags1D
+    weights: Array1D
+    anchors: Rows3
+    anchored: Flags1D
 
 
 @kernel
@@ -186,8 +188,8 @@ def stand_on(
     points: StandingPoints,
     velocity_gain: float,
     position_gain: float,
-    position: Array,
-    velocity: Array,
+    position: Vector3,
+    velocity: Vector3,
 ) -> None:
     """Correct velocity and position by the points that stand still.
 
@@ -209,12 +211,12 @@ def stand_on(
             if not active[i]:
                 continue
             weight = float(weights[i])
-            place = float(position[k]) + float(points.places[i, k])
+            place = position[k] + float(points.places[i, k])
             if anchored[i]:
                 anchors[i, k] += (1.0 - weight) * (place - float(anchors[i, k]))
             else:
                 anchors[i, k] = place
-            still -= weight * (float(velocity[k]) + float(points.rates[i, k]))
+            still -= weight * (velocity[k] + float(points.rates[i, k]))
             back += weight * (float(anchors[i, k]) - place)
         velocity[k] += velocity_gain * share * still
         position[k] += position_gain * share * back

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, Indices
+from .arrays import Array1D, Indices1D
 from .kernel import kernel
 
 
 @kernel
-def interval(points: Array, start: int, count: int, at: float) -> int:
+def interval(points: Array1D, start: int, count: int, at: float) -> int:
     """The place of the interval, from 0 to count - 2, in which ``at`` lies; the outer ones go on.
 
     The rising points are ``points[start]`` to ``points[start + count - 1]``, at least two.
@@ -19,7 +19,7 @@ def interval(points: Array, start: int, count: int, at: float) -> int:
     low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if at < float(points[start + middle]):
+        if at < points[start + middle]:
             high = middle
         else:
             low = middle
@@ -27,13 +27,13 @@ def interval(points: Array, start: int, count: int, at: float) -> int:
 
 
 @kernel
-def interpolate(points: Array, values: Array, at: float, clamp: bool) -> float:
+def interpolate(points: Array1D, values: Array1D, at: float, clamp: bool) -> float:
     """The value at ``at`` of the line through (points, values); both (k), points rising, k >= 2.
 
     Beyond the ends the outer values hold (``clamp``), or the outer lines go on.
     """
     k = interval(points, 0, points.shape[0], at)
-    x0, x1 = float(points[k]), float(points[k + 1])
+    x0, x1 = points[k], points[k + 1]
     share = (at - x0) / (x1 - x0)
     if clamp:
         share = min(max(share, 0.0), 1.0)
@@ -42,13 +42,13 @@ def interpolate(points: Array, values: Array, at: float, clamp: bool) -> float:
 
 @kernel
 def interpolate_grid(
-    points: Array,
-    counts: Indices,
-    values: Array,
-    at: Array,
+    points: Array1D,
+    counts: Indices1D,
+    values: Array1D,
+    at: Array1D,
     clamp: bool,
-    places: Indices,
-    shares: Array,
+    places: Indices1D,
+    shares: Array1D,
 ) -> float:
     """The multilinear value at ``at`` (d) of a table on a grid of d dimensions.
 
@@ -59,10 +59,10 @@ def interpolate_grid(
     dimensions = counts.shape[0]
     start = 0
     for axis in range(dimensions):
-        count = int(counts[axis])
-        k = interval(points, start, count, float(at[axis]))
-        x0, x1 = float(points[start + k]), float(points[start + k + 1])
-        share = (float(at[axis]) - x0) / (x1 - x0)
+        count = counts[axis]
+        k = interval(points, start, count, at[axis])
+        x0, x1 = points[start + k], points[start + k + 1]
+        share = (at[axis] - x0) / (x1 - x0)
         if clamp:
             share = min(max(share, 0.0), 1.0)
         places[axis] = k
@@ -74,11 +74,11 @@ def interpolate_grid(
         place = 0
         for axis in range(dimensions):
             upper = (corner >> axis) & 1
-            share = float(shares[axis])
+            share = shares[axis]
             weight *= share if upper == 1 else 1.0 - share
-            place = place * int(counts[axis]) + int(places[axis]) + upper
+            place = place * counts[axis] + places[axis] + upper
         if weight != 0.0:
-            total += weight * float(values[place])
+            total += weight * values[place]
     return total
 
 

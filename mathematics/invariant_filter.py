@@ -25,7 +25,15 @@ from __future__ import annotations
 
 import math
 
-from .arrays import Array, Flags, Indices
+from .arrays import (
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from .kernel import kernel
 from .linear_algebra import (
     make_symmetric,
@@ -38,7 +46,7 @@ from .linear_algebra import (
 
 
 @kernel
-def error_transition(gravity: float, period: float, transition: Array) -> None:
+def error_transition(gravity: float, period: float, transition: Array2D) -> None:
     """The constant part of the transition matrix F (n, n): the exponential of the equation above.
 
     ``gravity`` is in m/s^2, ``period`` in s.
@@ -56,7 +64,12 @@ def error_transition(gravity: float, period: float, transition: Array) -> None:
 
 @kernel
 def input_jacobian(
-    rotation: Array, vectors: Array, present: Flags, gravity: float, period: float, reach: Array
+    rotation: Matrix3,
+    vectors: Rows3,
+    present: Flags1D,
+    gravity: float,
+    period: float,
+    reach: Array2D,
 ) -> None:
     """The effect of a constant IMU error on the state's error over one period: ``reach`` (n, 6).
 
@@ -70,20 +83,20 @@ def input_jacobian(
         present: which contact points are in the state, (N,); the rows of the others are zero.
     """
     for j in range(3):
-        x, y, z = float(rotation[0, j]), float(rotation[1, j]), float(rotation[2, j])
+        x, y, z = rotation[0, j], rotation[1, j], rotation[2, j]
         reach[0, j], reach[1, j], reach[2, j] = -period * x, -period * y, -period * z
         for k in range(vectors.shape[0]):
             row = 3 * k + 3
             if k >= 2 and not present[k - 2]:
                 reach[row, j] = reach[row + 1, j] = reach[row + 2, j] = 0.0
                 continue
-            a, b, c = float(vectors[k, 0]), float(vectors[k, 1]), float(vectors[k, 2])
+            a, b, c = vectors[k, 0], vectors[k, 1], vectors[k, 2]
             if k == 0:  # the tilt error that grows during the period acts for half of it on average
                 c -= 0.5 * gravity * period
             elif k == 1:
-                a += 0.5 * period * float(vectors[0, 0])
-                b += 0.5 * period * float(vectors[0, 1])
-                c += 0.5 * period * float(vectors[0, 2])
+                a += 0.5 * period * vectors[0, 0]
+                b += 0.5 * period * vectors[0, 1]
+                c += 0.5 * period * vectors[0, 2]
             reach[row, j] = -period * (b * z - c * y)
             reach[row + 1, j] = -period * (c * x - a * z)
             reach[row + 2, j] = -period * (a * y - b * x)
@@ -94,8 +107,8 @@ def input_jacobian(
 
 @kernel
 def propagate_covariance(
-    transition: Array, reach: Array, bias: int, noise: Array, covariance: Array,
-    scaled: Array, product: Array,
+    transition: Array2D, reach: Array2D, bias: int, noise: Array1D, covariance: Array2D,
+    scaled: Array2D, product: Array2D,
 ) -> None:  # fmt: skip
     """Propagate the covariance P (n, n) over one period: F P F' + W W'.
 
@@ -118,18 +131,18 @@ def propagate_covariance(
     multiply_sparse(transition, product, covariance)
     for i in range(n):
         for k in range(6):
-            scaled[i, k] = float(reach[i, k]) * float(noise[k])
+            scaled[i, k] = reach[i, k] * noise[k]
     for i in range(n):
         for j in range(n):
             total = 0.0
             for k in range(6):
-                total += float(scaled[i, k]) * float(scaled[j, k])
+                total += scaled[i, k] * scaled[j, k]
             covariance[i, j] += total
     make_symmetric(covariance)
 
 
 @kernel
-def vector_deviation(covariance: Array, first: int, vector: Array) -> float:
+def vector_deviation(covariance: Array2D, first: int, vector: Vector3) -> float:
     """The standard deviation of the length of a vector's error in the world.
 
     The error of a vector u is xi_u plus the effect of the rotation error: xi_u + xi_R x u.
@@ -141,17 +154,17 @@ def vector_deviation(covariance: Array, first: int, vector: Array) -> float:
     total = 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        a, b = float(vector[k]), -float(vector[j])  # (xi_R x u)_i = u_k xi_j - u_j xi_k
-        total += float(covariance[first + i, first + i])
-        total += 2.0 * (a * float(covariance[first + i, j]) + b * float(covariance[first + i, k]))
-        total += a * a * float(covariance[j, j]) + b * b * float(covariance[k, k])
-        total += 2.0 * a * b * float(covariance[j, k])
+        a, b = vector[k], -vector[j]  # (xi_R x u)_i = u_k xi_j - u_j xi_k
+        total += covariance[first + i, first + i]
+        total += 2.0 * (a * covariance[first + i, j] + b * covariance[first + i, k])
+        total += a * a * covariance[j, j] + b * b * covariance[k, k]
+        total += 2.0 * a * b * covariance[j, k]
     return math.sqrt(total) if total > 0.0 else 0.0
 
 
 @kernel
 def sample_deviations(
-    reading: Array, limit: float, noise: float, doubt: float, run: Indices, out: Array
+    reading: Vector3, limit: float, noise: float, doubt: float, run: Indices1D, out: Vector3
 ) -> bool:
     """The standard deviations of a sample's axes, (3,); returns whether an axis is saturated.
 
@@ -168,9 +181,9 @@ def sample_deviations(
     any_full = False
     for axis in range(3):
         out[axis] = noise
-        if abs(float(reading[axis])) >= 0.999 * limit:
+        if abs(reading[axis]) >= 0.999 * limit:
             run[axis] += 1
-            out[axis] = doubt * math.sqrt(2.0 * int(run[axis]) - 1.0)
+            out[axis] = doubt * math.sqrt(2.0 * run[axis] - 1.0)
             any_full = True
         else:
             run[axis] = 0
@@ -178,7 +191,7 @@ def sample_deviations(
 
 
 @kernel
-def remove_contact(point: int, covariance: Array) -> None:
+def remove_contact(point: int, covariance: Array2D) -> None:
     """Remove a contact point from the state: set its covariances to zero."""
     first = 9 + 3 * point
     for i in range(first, first + 3):
@@ -187,7 +200,7 @@ def remove_contact(point: int, covariance: Array) -> None:
 
 
 @kernel
-def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> None:
+def place_jacobian(world_jacobian: Array2D, offsets: int, sensitivity: Array2D) -> None:
     """The measurement Jacobian H (3, n) of a point's position by leg kinematics.
 
     The columns of the point itself are left to ``measurement_jacobian``.
@@ -207,7 +220,12 @@ def place_jacobian(world_jacobian: Array, offsets: int, sensitivity: Array) -> N
 
 @kernel
 def add_contact(
-    point: int, sensitivity: Array, noise: Array, covariance: Array, rows: Array, corner: Array
+    point: int,
+    sensitivity: Array2D,
+    noise: Matrix3,
+    covariance: Array2D,
+    rows: Array2D,
+    corner: Matrix3,
 ) -> None:
     """Add a contact point to the covariance, at the position measured by leg kinematics.
 
@@ -221,33 +239,30 @@ def add_contact(
     multiply_transposed(rows, sensitivity, corner)
     for i in range(3):
         for k in range(covariance.shape[0]):
-            rows[i, k] = -float(rows[i, k])
+            rows[i, k] = -rows[i, k]
         for k in range(3):
-            mean = 0.5 * (float(corner[i, k]) + float(corner[k, i]))  # symmetric to the last bit
-            rows[i, first + k] = mean + float(noise[i, k])
+            mean = 0.5 * (corner[i, k] + corner[k, i])  # symmetric to the last bit
+            rows[i, first + k] = mean + noise[i, k]
     for i in range(3):
         for k in range(covariance.shape[0]):
             covariance[first + i, k] = rows[i, k]
     for i in range(3):
-        for k in range(covariance.shape[0]):
-            covariance[k, first + i] = rows[i, k]
+        covariance[:, first + i] = rows[i]
 
 
 @kernel
-def innovation(point: int, world_point: Array, vectors: Array, residual: Array) -> None:
+def innovation(point: int, world_point: Vector3, vectors: Rows3, residual: Vector3) -> None:
     """The innovation (3,) [m] of a point: its measured position minus its estimated one.
 
     Args:
         world_point: the measurement, from the base to the point, R h [m, world], (3,).
         residual: becomes the innovation.
     """
-    for i in range(3):
-        seen = float(vectors[1, i]) + float(world_point[i])
-        residual[i] = seen - float(vectors[2 + point, i])
+    residual[:] = vectors[1] + world_point - vectors[2 + point]
 
 
 @kernel
-def measurement_jacobian(point: int, sensitivity: Array) -> None:
+def measurement_jacobian(point: int, sensitivity: Array2D) -> None:
     """Fill in the point's own columns of the measurement Jacobian from ``place_jacobian``."""
     first = 9 + 3 * point
     for i in range(3):
@@ -257,8 +272,8 @@ def measurement_jacobian(point: int, sensitivity: Array) -> None:
 
 @kernel
 def height_row(
-    row: int, point: int, reference: int, height: float, vectors: Array,
-    sensitivity: Array, residual: Array,
+    row: int, point: int, reference: int, height: float, vectors: Array2D,
+    sensitivity: Array2D, residual: Array1D,
 ) -> None:  # fmt: skip
     """One row of H and r for the measured height of a point, over another point or the world.
 
@@ -268,22 +283,21 @@ def height_row(
         reference: the index of the other point; negative for the height over the world's origin.
         height: the measured height [m].
     """
-    for k in range(sensitivity.shape[1]):
-        sensitivity[row, k] = 0.0
-    x, y = float(vectors[2 + point, 0]), float(vectors[2 + point, 1])
-    z = float(vectors[2 + point, 2])
+    sensitivity[row, :] = 0.0
+    x, y = vectors[2 + point, 0], vectors[2 + point, 1]
+    z = vectors[2 + point, 2]
     sensitivity[row, 9 + 3 * point + 2] = 1.0
     if reference >= 0:
-        x -= float(vectors[2 + reference, 0])
-        y -= float(vectors[2 + reference, 1])
-        z -= float(vectors[2 + reference, 2])
+        x -= vectors[2 + reference, 0]
+        y -= vectors[2 + reference, 1]
+        z -= vectors[2 + reference, 2]
         sensitivity[row, 9 + 3 * reference + 2] = -1.0
     sensitivity[row, 0], sensitivity[row, 1] = y, -x
     residual[row] = height - z
 
 
 @kernel
-def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array) -> None:
+def world_definition_jacobian(levers: Array2D, vectors: Rows3, sensitivity: Array2D) -> None:
     """The measurement Jacobian H (3, n) of the world frame's definition by the feet.
 
     The first two rows put the world's origin at the mean x and y of the points, the third puts its
@@ -296,21 +310,20 @@ def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array)
     """
     n, total = levers.shape[0], 0.0
     for row in range(3):
-        for k in range(sensitivity.shape[1]):
-            sensitivity[row, k] = 0.0
+        sensitivity[row, :] = 0.0
     for point in range(n):
-        ahead, aside = float(levers[point, 0]), float(levers[point, 1])
+        ahead, aside = levers[point, 0], levers[point, 1]
         total += ahead * ahead + aside * aside
     for point in range(n):
         column = 9 + 3 * point
-        x, y = float(vectors[2 + point, 0]), float(vectors[2 + point, 1])
+        x, y = vectors[2 + point, 0], vectors[2 + point, 1]
         # The error of a point's position is xi_d plus the effect of the rotation error about z.
         sensitivity[0, column] = 1.0 / n
         sensitivity[0, 2] -= y / n
         sensitivity[1, column + 1] = 1.0 / n
         sensitivity[1, 2] += x / n
         if total > 0.0:
-            ahead, aside = float(levers[point, 0]) / total, float(levers[point, 1]) / total
+            ahead, aside = levers[point, 0] / total, levers[point, 1] / total
             sensitivity[2, column] = -aside
             sensitivity[2, column + 1] = ahead
             sensitivity[2, 2] += x * ahead + y * aside
@@ -318,7 +331,7 @@ def world_definition_jacobian(levers: Array, vectors: Array, sensitivity: Array)
 
 @kernel
 def add_contact_noise(
-    feet: Indices, present: Flags, own: float, shared: float, period: float, covariance: Array
+    feet: Indices1D, present: Flags1D, own: float, shared: float, period: float, covariance: Array2D
 ) -> None:
     """Add the process noise of standing points: each moves a little, and each foot as a whole.
 
@@ -341,10 +354,10 @@ def add_contact_noise(
 
 
 @kernel
-def invert(matrix: Array, out: Array) -> None:
+def invert(matrix: Array2D, out: Array2D) -> None:
     """The inverse of a symmetric matrix (3, 3); zero where it has none."""
-    a, b, c = float(matrix[0, 0]), float(matrix[0, 1]), float(matrix[0, 2])
-    d, e, f = float(matrix[1, 1]), float(matrix[1, 2]), float(matrix[2, 2])
+    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
+    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
     aa, bb, cc = d * f - e * e, c * e - b * f, b * e - c * d
     determinant = a * aa + b * bb + c * cc
     scale = 1.0 / determinant if abs(determinant) > 1e-300 else 0.0
@@ -355,8 +368,8 @@ def invert(matrix: Array, out: Array) -> None:
 
 @kernel
 def weigh(
-    covariance: Array, sensitivity: Array, noise: Array, residual: Array,
-    seen: Array, inverse: Array, spare: Array,
+    covariance: Array2D, sensitivity: Array2D, noise: Matrix3, residual: Vector3,
+    seen: Rows3, inverse: Matrix3, spare: Matrix3,
 ) -> float:  # fmt: skip
     """The squared Mahalanobis distance r' S^-1 r of a residual, with S = H P H' + N.
 
@@ -372,20 +385,19 @@ def weigh(
     multiply_transposed(covariance, sensitivity, seen)
     multiply_sparse(sensitivity, seen, spare)
     for i in range(3):
-        for k in range(3):
-            spare[i, k] += noise[i, k]
+        spare[i, :] += noise[i]
     invert(spare, inverse)
     total = 0.0
     for i in range(3):
         for k in range(3):
-            total += float(residual[i]) * float(inverse[i, k]) * float(residual[k])
+            total += residual[i] * inverse[i, k] * residual[k]
     return total
 
 
 @kernel
 def correct(
-    covariance: Array, sensitivity: Array, noise: Array, residual: Array,
-    seen: Array, inverse: Array, gain: Array, correction: Array,
+    covariance: Array2D, sensitivity: Array2D, noise: Array2D, residual: Array1D,
+    seen: Array2D, inverse: Array2D, gain: Array2D, correction: Array1D,
 ) -> None:  # fmt: skip
     """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``weigh``.
 
@@ -408,9 +420,8 @@ def correct(
 
 
 @kernel
-def add_outer(sign: float, a: Array, b: Array, out: Array) -> None:
+def add_outer(sign: float, a: Array2D, b: Array2D, out: Array2D) -> None:
     """Add ``sign`` times ``a`` (n, 3) times the transpose of ``b`` (n, 3) to ``out`` (n, n)."""
     for i in range(out.shape[0]):
-        x, y, z = sign * float(a[i, 0]), sign * float(a[i, 1]), sign * float(a[i, 2])
-        for j in range(out.shape[1]):
-            out[i, j] += x * float(b[j, 0]) + y * float(b[j, 1]) + z * float(b[j, 2])
+        x, y, z = sign * a[i, 0], sign * a[i, 1], sign * a[i, 2]
+        out[i, :] += x * b[:, 0] + y * b[:, 1] + z * b[:, 2]

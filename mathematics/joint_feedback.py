@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from .arrays import Array
+from .arrays import Array1D, Array2D
 from .kernel import kernel
 
 
 class Feedback(NamedTuple):
     """Stiffness towards an angle and damping towards a velocity, (n,) each."""
 
-    stiffness: Array
-    position: Array
-    damping: Array
-    velocity: Array
+    stiffness: Array1D
+    position: Array1D
+    damping: Array1D
+    velocity: Array1D
 
 
 class SoftStops(NamedTuple):
@@ -29,23 +29,23 @@ class SoftStops(NamedTuple):
     margin to ``gain`` times ``damping`` at the limit. ``margin`` and ``gain`` are (1,).
     """
 
-    limits: Array
-    margin: Array
-    gain: Array
-    stiffness: Array
-    damping: Array
+    limits: Array2D
+    margin: Array1D
+    gain: Array1D
+    stiffness: Array1D
+    damping: Array1D
 
 
 class Motion(NamedTuple):
     """Joint angles [rad] and velocities [rad/s], (n,) each."""
 
-    position: Array
-    velocity: Array
+    position: Array1D
+    velocity: Array1D
 
 
 @kernel
 def blend_feedback(
-    weight: Array, first: Feedback, second: Feedback, measured: Motion, out: Feedback
+    weight: Array1D, first: Feedback, second: Feedback, measured: Motion, out: Feedback
 ) -> None:
     """Blend two feedbacks into one, whose torque is the weighted mean of both torques.
 
@@ -64,34 +64,34 @@ def blend_feedback(
 
 @kernel
 def blend_gain(
-    weight: Array,
-    first_gain: Array,
-    first_target: Array,
-    second_gain: Array,
-    second_target: Array,
-    measured: Array,
-    gain: Array,
-    target: Array,
+    weight: Array1D,
+    first_gain: Array1D,
+    first_target: Array1D,
+    second_gain: Array1D,
+    second_target: Array1D,
+    measured: Array1D,
+    gain: Array1D,
+    target: Array1D,
 ) -> None:
     """Blend one pair of gains and targets, stiffness or damping, as ``blend_feedback`` does."""
     for i in range(gain.shape[0]):
-        first = float(weight[i]) * float(first_gain[i])
-        second = (1.0 - float(weight[i])) * float(second_gain[i])
+        first = weight[i] * first_gain[i]
+        second = (1.0 - weight[i]) * second_gain[i]
         total = first + second
         gain[i] = total
         if total > 0.0:
             share = first / total
-            target[i] = share * float(first_target[i]) + (1.0 - share) * float(second_target[i])
+            target[i] = share * first_target[i] + (1.0 - share) * second_target[i]
         else:
             target[i] = measured[i]
 
 
 @kernel
-def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
+def add_soft_stops(measured: Array1D, stops: SoftStops, out: Feedback) -> None:
     """Add soft stops to a feedback where a measured angle (n,) is near its joint's limit."""
     margin, gain = float(stops.margin[0]), float(stops.gain[0])
     for i in range(measured.shape[0]):
-        angle = float(measured[i])
+        angle = measured[i]
         edge = min(
             max(angle, float(stops.limits[i, 0]) + margin), float(stops.limits[i, 1]) - margin
         )
@@ -112,7 +112,7 @@ def add_soft_stops(measured: Array, stops: SoftStops, out: Feedback) -> None:
 
 @kernel
 def add_friction(
-    velocity: Array, friction: Array, damping: Array, speed: float, torque: Array
+    velocity: Array1D, friction: Array1D, damping: Array1D, speed: float, torque: Array1D
 ) -> None:
     """Add the torque that compensates joint friction to ``torque`` [N m], (n,).
 
@@ -120,15 +120,13 @@ def add_friction(
     viscous ``damping`` [N m s/rad]. The first term is zero at rest and has three quarters of its
     full value at ``speed`` [rad/s].
     """
-    for i in range(torque.shape[0]):
-        share = math.tanh(float(velocity[i]) / speed)
-        torque[i] = float(torque[i]) + share * float(friction[i])
-        torque[i] = float(torque[i]) + float(velocity[i]) * float(damping[i])
+    torque[:] = torque + math.tanh(velocity / speed) * friction
+    torque[:] = torque + velocity * damping
 
 
 @kernel
 def integrate_accelerations(
-    period: float, leak: float, acceleration: Array, measured: Motion, targets: Motion
+    period: float, leak: float, acceleration: Array1D, measured: Motion, targets: Motion
 ) -> None:
     """Integrate accelerations [rad/s^2] (n,) to ``targets`` that leak towards the measured joints.
 
@@ -141,6 +139,6 @@ def integrate_accelerations(
         speed = float(targets.velocity[i])
         x = float(targets.position[i]) + period * speed
         targets.velocity[i] = (
-            speed + period * float(acceleration[i]) + share * (float(measured.velocity[i]) - speed)
+            speed + period * acceleration[i] + share * (float(measured.velocity[i]) - speed)
         )
         targets.position[i] = x + share * (float(measured.position[i]) - x)

@@ -21,23 +21,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array1D, Array2D, Array3D, Matrix3, Rows3, Vector2, Vector3, Vector4
 from .kernel import kernel
 from .linear_algebra import multiply_matrices, solve_positive, solve_rows
 
 
 @kernel
 def landing_place(
-    nominal: Array,
+    nominal: Array1D,
     side: float,
-    linear: Array,
-    angular: Array,
-    w_l: Array,
-    w_k: Array,
+    linear: Array1D,
+    angular: Array1D,
+    w_l: Array1D,
+    w_k: Array1D,
     w_c: float,
-    p_max: Array,
-    centre: Array,
-    out: Array,
+    p_max: Array1D,
+    centre: Array1D,
+    out: Array1D,
 ) -> None:
     """The paper's law (IV): the landing place (3,) from the nominal one (3,); z is unchanged.
 
@@ -46,26 +46,26 @@ def landing_place(
         linear, angular: the momenta l and k fed back.
         p_max: the largest distance of the place from ``centre`` (3,), ahead and aside [m].
     """
-    x = float(nominal[0]) + float(w_l[0]) * float(linear[0]) + float(w_k[0]) * float(angular[1])
-    y = float(nominal[1]) + float(w_l[1]) * float(linear[1]) + float(w_k[1]) * float(angular[0])
-    y += side * w_c * abs(float(linear[1]))
+    x = nominal[0] + w_l[0] * linear[0] + w_k[0] * angular[1]
+    y = nominal[1] + w_l[1] * linear[1] + w_k[1] * angular[0]
+    y += side * w_c * abs(linear[1])
     out[0], out[1], out[2] = x, y, nominal[2]
     keep_within(p_max, centre, out)
 
 
 @kernel
-def keep_within(p_max: Array, centre: Array, place: Array) -> None:
+def keep_within(p_max: Vector2, centre: Array1D, place: Array1D) -> None:
     """Move a ``place`` (3,) that is farther from the ``centre`` than ``p_max`` ahead or aside to
     that limit."""
     for i in range(2):
-        far = float(p_max[i])
-        distance = float(place[i]) - float(centre[i])
+        far = p_max[i]
+        distance = place[i] - centre[i]
         if abs(distance) > far:
-            place[i] = float(centre[i]) + math.copysign(far, distance)
+            place[i] = centre[i] + math.copysign(far, distance)
 
 
 @kernel
-def pull_to_place(goal: Array, miss: Array, gain: float, width: float) -> None:
+def pull_to_place(goal: Array1D, miss: Array1D, gain: float, width: float) -> None:
     """Move the landing place with regard to balance towards the planned place in the world.
 
     The way from the planned place to the ``goal`` is d = goal + miss. Of this way the share
@@ -77,7 +77,7 @@ def pull_to_place(goal: Array, miss: Array, gain: float, width: float) -> None:
         miss: by how much the feet miss their planned place without a shift [m], (2 or more,).
         width: the length of d at which half of ``gain`` is left [m].
     """
-    x, y = float(goal[0]) + float(miss[0]), float(goal[1]) + float(miss[1])
+    x, y = goal[0] + miss[0], goal[1] + miss[1]
     far = (x * x + y * y) / (width * width)
     share = gain / (1.0 + far * far)
     goal[0] -= share * x
@@ -85,26 +85,32 @@ def pull_to_place(goal: Array, miss: Array, gain: float, width: float) -> None:
 
 
 @kernel
-def turn_places(places: Array, angle: float, out: Array) -> None:
+def turn_places(places: Array2D, angle: float, out: Array2D) -> None:
     """Rotate places (n, 3) about the vertical by ``angle`` [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
     for i in range(places.shape[0]):
-        x, y = float(places[i, 0]), float(places[i, 1])
+        x, y = places[i, 0], places[i, 1]
         out[i, 0], out[i, 1], out[i, 2] = cosine * x - sine * y, sine * x + cosine * y, places[i, 2]
 
 
 @kernel
-def lowest_height(points: Array) -> float:
+def lowest_height(points: Array2D) -> float:
     """The least z of points (n, 3)."""
-    lowest = float(points[0, 2])
+    lowest = points[0, 2]
     for i in range(1, points.shape[0]):
-        lowest = min(lowest, float(points[i, 2]))
+        lowest = min(lowest, points[i, 2])
     return lowest
 
 
 @kernel
 def swing(
-    planned: Array, place: Array, offset: Array, share: float, rate: float, out: Array, speed: Array
+    planned: Vector3,
+    place: Vector3,
+    offset: Vector3,
+    share: float,
+    rate: float,
+    out: Vector3,
+    speed: Vector3,
 ) -> None:
     """The motion of a foot from its offset at lift-off to its corrected landing place.
 
@@ -117,14 +123,16 @@ def swing(
         speed: the planned velocity [m/s], which becomes the foot's.
     """
     for k in range(3):
-        goal = float(place[k]) - float(planned[k])
-        start = float(offset[k])
-        out[k] = float(planned[k]) + start + share * (goal - start)
+        goal = place[k] - planned[k]
+        start = offset[k]
+        out[k] = planned[k] + start + share * (goal - start)
         speed[k] += rate * (goal - start)
 
 
 @kernel
-def hasten(swing_velocity: Array, lead: float, rate: float, place: Array, speed: Array) -> None:
+def hasten(
+    swing_velocity: Array1D, lead: float, rate: float, place: Array1D, speed: Array1D
+) -> None:
     """Bring a foot forward on its planned way by the time ``lead``, ahead and aside.
 
     Args:
@@ -134,8 +142,8 @@ def hasten(swing_velocity: Array, lead: float, rate: float, place: Array, speed:
             which are changed.
     """
     for k in range(2):
-        place[k] += lead * float(swing_velocity[k])
-        speed[k] += rate * float(swing_velocity[k])
+        place[k] += lead * swing_velocity[k]
+        speed[k] += rate * swing_velocity[k]
 
 
 @kernel
@@ -149,7 +157,7 @@ def retraction(left: float, speed: float, duration: float) -> tuple[float, float
 
 
 @kernel
-def heading_matrix(angle: float, out: Array) -> None:
+def heading_matrix(angle: float, out: Array2D) -> None:
     """The rotation about the vertical by ``angle`` [rad], (3, 3)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     out[:, :] = 0.0
@@ -175,15 +183,15 @@ class FlightMap(NamedTuple):
         answers: scratch, (2, n_joints).
     """
 
-    drift: Array
-    carried: Array
-    turn: Array
-    jacobian: Array
-    inverse: Array
-    reaction: Array
-    normal: Array
-    lever: Array
-    answers: Array
+    drift: Matrix3
+    carried: Rows3
+    turn: Array2D
+    jacobian: Array2D
+    inverse: Matrix3
+    reaction: Array2D
+    normal: Array2D
+    lever: Matrix3
+    answers: Array2D
 
 
 def flight_map(n_joints: int, n_contacts: int) -> FlightMap:
@@ -204,7 +212,12 @@ def flight_map(n_joints: int, n_contacts: int) -> FlightMap:
 
 @kernel
 def map_flight(
-    momentum: Array, jacobian: Array, rotation: Array, mass: float, damping: float, out: FlightMap
+    momentum: Array2D,
+    jacobian: Array3D,
+    rotation: Matrix3,
+    mass: float,
+    damping: float,
+    out: FlightMap,
 ) -> None:
     """Compute ``out`` for the present configuration.
 
@@ -222,14 +235,14 @@ def map_flight(
     for i in range(jacobian.shape[0]):
         for j in range(3):
             for k in range(3):
-                lever = float(momentum[j, 3 + k]) / mass
-                out.lever[j, k] = float(jacobian[i, j, 3 + k]) - lever
+                lever = momentum[j, 3 + k] / mass
+                out.lever[j, k] = jacobian[i, j, 3 + k] - lever
         rows = out.jacobian[3 * i : 3 * i + 3]
         multiply_matrices(out.lever, out.inverse, out.carried[3 * i : 3 * i + 3])
         multiply_matrices(out.lever, out.reaction, rows)
         for j in range(3):
             for k in range(n):
-                along = float(jacobian[i, j, 6 + k]) - float(momentum[j, 6 + k]) / mass
+                along = jacobian[i, j, 6 + k] - momentum[j, 6 + k] / mass
                 rows[j, k] = along - float(rows[j, k])
     multiply_matrices(out.jacobian.T, out.jacobian, out.normal)
     for k in range(n):
@@ -245,14 +258,14 @@ def map_flight(
 @kernel
 def predict_tilt(
     flight: FlightMap,
-    tilt: Array,
-    momentum: Array,
-    way: Array,
+    tilt: Vector3,
+    momentum: Vector3,
+    way: Array1D,
     time: float,
     later: float,
-    side: Array,
-    goal: Array,
-    turn: Array,
+    side: Array1D,
+    goal: Vector2,
+    turn: Array2D,
 ) -> None:
     """The base's tilt at touchdown, and how shifts of the landing place change it.
 
@@ -269,23 +282,23 @@ def predict_tilt(
             upwards, (2, 4).
     """
     for j in range(2):
-        value, rate = float(tilt[j]), 0.0
+        value, rate = tilt[j], 0.0
         for k in range(3):
-            rate += float(flight.drift[j, k]) * float(momentum[k])
+            rate += float(flight.drift[j, k]) * momentum[k]
         turn[j, :] = 0.0
         for i in range(way.shape[0]):
             carried = 0.0
             for k in range(3):
-                carried += float(flight.carried[i, k]) * float(momentum[k])
+                carried += float(flight.carried[i, k]) * momentum[k]
             per_way = float(flight.turn[j, i])
-            value += per_way * float(way[i])
+            value += per_way * way[i]
             rate -= per_way * carried
             if i % 3 == 2:
                 turn[j, 3] += per_way
             else:
                 turn[j, i % 3] += per_way
             if i % 3 == 1:
-                turn[j, 2] += float(side[i // 3]) * per_way
+                turn[j, 2] += side[i // 3] * per_way
         goal[j] = value + time * rate
         turn[j, 3] += later * rate
 
@@ -301,14 +314,16 @@ class LandingCost(NamedTuple):
         bounds: lowest and highest shift in height [m], (2,).
     """
 
-    goal: Array
-    weight: Array
-    free: Array
-    bounds: Array
+    goal: Vector3
+    weight: Array1D
+    free: Array2D
+    bounds: Vector2
 
 
 @kernel
-def choose_shift(tilt: Array, turn: Array, cost: LandingCost, matrix: Array, shift: Array) -> None:
+def choose_shift(
+    tilt: Vector2, turn: Array2D, cost: LandingCost, matrix: Array2D, shift: Vector4
+) -> None:
     """The ``shift`` (4,) of the feet ahead, to the left, apart and upwards [m] that costs least::
 
         sum_i weight_i (shift_i - goal_i)^2 + weight_3 shift_3^2
@@ -333,35 +348,34 @@ def choose_shift(tilt: Array, turn: Array, cost: LandingCost, matrix: Array, shi
             matrix[i, i] = weight
             shift[i] = weight * goal
         for j in range(2):
-            aimed = float(tilt[j])
+            aimed = tilt[j]
             for i in range(3):
-                aimed += float(turn[j, i]) * float(cost.goal[i])
+                aimed += turn[j, i] * float(cost.goal[i])
             free = min(max(aimed, float(cost.free[j, 0])), float(cost.free[j, 1]))
             weight = float(cost.weight[4 + j]) if aimed != free else 0.0
             for i in range(4):
-                part = weight * float(turn[j, i])
-                shift[i] -= part * (float(tilt[j]) - free)
+                part = weight * turn[j, i]
+                shift[i] -= part * (tilt[j] - free)
                 for k in range(4):
-                    matrix[i, k] += part * float(turn[j, k])
+                    matrix[i, k] += part * turn[j, k]
         solve_positive(matrix, shift)
-        bound = min(max(float(shift[3]), float(cost.bounds[0])), float(cost.bounds[1]))
-        if bound == float(shift[3]):
+        bound = min(max(shift[3], float(cost.bounds[0])), float(cost.bounds[1]))
+        if bound == shift[3]:
             return
 
 
 @kernel
-def invert(matrix: Array, out: Array) -> None:
+def invert(matrix: Matrix3, out: Matrix3) -> None:
     """The inverse of a regular matrix (3, 3), by its cofactors; zero for a singular one."""
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
             c, d = (j + 1) % 3, (j + 2) % 3
-            first = float(matrix[a, c]) * float(matrix[b, d])
-            out[j, i] = first - float(matrix[a, d]) * float(matrix[b, c])
+            first = matrix[a, c] * matrix[b, d]
+            out[j, i] = first - matrix[a, d] * matrix[b, c]
     determinant = 0.0
     for j in range(3):
-        determinant += float(matrix[0, j]) * float(out[j, 0])
+        determinant += matrix[0, j] * out[j, 0]
     scale = 1.0 / determinant if abs(determinant) > 1e-300 else 0.0
     for i in range(3):
-        for j in range(3):
-            out[i, j] *= scale
+        out[i, :] *= scale

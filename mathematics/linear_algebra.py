@@ -15,146 +15,146 @@ import math
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Array1D, Array2D
 from .kernel import kernel
 
 
 @kernel
-def multiply_vector(matrix: Array, vector: Array, out: Array) -> None:
+def multiply_vector(matrix: Array2D, vector: Array1D, out: Array1D) -> None:
     """``matrix`` (m, n) times ``vector`` (n) into ``out`` (m), which is another array."""
     for i in range(matrix.shape[0]):
         total = 0.0
         for j in range(matrix.shape[1]):
-            total += float(matrix[i, j]) * float(vector[j])
+            total += matrix[i, j] * vector[j]
         out[i] = total
 
 
 @kernel
-def add_product(matrix: Array, vector: Array, out: Array) -> None:
+def add_product(matrix: Array2D, vector: Array1D, out: Array1D) -> None:
     """Add ``matrix`` (m, n) times ``vector`` (n) to ``out`` (m), which is another array."""
     for i in range(matrix.shape[0]):
         total = 0.0
         for j in range(matrix.shape[1]):
-            total += float(matrix[i, j]) * float(vector[j])
-        out[i] = float(out[i]) + total
+            total += matrix[i, j] * vector[j]
+        out[i] = out[i] + total
 
 
 @kernel
-def multiply_matrices(a: Array, b: Array, out: Array) -> None:
+def multiply_matrices(a: Array2D, b: Array2D, out: Array2D) -> None:
     """``a`` (l, m) times ``b`` (m, n) into ``out`` (l, n), which is another array."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             total = 0.0
             for k in range(a.shape[1]):
-                total += float(a[i, k]) * float(b[k, j])
+                total += a[i, k] * b[k, j]
             out[i, j] = total
 
 
 @kernel
-def multiply_sparse(a: Array, b: Array, out: Array) -> None:
+def multiply_sparse(a: Array2D, b: Array2D, out: Array2D) -> None:
     """The same for an ``a`` with many zeros, which are left out."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             out[i, j] = 0.0
         for k in range(a.shape[1]):
-            factor = float(a[i, k])
+            factor = a[i, k]
             if factor != 0.0:
                 for j in range(b.shape[1]):
-                    out[i, j] += factor * float(b[k, j])
+                    out[i, j] += factor * b[k, j]
 
 
 @kernel
-def multiply_transposed(a: Array, b: Array, out: Array) -> None:
+def multiply_transposed(a: Array2D, b: Array2D, out: Array2D) -> None:
     """``a`` (l, m) times the transpose of ``b`` (n, m), which has many zeros, into ``out`` (l, n)."""
     for j in range(b.shape[0]):
         for i in range(a.shape[0]):
             out[i, j] = 0.0
         for k in range(b.shape[1]):
-            factor = float(b[j, k])
+            factor = b[j, k]
             if factor != 0.0:
                 for i in range(a.shape[0]):
-                    out[i, j] += float(a[i, k]) * factor
+                    out[i, j] += a[i, k] * factor
 
 
 @kernel
-def transpose(matrix: Array) -> None:
+def transpose(matrix: Array2D) -> None:
     """Transpose a square matrix in place."""
     for i in range(matrix.shape[0]):
         for j in range(i):
-            above = float(matrix[j, i])
+            above = matrix[j, i]
             matrix[j, i] = matrix[i, j]
             matrix[i, j] = above
 
 
 @kernel
-def make_symmetric(matrix: Array) -> None:
+def make_symmetric(matrix: Array2D) -> None:
     """Make a square matrix the mean of itself and its transpose, symmetric to the last bit."""
     for i in range(matrix.shape[0]):
         for j in range(i):
-            mean = 0.5 * (float(matrix[i, j]) + float(matrix[j, i]))
+            mean = 0.5 * (matrix[i, j] + matrix[j, i])
             matrix[i, j] = matrix[j, i] = mean
 
 
 @kernel
-def factorise(matrix: Array, smallest: float) -> bool:
+def factorise(matrix: Array2D, smallest: float) -> bool:
     """The Cholesky factor U of a matrix U'U, in place; only the upper half is read and written.
 
     Returns whether all pivots are larger than ``smallest``.
     """
     n = matrix.shape[0]
     for j in range(n):
-        pivot = float(matrix[j, j])
+        pivot = matrix[j, j]
         if not smallest < pivot < math.inf:
             return False
         root = math.sqrt(pivot)
         for i in range(j, n):
-            matrix[j, i] = float(matrix[j, i]) / root
+            matrix[j, i] = matrix[j, i] / root
         for i in range(j + 1, n):
-            value = float(matrix[j, i])
+            value = matrix[j, i]
             if value != 0.0:
                 for k in range(i, n):
-                    matrix[i, k] = float(matrix[i, k]) - value * float(matrix[j, k])
+                    matrix[i, k] = matrix[i, k] - value * matrix[j, k]
     return True
 
 
 @kernel
-def solve_transposed(factor: Array, vector: Array) -> None:
+def solve_transposed(factor: Array2D, vector: Array1D) -> None:
     """Solve U'x = b in place, with U (n, n) upper triangular."""
     n = vector.shape[0]
     for j in range(n):
-        value = float(vector[j]) / float(factor[j, j])
+        value = vector[j] / factor[j, j]
         vector[j] = value
         for i in range(j + 1, n):
-            vector[i] = float(vector[i]) - value * float(factor[j, i])
+            vector[i] = vector[i] - value * factor[j, i]
 
 
 @kernel
-def solve_upper(factor: Array, vector: Array) -> None:
+def solve_upper(factor: Array2D, vector: Array1D) -> None:
     """Solve U x = b in place, with U (n, n) upper triangular."""
     n = vector.shape[0]
     for j in range(n - 1, -1, -1):
-        value = float(vector[j])
+        value = vector[j]
         for i in range(j + 1, n):
-            value -= float(factor[j, i]) * float(vector[i])
-        vector[j] = value / float(factor[j, j])
+            value -= factor[j, i] * vector[i]
+        vector[j] = value / factor[j, j]
 
 
 @kernel
-def solve_rows_transposed(factor: Array, columns: int, rows: Array) -> None:
+def solve_rows_transposed(factor: Array2D, columns: int, rows: Array2D) -> None:
     """Solve R'X = B in place for the first ``columns`` of the rows of B."""
     n = factor.shape[0]
     for j in range(n):
-        pivot = float(factor[j, j])
+        pivot = factor[j, j]
         for k in range(columns):
-            rows[j, k] = float(rows[j, k]) / pivot
+            rows[j, k] = rows[j, k] / pivot
         for i in range(j + 1, n):
-            value = float(factor[j, i])
+            value = factor[j, i]
             for k in range(columns):
-                rows[i, k] = float(rows[i, k]) - value * float(rows[j, k])
+                rows[i, k] = rows[i, k] - value * rows[j, k]
 
 
 @kernel
-def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> None:
+def solve_damped(rows: Array2D, damping: float, normal: Array2D, vector: Array1D) -> None:
     """Solve (A'A + damping^2 I) x = A'b in place: ``vector`` is A'b and becomes x.
 
     Args:
@@ -166,14 +166,14 @@ def solve_damped(rows: Array, damping: float, normal: Array, vector: Array) -> N
         for j in range(i + 1):
             total = 0.0
             for k in range(rows.shape[0]):
-                total += float(rows[k, i]) * float(rows[k, j])
+                total += rows[k, i] * rows[k, j]
             normal[i, j] = normal[j, i] = total
         normal[i, i] += damping * damping
     solve_positive(normal, vector)
 
 
 @kernel
-def solve_positive(matrix: Array, vector: Array) -> None:
+def solve_positive(matrix: Array2D, vector: Array1D) -> None:
     """Solve a symmetric positive definite system in place: ``vector`` becomes the solution.
 
     The method is an LDL' factorisation, which overwrites ``matrix``. A pivot that is not positive
@@ -184,7 +184,7 @@ def solve_positive(matrix: Array, vector: Array) -> None:
 
 
 @kernel
-def solve_rows(matrix: Array, rows: Array) -> None:
+def solve_rows(matrix: Array2D, rows: Array2D) -> None:
     """As ``solve_positive`` for several right-hand sides: each of the ``rows`` (m, n) is one."""
     factorise_positive(matrix)
     for row in range(rows.shape[0]):
@@ -192,38 +192,38 @@ def solve_rows(matrix: Array, rows: Array) -> None:
 
 
 @kernel
-def factorise_positive(matrix: Array) -> None:
+def factorise_positive(matrix: Array2D) -> None:
     """The factors of a symmetric matrix LDL' in place: D on the diagonal, L' above it.
 
     Only the lower half is read; what is left there is of no use.
     """
     n = matrix.shape[0]
     for j in range(n):
-        pivot = float(matrix[j, j])
+        pivot = matrix[j, j]
         inverse_pivot = 1.0 / pivot if pivot > 1e-300 else 0.0
         for i in range(j + 1, n):
-            factor = float(matrix[i, j]) * inverse_pivot
+            factor = matrix[i, j] * inverse_pivot
             if factor != 0.0:
                 for k in range(j + 1, i + 1):
-                    matrix[i, k] -= factor * float(matrix[k, j])
+                    matrix[i, k] -= factor * matrix[k, j]
         for i in range(j + 1, n):
-            matrix[j, i] = float(matrix[i, j]) * inverse_pivot
+            matrix[j, i] = matrix[i, j] * inverse_pivot
 
 
 @kernel
-def substitute(factors: Array, vector: Array) -> None:
+def substitute(factors: Array2D, vector: Array1D) -> None:
     """Solve LDL'x = b in place, with the factors of ``factorise_positive``."""
     n = vector.shape[0]
     for j in range(n):
-        value = float(vector[j])
+        value = vector[j]
         for i in range(j + 1, n):
-            vector[i] -= float(factors[j, i]) * value
-        pivot = float(factors[j, j])
+            vector[i] -= factors[j, i] * value
+        pivot = factors[j, j]
         vector[j] = value * (1.0 / pivot if pivot > 1e-300 else 0.0)
     for j in range(n - 2, -1, -1):
-        value = float(vector[j])
+        value = vector[j]
         for i in range(j + 1, n):
-            value -= float(factors[j, i]) * float(vector[i])
+            value -= factors[j, i] * vector[i]
         vector[j] = value
 
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Array1D, Array2D
 from .kernel import kernel
 from .linear_algebra import multiply_matrices
 
@@ -26,7 +26,7 @@ _TERMS = 20
 
 
 @kernel
-def matrix_exponential(matrix: Array, power: Array, scratch: Array, out: Array) -> None:
+def matrix_exponential(matrix: Array2D, power: Array2D, scratch: Array2D, out: Array2D) -> None:
     """The exponential of a square matrix into ``out``, by scaling and squaring of its series.
 
     ``power`` and ``scratch`` are scratch arrays of the same shape (n, n).
@@ -36,7 +36,7 @@ def matrix_exponential(matrix: Array, power: Array, scratch: Array, out: Array) 
     for i in range(n):
         row = 0.0
         for j in range(n):
-            row += abs(float(matrix[i, j]))
+            row += abs(matrix[i, j])
         norm = max(norm, row)
     halvings = 0
     scale = 1.0
@@ -50,13 +50,13 @@ def matrix_exponential(matrix: Array, power: Array, scratch: Array, out: Array) 
         multiply_matrices(power, matrix, scratch)
         for i in range(n):
             for j in range(n):
-                power[i, j] = float(scratch[i, j]) * scale / term
-                out[i, j] = float(out[i, j]) + float(power[i, j])
+                power[i, j] = scratch[i, j] * scale / term
+                out[i, j] = out[i, j] + power[i, j]
     for _ in range(halvings):
         multiply_matrices(out, out, scratch)
         for i in range(n):
             for j in range(n):
-                out[i, j] = float(scratch[i, j])
+                out[i, j] = scratch[i, j]
 
 
 def discretise(
@@ -99,7 +99,7 @@ def controllable_form(
 
 
 @kernel
-def first_order(cutoff: float, period: float, high: bool, out: Array) -> None:
+def first_order(cutoff: float, period: float, high: bool, out: Array1D) -> None:
     """Coefficients (5) of the low-pass 1 / (1 + s / w), or the high-pass (s / w) / (1 + s / w).
 
     ``cutoff`` is w / (2 pi) [Hz], below half of the sampling rate; there the gain is 1 / sqrt(2).
@@ -114,7 +114,7 @@ def first_order(cutoff: float, period: float, high: bool, out: Array) -> None:
 
 
 @kernel
-def second_order(cutoff: float, damping: float, period: float, high: bool, out: Array) -> None:
+def second_order(cutoff: float, damping: float, period: float, high: bool, out: Array1D) -> None:
     """Coefficients (5) of w^2 / (s^2 + 2 d w s + w^2), or of s^2 over the same.
 
     ``cutoff`` is w / (2 pi) [Hz], below half of the sampling rate; with a damping d of 1 / sqrt(2)
@@ -130,7 +130,7 @@ def second_order(cutoff: float, damping: float, period: float, high: bool, out: 
 
 
 @kernel
-def band_stop(centre: float, width: float, period: float, out: Array) -> None:
+def band_stop(centre: float, width: float, period: float, out: Array1D) -> None:
     """Coefficients (5) of (s^2 + w^2) / (s^2 + v s + w^2): nothing passes at the centre.
 
     ``centre`` is w / (2 pi) [Hz], below half of the sampling rate; ``width`` is v / (2 pi) [Hz].
@@ -146,13 +146,13 @@ def band_stop(centre: float, width: float, period: float, out: Array) -> None:
 
 
 @kernel
-def settle(coefficients: Array, u: Array, memory: Array) -> None:
+def settle(coefficients: Array1D, u: Array1D, memory: Array2D) -> None:
     """Fill ``memory`` (n, 2) as if the input had always been ``u`` (n)."""
-    b0, b1, b2 = float(coefficients[0]), float(coefficients[1]), float(coefficients[2])
-    a1, a2 = float(coefficients[3]), float(coefficients[4])
+    b0, b1, b2 = coefficients[0], coefficients[1], coefficients[2]
+    a1, a2 = coefficients[3], coefficients[4]
     gain = (b0 + b1 + b2) / (1.0 + a1 + a2)
     for i in range(u.shape[0]):
-        x = float(u[i])
+        x = u[i]
         y = gain * x
         later = b2 * x - a2 * y
         memory[i, 1] = later
@@ -160,14 +160,14 @@ def settle(coefficients: Array, u: Array, memory: Array) -> None:
 
 
 @kernel
-def advance(coefficients: Array, u: Array, memory: Array, out: Array) -> None:
+def advance(coefficients: Array1D, u: Array1D, memory: Array2D, out: Array1D) -> None:
     """Filter one sample ``u`` (n) into ``out`` (n) and advance ``memory`` (n, 2)."""
-    b0, b1, b2 = float(coefficients[0]), float(coefficients[1]), float(coefficients[2])
-    a1, a2 = float(coefficients[3]), float(coefficients[4])
+    b0, b1, b2 = coefficients[0], coefficients[1], coefficients[2]
+    a1, a2 = coefficients[3], coefficients[4]
     for i in range(u.shape[0]):
-        x = float(u[i])
-        y = b0 * x + float(memory[i, 0])
-        memory[i, 0] = b1 * x - a1 * y + float(memory[i, 1])
+        x = u[i]
+        y = b0 * x + memory[i, 0]
+        memory[i, 0] = b1 * x - a1 * y + memory[i, 1]
         memory[i, 1] = b2 * x - a2 * y
         out[i] = y
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Indices
+from .arrays import Array1D, Array2D, Array3D, Indices1D, Indices2D
 from .kernel import kernel
 from .linear_algebra import multiply_vector, solve_rows
 
@@ -32,18 +32,18 @@ class LegScratch(NamedTuple):
     """Scratch for ``base_force_map``: ``normal`` (n, n) and ``right`` (6, n) for legs of up to n
     joints."""
 
-    normal: Array
-    right: Array
+    normal: Array2D
+    right: Array2D
 
 
 @kernel
 def base_force_map(
-    jacobian: Array,
+    jacobian: Array3D,
     stance: NDArray[np.bool_],
-    foot_of_point: Indices,
-    chains: Indices,
+    foot_of_point: Indices1D,
+    chains: Indices2D,
     scratch: LegScratch,
-    out: Array,
+    out: Array2D,
 ) -> None:
     """The map G (6, n_joints) from joint torques to the generalised force on a floating base.
 
@@ -61,26 +61,26 @@ def base_force_map(
         right[:] = 0.0
         loaded = False
         for point in range(foot_of_point.shape[0]):
-            if int(foot_of_point[point]) != foot or not stance[point]:
+            if foot_of_point[point] != foot or not stance[point]:
                 continue
             loaded = True
             for axis in range(3):
                 row = jacobian[point, axis]
                 for i in range(longest):
-                    if int(chains[foot, i]) < 0:
+                    if chains[foot, i] < 0:
                         continue
-                    lever = float(row[6 + int(chains[foot, i])])
+                    lever = row[6 + chains[foot, i]]
                     for k in range(i + 1):
-                        normal[i, k] += lever * float(row[6 + int(chains[foot, k])])
+                        normal[i, k] += lever * row[6 + chains[foot, k]]
                     for k in range(6):
-                        right[k, i] += lever * float(row[k])
+                        right[k, i] += lever * row[k]
         if not loaded:
             continue
         for i in range(longest):
             normal[i, i] += DAMPING
         solve_rows(normal, right)
         for i in range(longest):
-            joint = int(chains[foot, i])
+            joint = chains[foot, i]
             if joint >= 0:
                 for k in range(6):
                     out[k, joint] = float(right[k, i])
@@ -88,8 +88,8 @@ def base_force_map(
 
 @kernel
 def split_friction(
-    speed: Array, friction: Array, damping: Array, threshold: float, left: float,
-    known: Array, unknown: Array,
+    speed: Array1D, friction: Array1D, damping: Array1D, threshold: float, left: float,
+    known: Array1D, unknown: Array1D,
 ) -> None:  # fmt: skip
     """The part of the joints' friction that their speed tells, and the share that stays unknown.
 
@@ -102,13 +102,13 @@ def split_friction(
         unknown: becomes the share, 1 for a joint at rest.
     """
     for i in range(speed.shape[0]):
-        share = math.tanh(float(speed[i]) / threshold)
-        known[i] = float(friction[i]) * share + float(damping[i]) * float(speed[i])
+        share = math.tanh(speed[i] / threshold)
+        known[i] = friction[i] * share + damping[i] * speed[i]
         unknown[i] = 1.0 - (1.0 - left) * abs(share)
 
 
 @kernel
-def torso_moment(rotation: Array, weight: float, out: Array) -> None:
+def torso_moment(rotation: Array2D, weight: float, out: Array2D) -> None:
     """How the moment on the base (3) changes with the torso's centre of mass (3): out, (3, 3).
 
     At rest the weight at d needs the moment d x (R' e_z) weight, in the base's axes.
@@ -118,8 +118,8 @@ def torso_moment(rotation: Array, weight: float, out: Array) -> None:
         weight: of the torso [N].
     """
     x, y, z = (
-        weight * float(rotation[2, 0]), weight * float(rotation[2, 1]),
-        weight * float(rotation[2, 2]),
+        weight * rotation[2, 0], weight * rotation[2, 1],
+        weight * rotation[2, 2],
     )  # fmt: skip
     out[0, 0], out[0, 1], out[0, 2] = 0.0, z, -y
     out[1, 0], out[1, 1], out[1, 2] = -z, 0.0, x
@@ -127,7 +127,9 @@ def torso_moment(rotation: Array, weight: float, out: Array) -> None:
 
 
 @kernel
-def fade(estimate: Array, covariance: Array, first: int, factor: float, variance: float) -> None:
+def fade(
+    estimate: Array1D, covariance: Array2D, first: int, factor: float, variance: float
+) -> None:
     """One step in which the unknowns from ``first`` on are forgotten towards zero.
 
     Each follows a process whose correlation over the step is ``factor`` and whose stationary
@@ -145,8 +147,8 @@ def fade(estimate: Array, covariance: Array, first: int, factor: float, variance
 
 @kernel
 def correct_row(
-    estimate: Array, covariance: Array, row: Array, residual: float, noise: float, gate: float,
-    seen: Array,
+    estimate: Array1D, covariance: Array2D, row: Array1D, residual: float, noise: float, gate: float,
+    seen: Array1D,
 ) -> bool:  # fmt: skip
     """Correct the estimate by one measured number, unless it is an outlier; whether it was used.
 
@@ -161,13 +163,13 @@ def correct_row(
     multiply_vector(covariance, row, seen)
     variance = noise * noise
     for i in range(row.shape[0]):
-        variance += float(row[i]) * float(seen[i])
+        variance += row[i] * seen[i]
     if residual * residual > gate * gate * variance:
         return False
     for i in range(row.shape[0]):
-        estimate[i] += float(seen[i]) * residual / variance
+        estimate[i] += seen[i] * residual / variance
     for i in range(row.shape[0]):
         for k in range(row.shape[0]):
-            share = float(seen[i]) * float(seen[k]) / variance
-            covariance[i, k] = float(covariance[i, k]) - share
+            share = seen[i] * seen[k] / variance
+            covariance[i, k] = covariance[i, k] - share
     return True

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
+from .arrays import Array1D, Array2D, Array3D
 from .kernel import kernel
 
 _SMALL = 1e-8
@@ -22,32 +22,32 @@ _SMALL = 1e-8
 
 
 @kernel
-def cross(a: Array, b: Array, out: Array) -> None:
+def cross(a: Array1D, b: Array1D, out: Array1D) -> None:
     """The cross product of two three-vectors."""
-    ax, ay, az = float(a[0]), float(a[1]), float(a[2])
-    bx, by, bz = float(b[0]), float(b[1]), float(b[2])
+    ax, ay, az = a[0], a[1], a[2]
+    bx, by, bz = b[0], b[1], b[2]
     out[0] = ay * bz - az * by
     out[1] = az * bx - ax * bz
     out[2] = ax * by - ay * bx
 
 
 @kernel
-def skew(vector: Array, out: Array) -> None:
+def skew(vector: Array1D, out: Array2D) -> None:
     """The matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
-    x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
+    x, y, z = vector[0], vector[1], vector[2]
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
     out[1, 0], out[2, 0], out[2, 1] = z, -y, x
 
 
 @kernel
-def normalise(quaternion: Array, out: Array) -> None:
+def normalise(quaternion: Array1D, out: Array1D) -> None:
     """Divide a quaternion by its norm; the quaternion zero becomes the identity."""
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     largest = max(abs(x), abs(y), abs(z), abs(w))
     if largest == 0.0:
@@ -61,18 +61,18 @@ def normalise(quaternion: Array, out: Array) -> None:
 
 
 @kernel
-def conjugate(quaternion: Array, out: Array) -> None:
+def conjugate(quaternion: Array1D, out: Array1D) -> None:
     """The inverse of a unit quaternion."""
-    w = float(quaternion[3])
-    out[0], out[1], out[2] = -float(quaternion[0]), -float(quaternion[1]), -float(quaternion[2])
+    w = quaternion[3]
+    out[0], out[1], out[2] = -quaternion[0], -quaternion[1], -quaternion[2]
     out[3] = w
 
 
 @kernel
-def multiply(a: Array, b: Array, out: Array) -> None:
+def multiply(a: Array1D, b: Array1D, out: Array1D) -> None:
     """The quaternion product a b, which is the rotation ``b`` followed by the rotation ``a``."""
-    ax, ay, az, aw = float(a[0]), float(a[1]), float(a[2]), float(a[3])
-    bx, by, bz, bw = float(b[0]), float(b[1]), float(b[2]), float(b[3])
+    ax, ay, az, aw = a[0], a[1], a[2], a[3]
+    bx, by, bz, bw = b[0], b[1], b[2], b[3]
     out[0] = aw * bx + ax * bw + ay * bz - az * by
     out[1] = aw * by - ax * bz + ay * bw + az * bx
     out[2] = aw * bz + ax * by - ay * bx + az * bw
@@ -80,23 +80,23 @@ def multiply(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
-def rotate(quaternion: Array, vector: Array, out: Array) -> None:
+def rotate(quaternion: Array1D, vector: Array1D, out: Array1D) -> None:
     """Rotate ``vector`` by a unit quaternion: from body to world."""
-    x, y, z = float(quaternion[0]), float(quaternion[1]), float(quaternion[2])
-    turn(x, y, z, float(quaternion[3]), vector, out)
+    x, y, z = quaternion[0], quaternion[1], quaternion[2]
+    turn(x, y, z, quaternion[3], vector, out)
 
 
 @kernel
-def rotate_back(quaternion: Array, vector: Array, out: Array) -> None:
+def rotate_back(quaternion: Array1D, vector: Array1D, out: Array1D) -> None:
     """Rotate ``vector`` by the inverse of a unit quaternion: from world to body."""
-    x, y, z = float(quaternion[0]), float(quaternion[1]), float(quaternion[2])
-    turn(-x, -y, -z, float(quaternion[3]), vector, out)
+    x, y, z = quaternion[0], quaternion[1], quaternion[2]
+    turn(-x, -y, -z, quaternion[3], vector, out)
 
 
 @kernel
-def turn(x: float, y: float, z: float, w: float, vector: Array, out: Array) -> None:
+def turn(x: float, y: float, z: float, w: float, vector: Array1D, out: Array1D) -> None:
     """Rotate ``vector`` by the unit quaternion (x, y, z, w)."""
-    a, b, c = float(vector[0]), float(vector[1]), float(vector[2])
+    a, b, c = vector[0], vector[1], vector[2]
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     out[0] = a + w * tx + y * tz - z * ty
     out[1] = b + w * ty + z * tx - x * tz
@@ -104,13 +104,13 @@ def turn(x: float, y: float, z: float, w: float, vector: Array, out: Array) -> N
 
 
 @kernel
-def to_matrix(quaternion: Array, out: Array) -> None:
+def to_matrix(quaternion: Array1D, out: Array2D) -> None:
     """The rotation matrix (3, 3) of a unit quaternion."""
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
@@ -124,36 +124,36 @@ def to_matrix(quaternion: Array, out: Array) -> None:
 
 
 @kernel
-def from_matrix(matrix: Array, out: Array) -> None:
+def from_matrix(matrix: Array2D, out: Array1D) -> None:
     """The unit quaternion of a rotation matrix, with w >= 0 where w is not tiny.
 
     Shepperd's method: divide by the largest of the four components, so no digit is lost.
     """
-    a, b, c = float(matrix[0, 0]), float(matrix[1, 1]), float(matrix[2, 2])
+    a, b, c = matrix[0, 0], matrix[1, 1], matrix[2, 2]
     trace = a + b + c
     if trace >= a and trace >= b and trace >= c:
         s = 2.0 * math.sqrt(1.0 + trace)
-        out[0] = (float(matrix[2, 1]) - float(matrix[1, 2])) / s
-        out[1] = (float(matrix[0, 2]) - float(matrix[2, 0])) / s
-        out[2] = (float(matrix[1, 0]) - float(matrix[0, 1])) / s
+        out[0] = (matrix[2, 1] - matrix[1, 2]) / s
+        out[1] = (matrix[0, 2] - matrix[2, 0]) / s
+        out[2] = (matrix[1, 0] - matrix[0, 1]) / s
         out[3] = 0.25 * s
         return
     i = 0 if a >= b and a >= c else (1 if b >= c else 2)
     j, k = (i + 1) % 3, (i + 2) % 3
-    diagonal = 1.0 + float(matrix[i, i]) - float(matrix[j, j]) - float(matrix[k, k])
+    diagonal = 1.0 + matrix[i, i] - matrix[j, j] - matrix[k, k]
     s = 2.0 * math.sqrt(max(diagonal, 0.0))
-    w = (float(matrix[k, j]) - float(matrix[j, k])) / s
+    w = (matrix[k, j] - matrix[j, k]) / s
     sign = -1.0 if w < 0.0 else 1.0
     out[i] = sign * 0.25 * s
-    out[j] = sign * (float(matrix[i, j]) + float(matrix[j, i])) / s
-    out[k] = sign * (float(matrix[i, k]) + float(matrix[k, i])) / s
+    out[j] = sign * (matrix[i, j] + matrix[j, i]) / s
+    out[k] = sign * (matrix[i, k] + matrix[k, i]) / s
     out[3] = sign * w
 
 
 @kernel
-def exponential(vector: Array, out: Array) -> None:
+def exponential(vector: Array1D, out: Array1D) -> None:
     """The unit quaternion of a rotation vector [rad]: axis times angle."""
-    x, y, z = float(vector[0]), float(vector[1]), float(vector[2])
+    x, y, z = vector[0], vector[1], vector[2]
     angle = math.sqrt(x * x + y * y + z * z)
     scale = 0.5 if angle < _SMALL else math.sin(0.5 * angle) / angle
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
@@ -161,13 +161,13 @@ def exponential(vector: Array, out: Array) -> None:
 
 
 @kernel
-def logarithm(quaternion: Array, out: Array) -> None:
+def logarithm(quaternion: Array1D, out: Array1D) -> None:
     """The rotation vector [rad] of a unit quaternion, of length at most pi."""
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
@@ -177,22 +177,24 @@ def logarithm(quaternion: Array, out: Array) -> None:
 
 
 @kernel
-def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: Array) -> None:
+def integrate(
+    quaternion: Array1D, angular_velocity: Array1D, duration: float, out: Array1D
+) -> None:
     """The orientation after rotating at a constant body rate [rad/s] for ``duration`` [s]."""
     wx, wy, wz = (
-        float(angular_velocity[0]),
-        float(angular_velocity[1]),
-        float(angular_velocity[2]),
+        angular_velocity[0],
+        angular_velocity[1],
+        angular_velocity[2],
     )
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     half = 0.5 * rate * duration
     scale = 0.5 * duration if abs(half) < _SMALL else math.sin(half) / rate
     bx, by, bz, bw = scale * wx, scale * wy, scale * wz, math.cos(half)
     ax, ay, az, aw = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     out[0] = aw * bx + ax * bw + ay * bz - az * by
     out[1] = aw * by - ax * bz + ay * bw + az * bx
@@ -202,25 +204,25 @@ def integrate(quaternion: Array, angular_velocity: Array, duration: float, out: 
 
 
 @kernel
-def yaw(quaternion: Array) -> float:
+def yaw(quaternion: Array1D) -> float:
     """The heading [rad]: the angle about the world's z axis from its x axis to the body's."""
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
-def tilt(quaternion: Array) -> float:
+def tilt(quaternion: Array1D) -> float:
     """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     # Computed from half angles, as the arc cosine of R_zz would lose half the digits at zero.
     return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
@@ -233,13 +235,13 @@ def wrap(angle: float) -> float:
 
 
 @kernel
-def mean_heading(rotations: Array, counted: NDArray[np.bool_]) -> float:
+def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
     """The heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted`` (n,)."""
     x = y = 0.0
     for i in range(rotations.shape[0]):
         if counted[i]:
-            x += float(rotations[i, 0, 0])
-            y += float(rotations[i, 1, 0])
+            x += rotations[i, 0, 0]
+            y += rotations[i, 1, 0]
     return math.atan2(y, x)
 
 
@@ -260,9 +262,9 @@ def unit(
 
 
 @kernel
-def from_euler(angles: Array, out: Array) -> None:
+def from_euler(angles: Array1D, out: Array1D) -> None:
     """The unit quaternion (4) of roll, pitch and yaw [rad]."""
-    r, p, y = 0.5 * float(angles[0]), 0.5 * float(angles[1]), 0.5 * float(angles[2])
+    r, p, y = 0.5 * angles[0], 0.5 * angles[1], 0.5 * angles[2]
     cr, sr, cp, sp, cy, sy = (
         math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y),
     )  # fmt: skip
@@ -273,17 +275,17 @@ def from_euler(angles: Array, out: Array) -> None:
 
 
 @kernel
-def to_euler(quaternion: Array, out: Array) -> None:
+def to_euler(quaternion: Array1D, out: Array1D) -> None:
     """Roll (-pi to pi), pitch (-pi/2 to pi/2) and yaw (-pi to pi) [rad] of a unit quaternion.
 
     Where pitch is at its end only the sum or difference of the others is defined, and they are
     ill-conditioned near it.
     """
     x, y, z, w = (
-        float(quaternion[0]),
-        float(quaternion[1]),
-        float(quaternion[2]),
-        float(quaternion[3]),
+        quaternion[0],
+        quaternion[1],
+        quaternion[2],
+        quaternion[3],
     )
     sine = 2.0 * (w * y - z * x)
     side = 2.0 * (x * y + w * z)

@@ -33,7 +33,7 @@ from .active_set import (
     price_again,
     solve_program,
 )
-from .arrays import Array, Flags, Indices
+from .arrays import Array, Array1D, Array2D, Array3D, Flags, Indices, Indices1D
 from .kernel import kernel
 from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows
 from .whole_body_reduction import (
@@ -71,10 +71,10 @@ class Cones(NamedTuple):
     (n_contacts,) of them; ``direction`` (n_contacts, 2) is u, ``curvature`` (n_contacts,) is p / r.
     """
 
-    planes: Array
-    used: Indices
-    direction: Array
-    curvature: Array
+    planes: Array3D
+    used: Indices1D
+    direction: Array2D
+    curvature: Array1D
 
 
 def cone_memory(n_contacts: int) -> Cones:
@@ -135,10 +135,10 @@ def add_plane(
 
 
 @kernel
-def look_along(point: int, x: Array, cones: Cones) -> float:
+def look_along(point: int, x: Array1D, cones: Cones) -> float:
     """Make a cone's ``direction`` that of its tangential force; returns the size of that [N]. At the
     apex it returns zero, and the direction stays."""
-    a, b = float(x[3 * point]), float(x[3 * point + 1])
+    a, b = x[3 * point], x[3 * point + 1]
     size = math.sqrt(a * a + b * b)
     if size <= APEX:
         return 0.0
@@ -155,13 +155,13 @@ def cut(
     cones: Cones,
     program: Program,
     memory: ActiveSetMemory,
-    x: Array,
+    x: Array1D,
 ) -> int:
     """Add a plane where a force has left its cone by more than that share; returns how many."""
     added = 0
     for point in range(count):
         size = look_along(point, x, cones)
-        outside = size - friction * float(x[3 * point + 2]) > tolerance * size
+        outside = size - friction * x[3 * point + 2] > tolerance * size
         if size > 0.0 and outside:
             add_plane(point, first, friction, cones, program, memory)
             added += 1
@@ -169,12 +169,12 @@ def cut(
 
 
 @kernel
-def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array) -> None:
+def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array1D) -> None:
     """Have a plane along every force that presses its cone or has left it by more than that share, and
     no other plane near it. The rows of the program are not changed."""
     for point in range(count):
         size = look_along(point, x, cones)
-        outside = size - friction * float(x[3 * point + 2]) > tolerance * size
+        outside = size - friction * x[3 * point + 2] > tolerance * size
         if size == 0.0 or not (cones.curvature[point] > 0.0 or outside):
             continue
         a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
@@ -195,7 +195,7 @@ def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array)
 
 @kernel
 def bend(
-    count: int, active: int, first: int, cones: Cones, memory: ActiveSetMemory, x: Array
+    count: int, active: int, first: int, cones: Cones, memory: ActiveSetMemory, x: Array1D
 ) -> None:
     """Compute ``direction`` and ``curvature`` from a solution and its ``active`` multipliers.
 
@@ -219,39 +219,39 @@ def bend(
 
 
 @kernel
-def add_curvature(count: int, cones: Cones, hessian: Array) -> None:
+def add_curvature(count: int, cones: Cones, hessian: Array2D) -> None:
     """Add p / r (1 - u u') of every cone to the Hessian."""
     for point in range(count):
         value, i = float(cones.curvature[point]), 3 * point
         a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
-        hessian[i, i] = float(hessian[i, i]) + value * b * b
-        hessian[i + 1, i + 1] = float(hessian[i + 1, i + 1]) + value * a * a
-        hessian[i, i + 1] = float(hessian[i, i + 1]) - value * a * b
-        hessian[i + 1, i] = float(hessian[i + 1, i]) - value * a * b
+        hessian[i, i] = hessian[i, i] + value * b * b
+        hessian[i + 1, i + 1] = hessian[i + 1, i + 1] + value * a * a
+        hessian[i, i + 1] = hessian[i, i + 1] - value * a * b
+        hessian[i + 1, i] = hessian[i + 1, i] - value * a * b
 
 
 @kernel
-def add_bending(count: int, cones: Cones, x: Array, gradient: Array) -> None:
+def add_bending(count: int, cones: Cones, x: Array1D, gradient: Array1D) -> None:
     """Add p / r (1 - u u') f_t of every cone to the gradient."""
     for point in range(count):
         i = 3 * point
         a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
-        across = float(cones.curvature[point]) * (a * float(x[i + 1]) - b * float(x[i]))
-        gradient[i] = float(gradient[i]) - across * b
-        gradient[i + 1] = float(gradient[i + 1]) + across * a
+        across = float(cones.curvature[point]) * (a * x[i + 1] - b * x[i])
+        gradient[i] = gradient[i] - across * b
+        gradient[i + 1] = gradient[i + 1] + across * a
 
 
 @kernel
-def turned(count: int, friction: float, cones: Cones, x: Array) -> float:
+def turned(count: int, friction: float, cones: Cones, x: Array1D) -> float:
     """How far the solution is from its cones: the largest angle [rad] between a pressed cone's
     ``direction`` and its force, or share by which a force leaves its cone."""
     worst = 0.0
     for point in range(count):
-        a, b = float(x[3 * point]), float(x[3 * point + 1])
+        a, b = x[3 * point], x[3 * point + 1]
         size = math.sqrt(a * a + b * b)
         if size <= APEX:
             continue
-        worst = max(worst, (size - friction * float(x[3 * point + 2])) / size)
+        worst = max(worst, (size - friction * x[3 * point + 2]) / size)
         if cones.curvature[point] > 0.0:
             across = float(cones.direction[point, 0]) * b - float(cones.direction[point, 1]) * a
             along = float(cones.direction[point, 0]) * a + float(cones.direction[point, 1]) * b

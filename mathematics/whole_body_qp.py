@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Indices
+from .arrays import Array1D, Array2D, Array3D, Indices1D, Rows3
 from .kernel import kernel
 
 PYRAMID_ROWS = 6
@@ -29,9 +29,9 @@ PYRAMID_ROWS = 6
 class TaskRows(NamedTuple):
     """Rows of J a = d: ``jacobian`` (n, n_velocities), ``desired`` (n,), ``weights`` (n,)."""
 
-    jacobian: Array
-    desired: Array
-    weights: Array
+    jacobian: Array2D
+    desired: Array1D
+    weights: Array1D
 
 
 class RigidBodyTerms(NamedTuple):
@@ -41,31 +41,31 @@ class RigidBodyTerms(NamedTuple):
     contact points (n_contacts, 3, n_velocities).
     """
 
-    mass_matrix: Array
-    nonlinear: Array
-    jacobian: Array
+    mass_matrix: Array2D
+    nonlinear: Array1D
+    jacobian: Array3D
 
 
 class Cost(NamedTuple):
     """1/2 x' hessian x + gradient' x over x = [a; f]."""
 
-    hessian: Array
-    gradient: Array
+    hessian: Array2D
+    gradient: Array1D
 
 
 class CostScratch(NamedTuple):
     """Memory for intermediate results of ``assemble_cost``: (n_rows, n_v), (n_v, n_v), (n_v,)."""
 
-    weighted: Array
-    block: Array
-    vector: Array
+    weighted: Array2D
+    block: Array2D
+    vector: Array1D
 
 
 class Constraints(NamedTuple):
     """Rows of ``matrix`` x = ``bound``, or of ``matrix`` x <= ``bound``."""
 
-    matrix: Array
-    bound: Array
+    matrix: Array2D
+    bound: Array1D
 
 
 class FrictionCone(NamedTuple):
@@ -79,16 +79,16 @@ class FrictionCone(NamedTuple):
 class Bounds(NamedTuple):
     """Lower and upper bounds of the limited torques [N m], (n_joints,) each."""
 
-    lower: Array
-    upper: Array
+    lower: Array1D
+    upper: Array1D
 
 
 class TorqueScratch(NamedTuple):
     """Memory for intermediate results of ``torque_limits``: (n_joints, n_x) twice, (n_joints,)."""
 
-    rows: Array
-    product: Array
-    offset: Array
+    rows: Array2D
+    product: Array2D
+    offset: Array1D
 
 
 class TorqueSpeedCurves(NamedTuple):
@@ -98,9 +98,9 @@ class TorqueSpeedCurves(NamedTuple):
     falls linearly to zero at the ``no_load`` speed [rad/s].
     """
 
-    peak: Array
-    corner: Array
-    no_load: Array
+    peak: Array1D
+    corner: Array1D
+    no_load: Array1D
 
 
 @kernel
@@ -128,7 +128,7 @@ def assemble_cost(
 
 
 @kernel
-def base_dynamics(terms: RigidBodyTerms, active: Indices, rows: Constraints) -> None:
+def base_dynamics(terms: RigidBodyTerms, active: Indices1D, rows: Constraints) -> None:
     """The six equations of motion of the floating base (paper, base_dyn): matrix x = bound.
 
     Args:
@@ -166,8 +166,8 @@ def friction_pyramids(count: int, first: int, cone: FrictionCone, rows: Constrai
 @kernel
 def torque_limits(
     terms: RigidBodyTerms,
-    active: Indices,
-    transmission: Array,
+    active: Indices1D,
+    transmission: Array2D,
     bounds: Bounds,
     scratch: TorqueScratch,
     rows: Constraints,
@@ -196,13 +196,13 @@ def torque_limits(
 
 
 @kernel
-def motor_limits(speed: Array, curves: TorqueSpeedCurves, bounds: Bounds) -> None:
+def motor_limits(speed: Array1D, curves: TorqueSpeedCurves, bounds: Bounds) -> None:
     """The torque bounds of each motor at its speed [rad/s], (n_motors,).
 
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
     """
     for i in range(speed.shape[0]):
-        value, peak = float(speed[i]), float(curves.peak[i])
+        value, peak = speed[i], float(curves.peak[i])
         corner, no_load = float(curves.corner[i]), float(curves.no_load[i])
         share = (no_load - abs(value)) / max(no_load - corner, 1e-9)
         driving = peak * min(max(share, 0.0), 1.0)
@@ -212,7 +212,7 @@ def motor_limits(speed: Array, curves: TorqueSpeedCurves, bounds: Bounds) -> Non
 
 @kernel
 def joint_torque(
-    terms: RigidBodyTerms, acceleration: Array, force: Array, product: Array, torque: Array
+    terms: RigidBodyTerms, acceleration: Array1D, force: Rows3, product: Array1D, torque: Array1D
 ) -> None:
     """The joint torques, from the joints' rows of the equation of motion (paper, opt_torque):
     tau = M_j a + h_j - sum J_j' f, (n_joints,) [N m].
@@ -231,7 +231,7 @@ def joint_torque(
 
 
 @kernel
-def share_weight(stance: NDArray[np.bool_], weight: float, force: Array) -> None:
+def share_weight(stance: NDArray[np.bool_], weight: float, force: Array2D) -> None:
     """Share the robot's weight [N] equally among the points in stance, as upward forces."""
     force[:, :] = 0.0
     loaded = 0

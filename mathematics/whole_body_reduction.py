@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array, Indices
+from .arrays import Array1D, Array2D, Indices1D
 from .kernel import kernel
 from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
 from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
@@ -41,19 +41,19 @@ class Reduction(NamedTuple):
     function of f and e.
     """
 
-    factor: Array
-    base: Array
-    wanted: Array
-    shape: Array
-    lever: Array
-    pull: Array
-    response: Array
-    rest: Array
-    price: Array
-    free: Array
-    mirrors: Array
-    torque_map: Array
-    torque_rest: Array
+    factor: Array2D
+    base: Array2D
+    wanted: Array1D
+    shape: Array2D
+    lever: Array2D
+    pull: Array1D
+    response: Array2D
+    rest: Array1D
+    price: Array1D
+    free: Array2D
+    mirrors: Array2D
+    torque_map: Array2D
+    torque_rest: Array1D
 
 
 def reduction_memory(n: int, m: int) -> Reduction:
@@ -69,7 +69,7 @@ def reduction_memory(n: int, m: int) -> Reduction:
 def eliminate(
     tasks: TaskRows,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
     acceleration_weight: float,
     reduction: Reduction,
@@ -145,8 +145,8 @@ def force_program(
     size: int,
     extra: int,
     force_weight: float,
-    hessian: Array,
-    gradient: Array,
+    hessian: Array2D,
+    gradient: Array1D,
 ) -> None:
     """The cost in the first ``size`` elements of force and the first ``extra`` elements of e."""
     lever, pull = reduction.lever, reduction.pull
@@ -158,21 +158,21 @@ def force_program(
     for k in range(6):
         for i in range(size):
             value = float(lever[k, i])
-            gradient[i] = float(gradient[i]) - value * float(pull[k])
+            gradient[i] = gradient[i] - value * float(pull[k])
             for j in range(size):
-                hessian[i, j] = float(hessian[i, j]) + value * float(lever[k, j])
+                hessian[i, j] = hessian[i, j] + value * float(lever[k, j])
 
 
 @kernel
 def force_gradient(
     reduction: Reduction,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
     extra: int,
     force_weight: float,
-    unknowns: Array,
-    out: Array,
+    unknowns: Array1D,
+    out: Array1D,
 ) -> None:
     """The gradient of the cost: w_f f + B'R^-1 (K f - k), then e; (3 count + extra,).
 
@@ -183,13 +183,13 @@ def force_gradient(
     for k in range(6):
         total = -float(reduction.pull[k])
         for i in range(size):
-            total += float(reduction.lever[k, i]) * float(unknowns[i])
+            total += float(reduction.lever[k, i]) * unknowns[i]
         price[k] = total
     solve_upper(reduction.shape, price)
     for j in range(count):
         for axis in range(3):
             i = 3 * j + axis
-            total = force_weight * float(unknowns[i])
+            total = force_weight * unknowns[i]
             for k in range(6):
                 total += float(terms.jacobian[active[j], axis, k]) * float(price[k])
             out[i] = total
@@ -204,8 +204,8 @@ def friction_rows(
     friction: float,
     least: float,
     most: float,
-    matrix: Array,
-    bound: Array,
+    matrix: Array2D,
+    bound: Array1D,
 ) -> int:
     """Six rows for each point: |f_x| <= mu f_z, |f_y| <= mu f_z, least <= f_z <= most.
 
@@ -258,26 +258,25 @@ def free_motions(reduction: Reduction) -> None:
 
 
 @kernel
-def reflect(mirror: Array, vector: Array) -> None:
+def reflect(mirror: Array1D, vector: Array1D) -> None:
     """Replace x by x - v (v'x), a reflection where v has the length sqrt(2)."""
     total = 0.0
     for i in range(vector.shape[0]):
-        total += float(mirror[i]) * float(vector[i])
-    for i in range(vector.shape[0]):
-        vector[i] = float(vector[i]) - total * float(mirror[i])
+        total += mirror[i] * vector[i]
+    vector[:] = vector - total * mirror
 
 
 @kernel
 def torque_rows(
     reduction: Reduction,
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
-    transmission: Array,
+    transmission: Array2D,
     bounds: Bounds,
     first: int,
-    matrix: Array,
-    bound: Array,
+    matrix: Array2D,
+    bound: Array1D,
 ) -> int:
     """Two rows in [f; e] for each limited torque, from row ``first`` on; returns the number in all.
 
@@ -312,25 +311,25 @@ def torque_rows(
             matrix[high, i] = 0.0
         rest = 0.0
         for j in range(joints):
-            share = float(transmission[motor, j])
+            share = transmission[motor, j]
             if share != 0.0:
                 rest += share * float(torque_rest[j])
                 for i in range(size + joints):
-                    matrix[high, i] = float(matrix[high, i]) + share * float(torque_map[j, i])
+                    matrix[high, i] = matrix[high, i] + share * float(torque_map[j, i])
         for i in range(size + joints):
-            matrix[low, i] = -float(matrix[high, i])
+            matrix[low, i] = -matrix[high, i]
         bound[high] = float(bounds.upper[motor]) - rest
         bound[low] = rest - float(bounds.lower[motor])
     return int(first + 2 * joints)
 
 
 @kernel
-def within_limits(torque: Array, transmission: Array, bounds: Bounds) -> bool:
+def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> bool:
     """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
     for motor in range(torque.shape[0]):
         total = 0.0
         for j in range(torque.shape[0]):
-            total += float(transmission[motor, j]) * float(torque[j])
+            total += transmission[motor, j] * torque[j]
         if total > float(bounds.upper[motor]) + 1e-10:
             return False
         if total < float(bounds.lower[motor]) - 1e-10:
@@ -340,7 +339,7 @@ def within_limits(torque: Array, transmission: Array, bounds: Bounds) -> bool:
 
 @kernel
 def recover_acceleration(
-    reduction: Reduction, size: int, extra: int, unknowns: Array, out: Array
+    reduction: Reduction, size: int, extra: int, unknowns: Array1D, out: Array1D
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
     response, lever, free = reduction.response, reduction.lever, reduction.free
@@ -349,23 +348,23 @@ def recover_acceleration(
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += float(lever[k, i]) * float(unknowns[i])
+            value += float(lever[k, i]) * unknowns[i]
         for i in range(out.shape[0]):
-            out[i] = float(out[i]) + value * float(response[k, i])
+            out[i] = out[i] + value * float(response[k, i])
     for k in range(extra):
-        value = float(unknowns[size + k])
+        value = unknowns[size + k]
         for i in range(out.shape[0]):
-            out[i] = float(out[i]) + value * float(free[k, i])
+            out[i] = out[i] + value * float(free[k, i])
 
 
 @kernel
 def recover_torque(
     terms: RigidBodyTerms,
-    active: Indices,
+    active: Indices1D,
     count: int,
-    acceleration: Array,
-    force: Array,
-    torque: Array,
+    acceleration: Array1D,
+    force: Array1D,
+    torque: Array1D,
 ) -> None:
     """The joint torques M_j a + h_j - J_j' f (paper, opt_torque), (n_joints,) [N m].
 
@@ -375,10 +374,8 @@ def recover_torque(
     for j in range(torque.shape[0]):
         total = float(terms.nonlinear[6 + j])
         for i in range(acceleration.shape[0]):
-            total += float(terms.mass_matrix[6 + j, i]) * float(acceleration[i])
+            total += float(terms.mass_matrix[6 + j, i]) * acceleration[i]
         for point in range(count):
             for axis in range(3):
-                total -= float(terms.jacobian[active[point], axis, 6 + j]) * float(
-                    force[3 * point + axis]
-                )
+                total -= float(terms.jacobian[active[point], axis, 6 + j]) * force[3 * point + axis]
         torque[j] = total

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .active_set import ActiveSetMemory, Program, active_set_memory, polish, solve_program
-from .arrays import Array, Flags, Indices
+from .arrays import Array1D, Array2D, Flags1D, Indices1D, Rows3
 from .kernel import kernel
 from .whole_body_qp import (
     Bounds,
@@ -54,11 +54,11 @@ class Weights(NamedTuple):
     ``force_min`` and ``force_max`` [N] bound the normal force of a point.
     """
 
-    acceleration: Array
-    force: Array
-    friction: Array
-    force_min: Array
-    force_max: Array
+    acceleration: Array1D
+    force: Array1D
+    friction: Array1D
+    force_min: Array1D
+    force_max: Array1D
 
 
 class Motors(NamedTuple):
@@ -67,20 +67,20 @@ class Motors(NamedTuple):
     ``to_speed`` and ``to_torque`` are (n, n); ``speed`` (n,) is scratch.
     """
 
-    to_speed: Array
-    to_torque: Array
+    to_speed: Array2D
+    to_torque: Array2D
     curves: TorqueSpeedCurves
-    speed: Array
+    speed: Array1D
     bounds: Bounds
 
 
 class Solution(NamedTuple):
     """The result: torques (n_joints,), accelerations (n,), forces (n_contacts, 3); ``code`` (1,)."""
 
-    torque: Array
-    acceleration: Array
-    force: Array
-    code: Indices
+    torque: Array1D
+    acceleration: Array1D
+    force: Rows3
+    code: Indices1D
 
 
 class SolutionMemory(NamedTuple):
@@ -89,9 +89,9 @@ class SolutionMemory(NamedTuple):
     reduction: Reduction
     program: Program
     memory: ActiveSetMemory
-    unknowns: Array
-    gradient: Array
-    active: Indices
+    unknowns: Array1D
+    gradient: Array1D
+    active: Indices1D
 
 
 def solution_memory(n_velocities: int, n_contacts: int) -> SolutionMemory:
@@ -112,8 +112,8 @@ def solution_memory(n_velocities: int, n_contacts: int) -> SolutionMemory:
 def solve_whole_body(
     tasks: TaskRows,
     terms: RigidBodyTerms,
-    stance: Flags,
-    joint_velocity: Array,
+    stance: Flags1D,
+    joint_velocity: Array1D,
     weights: Weights,
     limits: int,
     motors: Motors,
@@ -150,13 +150,13 @@ def solve_whole_body(
 def reduce_program(
     tasks: TaskRows,
     terms: RigidBodyTerms,
-    stance: Flags,
-    joint_velocity: Array,
+    stance: Flags1D,
+    joint_velocity: Array1D,
     weights: Weights,
     limits: int,
     motors: Motors,
     reduction: Reduction,
-    active: Indices,
+    active: Indices1D,
     solution: Solution,
 ) -> int:
     """Eliminate the accelerations and compute the motors' limits of this tick.
@@ -191,7 +191,7 @@ def exceeds_limits(limits: int, motors: Motors, reduction: Reduction, solution: 
 
 @kernel
 def write_forces(
-    code: int, active: Indices, count: int, unknowns: Array, solution: Solution
+    code: int, active: Indices1D, count: int, unknowns: Array1D, solution: Solution
 ) -> None:
     """Write the forces of the points in stance, zeros for the others, and SOLVED; or a failure's code."""
     if code < 0:
@@ -249,7 +249,7 @@ def limit_rows(
     count: int,
     extra: int,
     reduction: Reduction,
-    active: Indices,
+    active: Indices1D,
     program: Program,
 ) -> int:
     """Write the rows of friction, and with ``extra`` unknowns those of torque; returns their number."""
@@ -266,7 +266,7 @@ def limit_rows(
 
 
 @kernel
-def limit_motors(joint_velocity: Array, limits: int, motors: Motors) -> None:
+def limit_motors(joint_velocity: Array1D, limits: int, motors: Motors) -> None:
     """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
     for i in range(motors.speed.shape[0]):
         if limits == JOINT_LIMITS:
@@ -275,7 +275,7 @@ def limit_motors(joint_velocity: Array, limits: int, motors: Motors) -> None:
             continue
         total = 0.0
         for j in range(joint_velocity.shape[0]):
-            total += float(motors.to_speed[i, j]) * float(joint_velocity[j])
+            total += float(motors.to_speed[i, j]) * joint_velocity[j]
         motors.speed[i] = total
     if limits == MOTOR_LIMITS:
         motor_limits(motors.speed, motors.curves, motors.bounds)

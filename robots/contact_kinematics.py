@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Indices
+from ..mathematics.arrays import (
+    Array,
+    Array1D,
+    Array2D,
+    Array3D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from ..mathematics.body_dynamics import (
     BodyMotion,
     BodyTree,
@@ -49,24 +58,24 @@ class Contacts(NamedTuple):
     (2, n_contacts) gives the direction ahead of a robot all of whose feet are balls, ``patterned``.
     """
 
-    body: Indices
-    sole: Array
-    ball: Indices
-    foot: Indices
-    centre: Array
-    radius: Array
-    pattern: Array
+    body: Indices1D
+    sole: Rows3
+    ball: Indices1D
+    foot: Indices1D
+    centre: Rows3
+    radius: Array1D
+    pattern: Array2D
     patterned: bool
 
 
 class Seen(NamedTuple):
     """What ``see_contacts`` writes: see the attributes of ``ContactKinematics``."""
 
-    points: Array
-    rates: Array
-    soles: Array
-    forward: Array
-    com_velocity: Array
+    points: Rows3
+    rates: Rows3
+    soles: Rows3
+    forward: Vector3
+    com_velocity: Vector3
 
 
 class Rigid(NamedTuple):
@@ -74,17 +83,17 @@ class Rigid(NamedTuple):
 
     tree: BodyTree
     motion: BodyMotion
-    scratch: Array
+    scratch: Matrix3
 
 
 class Measured(NamedTuple):
     """The base's ``orientation``, which gives the vertical, and ``angular_velocity`` [rad/s, body], and
     the joints' ``position`` and ``velocity`` [rad, rad/s]."""
 
-    orientation: Array
-    angular_velocity: Array
-    position: Array
-    velocity: Array
+    orientation: Array1D
+    angular_velocity: Vector3
+    position: Array1D
+    velocity: Array1D
 
 
 @kernel
@@ -120,7 +129,9 @@ def see_contacts(rigid: Rigid, contacts: Contacts, measured: Measured, seen: See
 
 
 @kernel
-def see_pattern(pattern: Array, points: Array, down: Array, aside: Array, forward: Array) -> None:
+def see_pattern(
+    pattern: Array2D, points: Rows3, down: Vector3, aside: Vector3, forward: Vector3
+) -> None:
     """The direction ahead (3,), from where the points are: see ``_pattern``.
 
     Args:
@@ -130,17 +141,17 @@ def see_pattern(pattern: Array, points: Array, down: Array, aside: Array, forwar
     for k in range(3):
         forward[k] = aside[k] = 0.0
         for i in range(points.shape[0]):
-            forward[k] = float(forward[k]) + float(pattern[0, i]) * float(points[i, k])
-            aside[k] = float(aside[k]) + float(pattern[1, i]) * float(points[i, k])
-    x, y, z = float(aside[0]), float(aside[1]), float(aside[2])
-    u, v, w = float(down[0]), float(down[1]), float(down[2])
-    forward[0] = float(forward[0]) + (v * z - w * y)
-    forward[1] = float(forward[1]) + (w * x - u * z)
-    forward[2] = float(forward[2]) + (u * y - v * x)
+            forward[k] = forward[k] + pattern[0, i] * points[i, k]
+            aside[k] = aside[k] + pattern[1, i] * points[i, k]
+    x, y, z = aside[0], aside[1], aside[2]
+    u, v, w = down[0], down[1], down[2]
+    forward[0] = forward[0] + (v * z - w * y)
+    forward[1] = forward[1] + (w * x - u * z)
+    forward[2] = forward[2] + (u * y - v * x)
 
 
 @kernel
-def see_com_velocity(rigid: Rigid, out: Array) -> None:
+def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
     """The velocity (3,) of the centre of mass relative to the base's origin [m/s, body]."""
     tree, motion, place, velocity = rigid.tree, rigid.motion, rigid.scratch[1], rigid.scratch[2]
     total = 0.0
@@ -151,14 +162,13 @@ def see_com_velocity(rigid: Rigid, out: Array) -> None:
         velocity_at(motion, body, place, velocity)
         total += mass
         for k in range(3):
-            out[k] = float(out[k]) + mass * float(velocity[k])
-    for k in range(3):
-        out[k] = float(out[k]) / total
+            out[k] = out[k] + mass * float(velocity[k])
+    out[:] = out / total
 
 
 @kernel
 def differentiate_contacts(
-    rigid: Rigid, contacts: Contacts, centres: Array, jacobians: Array
+    rigid: Rigid, contacts: Contacts, centres: Array2D, jacobians: Array3D
 ) -> None:
     """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
     (n_contacts, 3, n_joints), with the bodies where ``see_contacts`` has left them."""
@@ -168,7 +178,7 @@ def differentiate_contacts(
         place_of(rigid.motion, body, contacts.centre[i], centre)
         for k in range(jacobian.shape[1]):
             jacobian[0, k] = jacobian[1, k] = jacobian[2, k] = 0.0
-        x, y, z = float(centre[0]), float(centre[1]), float(centre[2])
+        x, y, z = centre[0], centre[1], centre[2]
         while body > 0:
             joint = rigid.motion.joint[body - 1]
             u, v, w = float(joint[3]), float(joint[4]), float(joint[5])

@@ -224,7 +224,7 @@ __all__ = [
 ]
 
 
-def find_robot(name: str, folder: Path | None = None) -> RobotDescription:
+def find_robot(name: str, folder: str | Path | None = None) -> RobotDescription:
     """The description called ``name``: a shipped robot, or a file relative to ``folder``.
 
     The file is a description in YAML, or a URDF or MJCF file with a short YAML of the same name
@@ -234,7 +234,7 @@ def find_robot(name: str, folder: Path | None = None) -> RobotDescription:
         LookupError: there is none; the message names those that exist.
         RobotError: the file cannot be read, or describes no robot; it carries every fault.
     """
-    return find(name, folder)
+    return find(name, Path(folder) if folder is not None else None)
 
 
 def read_description(path: Path) -> RobotDescription:

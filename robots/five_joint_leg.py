@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Array1D, Array2D, Matrix3, Vector3
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_matrices, solve_damped
 from ..mathematics.rotations import unit, wrap
@@ -116,37 +116,42 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
 
 @kernel
 def forward(
-    hip: Array, plane: Array, signs: Array, angles: Array, position: Array, rotation: Array
+    hip: Vector3,
+    plane: Array2D,
+    signs: Array1D,
+    angles: Array1D,
+    position: Vector3,
+    rotation: Matrix3,
 ) -> None:
     """The sole centre (3,) and the foot's rotation (3, 3) to the base, from the joint angles."""
     a, b, c, k, n = _canonical(signs, angles)
     _thigh_rotation(a, b, c, rotation)
     cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
-    calf_x, calf_z = float(plane[1, 0]), float(plane[1, 1])
-    sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
-    x = float(plane[0, 0]) + calf_x * cos_k - calf_z * sin_k + sole_x * cos_f - sole_z * sin_f
-    z = float(plane[0, 1]) + calf_x * sin_k + calf_z * cos_k + sole_x * sin_f + sole_z * cos_f
+    calf_x, calf_z = plane[1, 0], plane[1, 1]
+    sole_x, sole_z = plane[2, 0], plane[2, 1]
+    x = plane[0, 0] + calf_x * cos_k - calf_z * sin_k + sole_x * cos_f - sole_z * sin_f
+    z = plane[0, 1] + calf_x * sin_k + calf_z * cos_k + sole_x * sin_f + sole_z * cos_f
     for i in range(3):
-        thigh_x, thigh_z = float(rotation[i, 0]), float(rotation[i, 2])
+        thigh_x, thigh_z = rotation[i, 0], rotation[i, 2]
         position[i] = hip[i] + x * thigh_x + z * thigh_z
         rotation[i, 0] = cos_f * thigh_x + sin_f * thigh_z
         rotation[i, 2] = cos_f * thigh_z - sin_f * thigh_x
 
 
 @kernel
-def jacobian(plane: Array, signs: Array, angles: Array, out: Array) -> None:
+def jacobian(plane: Array2D, signs: Array1D, angles: Array1D, out: Array2D) -> None:
     """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
     a, b, c, k, n = _canonical(signs, angles)
     cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     cos_c, sin_c = math.cos(c), math.sin(c)
     cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
-    calf_x, calf_z = float(plane[1, 0]), float(plane[1, 1])
-    sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
+    calf_x, calf_z = plane[1, 0], plane[1, 1]
+    sole_x, sole_z = plane[2, 0], plane[2, 1]
     # From the ankle, from the knee and from the hip to the sole, in the leg plane.
     ankle_x, ankle_z = sole_x * cos_f - sole_z * sin_f, sole_x * sin_f + sole_z * cos_f
     knee_x = ankle_x + calf_x * cos_k - calf_z * sin_k
     knee_z = ankle_z + calf_x * sin_k + calf_z * cos_k
-    x, z = knee_x + float(plane[0, 0]), knee_z + float(plane[0, 1])
+    x, z = knee_x + plane[0, 0], knee_z + plane[0, 1]
     # The thigh's x, y and z axes in the base's frame.
     xx, xy, xz = cos_a * cos_b, sin_a * cos_b, sin_b
     yx = -sin_a * cos_c - cos_a * sin_b * sin_c
@@ -170,23 +175,23 @@ def jacobian(plane: Array, signs: Array, angles: Array, out: Array) -> None:
     out[3, 3], out[4, 3], out[5, 3] = -yx, -yy, -yz
     out[3, 4], out[4, 4], out[5, 4] = -yx, -yy, -yz
     for j in range(5):
-        sign = float(signs[j])
+        sign = signs[j]
         for i in range(6):
             out[i, j] *= sign
 
 
 @kernel
 def inverse(
-    hip: Array,
-    plane: Array,
-    signs: Array,
-    limits: Array,
-    sole: Array,
-    line: Array,
+    hip: Array1D,
+    plane: Array2D,
+    signs: Array1D,
+    limits: Array2D,
+    sole: Array1D,
+    line: Array1D,
     softness: float,
     kept_yaw: float,
     level: float,
-    out: Array,
+    out: Array1D,
 ) -> tuple[bool, float]:
     """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
 
@@ -217,10 +222,10 @@ def inverse(
         Whether the target is met without touching a limit, and how much the foot moves away from
         the hip per movement of the target: one, or less where the leg is stretched.
     """
-    px = min(max(float(sole[0]) - float(hip[0]), -_FAR), _FAR)
-    py = min(max(float(sole[1]) - float(hip[1]), -_FAR), _FAR)
-    pz = min(max(float(sole[2]) - float(hip[2]), -_FAR), _FAR)
-    fx, fy, fz = unit(float(line[0]), float(line[1]), float(line[2]), 1.0, 0.0, 0.0)
+    px = min(max(sole[0] - hip[0], -_FAR), _FAR)
+    py = min(max(sole[1] - hip[1], -_FAR), _FAR)
+    pz = min(max(sole[2] - hip[2], -_FAR), _FAR)
+    fx, fy, fz = unit(line[0], line[1], line[2], 1.0, 0.0, 0.0)
     # The plane's normal, which becomes the thigh's y axis.
     nx, ny, nz = fy * pz - fz * py, fz * px - fx * pz, fx * py - fy * px
     size = math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -236,23 +241,23 @@ def inverse(
 
     # In the plane, with the ankle as the target: knee, thigh, then the ankle's own angle.
     knee, thigh, share, near = _two_links(
-        float(plane[0, 0]), float(plane[0, 1]), float(plane[1, 0]), float(plane[1, 1]),
-        x - float(plane[2, 0]), z - float(plane[2, 1]), float(signs[3]),
-        float(limits[3, 0]), float(limits[3, 1]), softness,
+        plane[0, 0], plane[0, 1], plane[1, 0], plane[1, 1],
+        x - plane[2, 0], z - plane[2, 1], signs[3],
+        limits[3, 0], limits[3, 1], softness,
     )  # fmt: skip
     ankle = wrap(-thigh - knee)
-    sign = float(signs[4])
-    held = min(max(ankle * sign, float(limits[4, 0])), float(limits[4, 1])) * sign
+    sign = signs[4]
+    held = min(max(ankle * sign, limits[4, 0]), limits[4, 1]) * sign
     if held != ankle:
         # The ankle keeps its angle, calf and foot become one link, the sole is the target.
         ankle, exact = held, False
         cos_n, sin_n = math.cos(ankle), math.sin(ankle)
-        sole_x, sole_z = float(plane[2, 0]), float(plane[2, 1])
+        sole_x, sole_z = plane[2, 0], plane[2, 1]
         knee, thigh, share, near = _two_links(
-            float(plane[0, 0]), float(plane[0, 1]),
-            float(plane[1, 0]) + cos_n * sole_x - sin_n * sole_z,
-            float(plane[1, 1]) + sin_n * sole_x + cos_n * sole_z,
-            x, z, float(signs[3]), float(limits[3, 0]), float(limits[3, 1]), softness,
+            plane[0, 0], plane[0, 1],
+            plane[1, 0] + cos_n * sole_x - sin_n * sole_z,
+            plane[1, 1] + sin_n * sole_x + cos_n * sole_z,
+            x, z, signs[3], limits[3, 0], limits[3, 1], softness,
         )  # fmt: skip
     cos_t, sin_t = math.cos(thigh), math.sin(thigh)
     xx, xy, xz = cos_t * fx + sin_t * ux, cos_t * fy + sin_t * uy, cos_t * fz + sin_t * uz
@@ -266,7 +271,7 @@ def inverse(
         yaw = wrap(yaw + math.pi)
     share_of_yaw = yaw_share(flat, level)
     if share_of_yaw < 1.0:
-        kept = wrap(kept_yaw * float(signs[0]))
+        kept = wrap(kept_yaw * signs[0])
         yaw = kept + share_of_yaw * wrap(yaw - kept)
     cos_y, sin_y = math.cos(yaw), math.sin(yaw)
     out[0] = yaw
@@ -276,8 +281,8 @@ def inverse(
     out[4] = ankle
     inside = exact and near
     for i in range(5):
-        angle = float(out[i]) * float(signs[i])
-        lower, upper = float(limits[i, 0]), float(limits[i, 1])
+        angle = out[i] * signs[i]
+        lower, upper = limits[i, 0], limits[i, 1]
         inside = inside and lower <= angle <= upper
         out[i] = min(max(angle, lower), upper)
     return inside, share
@@ -293,7 +298,7 @@ def yaw_share(flat: float, level: float) -> float:
 
 
 @kernel
-def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float, float]:
+def _canonical(signs: Array1D, angles: Array1D) -> tuple[float, float, float, float, float]:
     return (
         float(signs[0]) * float(angles[0]),
         float(signs[1]) * float(angles[1]),
@@ -304,7 +309,7 @@ def _canonical(signs: Array, angles: Array) -> tuple[float, float, float, float,
 
 
 @kernel
-def _thigh_rotation(a: float, b: float, c: float, out: Array) -> None:
+def _thigh_rotation(a: float, b: float, c: float, out: Array2D) -> None:
     """Yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
     cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     cos_c, sin_c = math.cos(c), math.sin(c)
@@ -370,26 +375,25 @@ _JUMP = 0.1
 
 
 @kernel
-def pitched_line(rotation: Array, pitch: float, out: Array) -> None:
+def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
     """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
     cosine, sine = math.cos(pitch), math.sin(pitch)
-    for i in range(3):
-        out[i] = cosine * float(rotation[i, 0]) - sine * float(rotation[i, 2])
+    out[:] = cosine * rotation[:, 0] - sine * rotation[:, 2]
 
 
 @kernel
 def slide(
-    hip: Array,
-    plane: Array,
-    signs: Array,
-    limits: Array,
-    sole: Array,
-    rotation: Array,
+    hip: Array1D,
+    plane: Array2D,
+    signs: Array1D,
+    limits: Array2D,
+    sole: Array1D,
+    rotation: Array2D,
     softness: float,
     kept_yaw: float,
     level: float,
-    place: Array,
-    angles: Array,
+    place: Array1D,
+    angles: Array1D,
 ) -> tuple[bool, float]:
     """Move a ``sole`` out of reach, in its own plane, towards a place that is in reach.
 
@@ -407,13 +411,13 @@ def slide(
     Returns:
         Whether there is such a place, and the second result of ``inverse`` for it.
     """
-    nx, ny, nz = float(rotation[0, 2]), float(rotation[1, 2]), float(rotation[2, 2])
+    nx, ny, nz = rotation[0, 2], rotation[1, 2], rotation[2, 2]
     if nz < _LEVEL or not abs(nx * nx + ny * ny + nz * nz - 1.0) < 0.1:
         return False, 1.0
-    hx, hy, hz = float(hip[0]), float(hip[1]), float(hip[2])
-    sx = min(max(float(sole[0]), -_FARTHEST), _FARTHEST)
-    sy = min(max(float(sole[1]), -_FARTHEST), _FARTHEST)
-    sz = min(max(float(sole[2]), -_FARTHEST), _FARTHEST)
+    hx, hy, hz = hip[0], hip[1], hip[2]
+    sx = min(max(sole[0], -_FARTHEST), _FARTHEST)
+    sy = min(max(sole[1], -_FARTHEST), _FARTHEST)
+    sz = min(max(sole[2], -_FARTHEST), _FARTHEST)
     depth = nx * (hx - sx) + ny * (hy - sy) + nz * (hz - sz)
     line = rotation[:, 0]
     for axis in range(2):
@@ -444,18 +448,17 @@ def slide(
 
 
 @kernel
-def keep_along(axis: Array, vector: Array) -> None:
+def keep_along(axis: Vector3, vector: Vector3) -> None:
     """Replace ``vector`` (3,) by its component along ``axis`` (3,), which has unit length."""
     part = 0.0
     for i in range(3):
-        part += float(axis[i]) * float(vector[i])
-    for i in range(3):
-        vector[i] = part * float(axis[i])
+        part += axis[i] * vector[i]
+    vector[:] = part * axis
 
 
 @kernel
 def slow_stretch(
-    hip: Array, plane: Array, sole: Array, rotation: Array, share: float, velocity: Array
+    hip: Vector3, plane: Array2D, sole: Vector3, rotation: Matrix3, share: float, velocity: Vector3
 ) -> None:
     """Keep only a ``share`` of the velocity [m/s] that leads the ankle away from the hip.
 
@@ -467,24 +470,20 @@ def slow_stretch(
         return
     square, along = 1e-9, 0.0
     for i in range(3):
-        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
-            rotation[i, 2]
-        )
-        reach = float(sole[i]) - lever - float(hip[i])
+        lever = plane[2, 0] * rotation[i, 0] + plane[2, 1] * rotation[i, 2]
+        reach = sole[i] - lever - hip[i]
         square += reach * reach
-        along += reach * float(velocity[i])
+        along += reach * velocity[i]
     scale = (1.0 - share) * along / square
-    for i in range(3):
-        lever = float(plane[2, 0]) * float(rotation[i, 0]) + float(plane[2, 1]) * float(
-            rotation[i, 2]
-        )
-        velocity[i] -= scale * (float(sole[i]) - lever - float(hip[i]))
+    velocity[:] -= scale * (
+        sole - (plane[2, 0] * rotation[:, 0] + plane[2, 1] * rotation[:, 2]) - hip
+    )
 
 
 @kernel
-def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) -> None:
+def line_rate(line: Array1D, last: Array1D, period: float, known: bool, out: Array1D) -> None:
     """The time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
-    x, y, z = float(line[0]), float(line[1]), float(line[2])
+    x, y, z = line[0], line[1], line[2]
     largest = max(abs(x), abs(y), abs(z))
     if largest < 1e-300:
         x, y, z = 1.0, 0.0, 0.0
@@ -492,7 +491,7 @@ def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) 
         x, y, z = x / largest, y / largest, z / largest
     size = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / size, y / size, z / size
-    dx, dy, dz = x - float(last[0]), y - float(last[1]), z - float(last[2])
+    dx, dy, dz = x - last[0], y - last[1], z - last[2]
     jumped = dx * dx + dy * dy + dz * dz > _JUMP * _JUMP
     scale = 0.0 if jumped or not known else 1.0 / period
     out[0], out[1], out[2] = scale * dx, scale * dy, scale * dz
@@ -501,18 +500,18 @@ def line_rate(line: Array, last: Array, period: float, known: bool, out: Array) 
 
 @kernel
 def inverse_velocity(
-    sole_jacobian: Array,
-    rotation: Array,
-    velocity: Array,
-    line_rate: Array,
+    sole_jacobian: Array2D,
+    rotation: Matrix3,
+    velocity: Vector3,
+    line_rate: Vector3,
     length: float,
     damping: float,
     held: float,
     kept_rate: float,
-    rows: Array,
-    turns: Array,
-    normal: Array,
-    out: Array,
+    rows: Array2D,
+    turns: Array2D,
+    normal: Array2D,
+    out: Array1D,
 ) -> None:
     """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
 
@@ -533,19 +532,19 @@ def inverse_velocity(
     multiply_matrices(rotation.T, sole_jacobian[3:6, :], turns)
     turn = nod = 0.0
     for i in range(3):
-        turn += float(rotation[i, 1]) * float(line_rate[i])
-        nod -= float(rotation[i, 2]) * float(line_rate[i])
+        turn += rotation[i, 1] * line_rate[i]
+        nod -= rotation[i, 2] * line_rate[i]
     for j in range(5):
         for i in range(3):
             rows[i, j] = sole_jacobian[i, j]
-        rows[3, j] = length * float(turns[2, j])
-        rows[4, j] = length * float(turns[1, j])
+        rows[3, j] = length * turns[2, j]
+        rows[4, j] = length * turns[1, j]
         rows[5, j] = 0.0
     rows[5, 0] = held * length
     # With the task (velocity, length * turn, length * nod), whose product with the rows is:
     for j in range(5):
-        value = length * (float(rows[3, j]) * turn + float(rows[4, j]) * nod)
+        value = length * (rows[3, j] * turn + rows[4, j] * nod)
         for i in range(3):
-            value += float(rows[i, j]) * float(velocity[i])
-        out[j] = value + float(rows[5, j]) * held * length * kept_rate
+            value += rows[i, j] * velocity[i]
+        out[j] = value + rows[5, j] * held * length * kept_rate
     solve_damped(rows, damping, normal, out)

@@ -11,7 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Flags, Indices
+from ..mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags0D,
+    Flags1D,
+    Indices1D,
+    Matrix3,
+    Vector3,
+)
 from ..mathematics.kernel import kernel
 from .five_joint_leg import (
     Leg,
@@ -34,44 +43,44 @@ _FASTEST = 100.0
 class LegGeometry(NamedTuple):
     """A ``Leg`` as arrays; ``joints`` (5,) are its joints' indices."""
 
-    joints: Indices
-    hip: Array
-    plane: Array
-    signs: Array
-    limits: Array
+    joints: Indices1D
+    hip: Vector3
+    plane: Array2D
+    signs: Array1D
+    limits: Array2D
 
 
 class FootMotion(NamedTuple):
     """A foot's target in the base's frame: place (3,) [m], velocity (3,) [m/s], rotation (3, 3)."""
 
-    position: Array
-    velocity: Array
-    rotation: Array
+    position: Vector3
+    velocity: Vector3
+    rotation: Matrix3
 
 
 class LegTargets(NamedTuple):
     """What a robot's joints shall do: (n_joints,) twice; and whether each foot is reached."""
 
-    position: Array
-    velocity: Array
-    reachable: Flags
+    position: Array1D
+    velocity: Array1D
+    reachable: Flags1D
 
 
 class LegScratch(NamedTuple):
     """Memory for intermediate results; ``line`` and ``rate`` lead from one kernel to the other."""
 
-    line: Array
-    rate: Array
-    angles: Array
-    speeds: Array
-    sole: Array
-    turn: Array
-    velocity: Array
-    place: Array
-    jacobian: Array
-    rows: Array
-    turns: Array
-    normal: Array
+    line: Vector3
+    rate: Vector3
+    angles: Array1D
+    speeds: Array1D
+    sole: Vector3
+    turn: Matrix3
+    velocity: Vector3
+    place: Vector3
+    jacobian: Array2D
+    rows: Array2D
+    turns: Array2D
+    normal: Array2D
 
 
 class LegSettings(NamedTuple):
@@ -83,12 +92,12 @@ class LegSettings(NamedTuple):
     sole first.
     """
 
-    softness: Array
-    turn_length: Array
-    damping: Array
-    level: Array
-    speed_limit: Array
-    slides: Flags
+    softness: Array1D
+    turn_length: Array1D
+    damping: Array1D
+    level: Array1D
+    speed_limit: Array1D
+    slides: Flags1D
 
 
 def leg_geometry(leg: Leg, margin: float) -> LegGeometry:
@@ -114,12 +123,12 @@ def leg_settings() -> LegSettings:
 
 @kernel
 def watch_line(
-    rotation: Array,
+    rotation: Matrix3,
     pitched: bool,
-    pitch: Array,
+    pitch: Array0D,
     period: float,
-    known: Flags,
-    direction: Array,
+    known: Flags0D,
+    direction: Vector3,
     scratch: LegScratch,
 ) -> None:
     """The direction of the foot's line that is wanted, and how fast it turns.
@@ -133,7 +142,7 @@ def watch_line(
     for i in range(3):
         scratch.line[i] = rotation[i, 0]
     if pitched:
-        pitched_line(rotation, float(pitch[()]), scratch.line)
+        pitched_line(rotation, pitch[()], scratch.line)
     line_rate(scratch.line, direction, period, bool(known[()]), scratch.rate)
 
 
@@ -142,8 +151,8 @@ def follow_foot(
     leg: LegGeometry,
     number: int,
     foot: FootMotion,
-    kept: Array,
-    kept_rates: Array,
+    kept: Array1D,
+    kept_rates: Array1D,
     settings: LegSettings,
     scratch: LegScratch,
     target: LegTargets,
@@ -159,7 +168,7 @@ def follow_foot(
     """
     angles, speeds, turn, velocity = scratch.angles, scratch.speeds, scratch.turn, scratch.velocity
     softness, level = float(settings.softness[0]), float(settings.level[0])
-    yaw, yaw_rate = float(kept[leg.joints[0]]), float(kept_rates[leg.joints[0]])
+    yaw, yaw_rate = kept[leg.joints[0]], kept_rates[leg.joints[0]]
     inside, share = inverse(
         leg.hip,
         leg.plane,

@@ -17,7 +17,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Array1D, Array2D, Matrix3, Rows3, Vector3
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import unit
@@ -130,7 +130,9 @@ def read_limb(robot: RobotDescription, foot: int, margin: float = 0.0) -> Limb:
 
 
 @kernel
-def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Array) -> None:
+def place_limb(
+    links: Array2D, tip: Array1D, angles: Array1D, anchors: Array2D, pose: Array2D
+) -> None:
     """Compute the pose of the foot and of the joints from the joint angles.
 
     Args:
@@ -142,9 +144,9 @@ def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Ar
     px, py, pz = 0.0, 0.0, 0.0
     xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
     for j in range(links.shape[0]):
-        ox, oy, oz = float(links[j, 0]), float(links[j, 1]), float(links[j, 2])
-        ax, ay, az = float(links[j, 3]), float(links[j, 4]), float(links[j, 5])
-        angle = float(angles[j])
+        ox, oy, oz = links[j, 0], links[j, 1], links[j, 2]
+        ax, ay, az = links[j, 3], links[j, 4], links[j, 5]
+        angle = angles[j]
         px += xx * ox + xy * oy + xz * oz
         py += yx * ox + yy * oy + yz * oz
         pz += zx * ox + zy * oy + zz * oz
@@ -153,7 +155,7 @@ def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Ar
         bz = zx * ax + zy * ay + zz * az
         anchors[j, 0], anchors[j, 1], anchors[j, 2] = px, py, pz
         anchors[j, 3], anchors[j, 4], anchors[j, 5] = bx, by, bz
-        if float(links[j, 6]) > 0.5:
+        if links[j, 6] > 0.5:
             px += angle * bx
             py += angle * by
             pz += angle * bz
@@ -176,7 +178,7 @@ def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Ar
                 c * zy + s * (zz * ax - zx * az) + d * bz * ay,
                 c * zz + s * (zx * ay - zy * ax) + d * bz * az,
             )
-    sx, sy, sz = float(tip[0]), float(tip[1]), float(tip[2])
+    sx, sy, sz = tip[0], tip[1], tip[2]
     pose[0, 0] = px + xx * sx + xy * sy + xz * sz
     pose[0, 1] = py + yx * sx + yy * sy + yz * sz
     pose[0, 2] = pz + zx * sx + zy * sy + zz * sz
@@ -186,24 +188,24 @@ def place_limb(links: Array, tip: Array, angles: Array, anchors: Array, pose: Ar
 
 
 @kernel
-def limb_jacobian(links: Array, anchors: Array, pose: Array, out: Array) -> None:
+def limb_jacobian(links: Array2D, anchors: Array2D, pose: Array2D, out: Array2D) -> None:
     """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, n).
 
     Args:
         links: of the ``Limb``.
         anchors, pose: from ``place_limb``.
     """
-    px, py, pz = float(pose[0, 0]), float(pose[0, 1]), float(pose[0, 2])
+    px, py, pz = pose[0, 0], pose[0, 1], pose[0, 2]
     for j in range(links.shape[0]):
-        ax, ay, az = float(anchors[j, 3]), float(anchors[j, 4]), float(anchors[j, 5])
-        if float(links[j, 6]) > 0.5:
+        ax, ay, az = anchors[j, 3], anchors[j, 4], anchors[j, 5]
+        if links[j, 6] > 0.5:
             out[0, j], out[1, j], out[2, j] = ax, ay, az
             out[3, j] = out[4, j] = out[5, j] = 0.0
         else:
             x, y, z = (
-                px - float(anchors[j, 0]),
-                py - float(anchors[j, 1]),
-                pz - float(anchors[j, 2]),
+                px - anchors[j, 0],
+                py - anchors[j, 1],
+                pz - anchors[j, 2],
             )
             out[0, j] = ay * z - az * y
             out[1, j] = az * x - ax * z
@@ -216,7 +218,7 @@ _FAR = 10.0
 
 
 @kernel
-def aim(position: Array, rotation: Array, target: Array) -> None:
+def aim(position: Vector3, rotation: Matrix3, target: Rows3) -> None:
     """Make a target of any finite numbers: within 10 m, and with a true rotation matrix.
 
     Args:
@@ -224,14 +226,9 @@ def aim(position: Array, rotation: Array, target: Array) -> None:
         rotation: from foot to base (3, 3); its first and then its second axis are kept.
         target: out, the place and then the rows of the rotation matrix, (4, 3).
     """
-    for k in range(3):
-        target[0, k] = min(max(float(position[k]), -_FAR), _FAR)
-    x0, x1, x2 = unit(
-        float(rotation[0, 0]), float(rotation[1, 0]), float(rotation[2, 0]), 1.0, 0.0, 0.0
-    )
-    y0, y1, y2 = unit(
-        float(rotation[0, 1]), float(rotation[1, 1]), float(rotation[2, 1]), 0.0, 1.0, 0.0
-    )
+    target[0, :] = min(max(position, -_FAR), _FAR)
+    x0, x1, x2 = unit(rotation[0, 0], rotation[1, 0], rotation[2, 0], 1.0, 0.0, 0.0)
+    y0, y1, y2 = unit(rotation[0, 1], rotation[1, 1], rotation[2, 1], 0.0, 1.0, 0.0)
     part = x0 * y0 + x1 * y1 + x2 * y2
     if abs(part) > 0.999999:
         # The second axis is parallel to the first: take the base's axis farthest from that.
@@ -252,7 +249,9 @@ def aim(position: Array, rotation: Array, target: Array) -> None:
 
 
 @kernel
-def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Array) -> float:
+def foot_error(
+    tip: Array1D, pose: Array2D, target: Array2D, weights: Array1D, error: Array1D
+) -> float:
     """The weighted error of a foot's pose, and its square [m^2].
 
     Args:
@@ -262,11 +261,11 @@ def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Ar
             and how many metres a turn of 1 rad counts as, (3,).
         error: out, (6,); the last three are zero for a point foot.
     """
-    plane, normal, length = float(weights[0]), float(weights[1]), float(weights[2])
-    ex = float(target[0, 0]) - float(pose[0, 0])
-    ey = float(target[0, 1]) - float(pose[0, 1])
-    ez = float(target[0, 2]) - float(pose[0, 2])
-    nx, ny, nz = float(target[1, 2]), float(target[2, 2]), float(target[3, 2])
+    plane, normal, length = weights[0], weights[1], weights[2]
+    ex = target[0, 0] - pose[0, 0]
+    ey = target[0, 1] - pose[0, 1]
+    ez = target[0, 2] - pose[0, 2]
+    nx, ny, nz = target[1, 2], target[2, 2], target[3, 2]
     along = (normal - plane) * (nx * ex + ny * ey + nz * ez)
     ex, ey, ez = plane * ex + along * nx, plane * ey + along * ny, plane * ez + along * nz
     tx, ty, tz, sine, cosine = 0.0, 0.0, 0.0, 0.0, 1.0
@@ -313,14 +312,16 @@ def foot_error(tip: Array, pose: Array, target: Array, weights: Array, error: Ar
 
 
 @kernel
-def weigh_rows(tip: Array, pose: Array, target: Array, weights: Array, rows: Array) -> None:
+def weigh_rows(
+    tip: Array1D, pose: Array2D, target: Array2D, weights: Array1D, rows: Array2D
+) -> None:
     """Make of the foot's Jacobian (6, n) the negative derivative of ``foot_error``, in place."""
-    plane, normal, length = float(weights[0]), float(weights[1]), float(weights[2])
+    plane, normal, length = weights[0], weights[1], weights[2]
     n = rows.shape[1]
     if plane != normal or plane != 1.0:
-        nx, ny, nz = float(target[1, 2]), float(target[2, 2]), float(target[3, 2])
+        nx, ny, nz = target[1, 2], target[2, 2], target[3, 2]
         for j in range(n):
-            x, y, z = float(rows[0, j]), float(rows[1, j]), float(rows[2, j])
+            x, y, z = rows[0, j], rows[1, j], rows[2, j]
             along = (normal - plane) * (nx * x + ny * y + nz * z)
             rows[0, j] = plane * x + along * nx
             rows[1, j] = plane * y + along * ny
@@ -331,7 +332,7 @@ def weigh_rows(tip: Array, pose: Array, target: Array, weights: Array, rows: Arr
     elif tip[6] == 1.0:
         lx, ly, lz = _along(pose, tip)
     for j in range(n):
-        x, y, z = float(rows[3, j]), float(rows[4, j]), float(rows[5, j])
+        x, y, z = rows[3, j], rows[4, j], rows[5, j]
         along = lx * x + ly * y + lz * z
         rows[3, j] = length * (x - along * lx)
         rows[4, j] = length * (y - along * ly)
@@ -340,7 +341,7 @@ def weigh_rows(tip: Array, pose: Array, target: Array, weights: Array, rows: Arr
 
 @kernel
 def turning(
-    tip: Array, last: Array, target: Array, period: float, limit: float, out: Array
+    tip: Array1D, last: Array2D, target: Array2D, period: float, limit: float, out: Array1D
 ) -> None:
     """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
@@ -382,7 +383,7 @@ def _along(pose: Array, tip: Array) -> tuple[float, float, float]:
 
 
 @kernel
-def _product(first: Array, second: Array, row: int, column: int) -> float:
+def _product(first: Array2D, second: Array2D, row: int, column: int) -> float:
     """An element of a rotation matrix times the transpose of another; row 0 is the position."""
     return (
         float(first[row, 0]) * float(second[column, 0])

@@ -31,7 +31,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Flags, Indices
+from ..mathematics.arrays import (
+    Array,
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags0D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import solve_positive
 from .description import RobotDescription
@@ -66,14 +76,14 @@ def limb_scratch(joints: int) -> Array:
 
 @kernel
 def approach(
-    links: Array,
-    tip: Array,
-    limits: Array,
-    target: Array,
-    weights: Array,
+    links: Array2D,
+    tip: Array1D,
+    limits: Array2D,
+    target: Array2D,
+    weights: Array1D,
     steps: int,
-    work: Array,
-    angles: Array,
+    work: Array2D,
+    angles: Array1D,
 ) -> float:
     """Bring the foot as near to its target as possible, starting from the present joint angles.
 
@@ -95,7 +105,7 @@ def approach(
     step, trial = work[2 * n + 12, :n], work[2 * n + 13, :n]
     points = 3 if tip[6] == 0.0 else 6
     for j in range(n):
-        angles[j] = min(max(float(angles[j]), float(limits[j, 0])), float(limits[j, 1]))
+        angles[j] = min(max(angles[j], limits[j, 0]), limits[j, 1])
     place_limb(links, tip, angles, anchors, pose)
     square = foot_error(tip, pose, target, weights, error)
     ease, fresh = 0.1, True
@@ -109,8 +119,8 @@ def approach(
             for j in range(n):
                 value = 0.0
                 for i in range(points):
-                    value += float(rows[i, j]) * float(error[i])
-                if _stuck(limits, j, float(angles[j]), value):
+                    value += rows[i, j] * error[i]
+                if _stuck(limits, j, angles[j], value):
                     # Without its column the joint stays where it is.
                     value = 0.0
                     for i in range(points):
@@ -125,16 +135,16 @@ def approach(
             for k in range(j + 1):
                 value = 0.0
                 for i in range(points):
-                    value += float(rows[i, j]) * float(rows[i, k])
+                    value += rows[i, j] * rows[i, k]
                 normal[j, k] = value
             normal[j, j] += damping
         solve_positive(normal, step)
         promised = 0.0
         for j in range(n):
-            angle = float(angles[j]) + min(max(float(step[j]), -1.0), 1.0)
-            trial[j] = min(max(angle, float(limits[j, 0])), float(limits[j, 1]))
-            moved = float(trial[j]) - float(angles[j])
-            promised += moved * (damping * moved + float(gradient[j]))
+            angle = angles[j] + min(max(step[j], -1.0), 1.0)
+            trial[j] = min(max(angle, limits[j, 0]), limits[j, 1])
+            moved = trial[j] - angles[j]
+            promised += moved * (damping * moved + gradient[j])
         place_limb(links, tip, trial, anchors, pose)
         found = foot_error(tip, pose, target, weights, error)
         fresh = found < square
@@ -151,16 +161,16 @@ def approach(
 
 @kernel
 def reach(
-    links: Array,
-    tip: Array,
-    limits: Array,
-    target: Array,
-    weights: Array,
-    starts: Array,
+    links: Array2D,
+    tip: Array1D,
+    limits: Array2D,
+    target: Array2D,
+    weights: Array1D,
+    starts: Array2D,
     tries: int,
     steps: int,
-    work: Array,
-    angles: Array,
+    work: Array2D,
+    angles: Array1D,
 ) -> float:
     """Reach a target from the first of several starts that leads there.
 
@@ -190,8 +200,8 @@ def reach(
         if number > 0:
             start = 0
             for k in range(1, starts.shape[0]):
-                fresh = float(starts[k, n]) >= 0.0
-                if fresh and (start == 0 or float(starts[k, n]) < float(starts[start, n])):
+                fresh = starts[k, n] >= 0.0
+                if fresh and (start == 0 or starts[k, n] < starts[start, n]):
                     start = k
             starts[start, n] = -1.0
         for j in range(n):
@@ -208,16 +218,16 @@ def reach(
 
 @kernel
 def limb_velocity(
-    links: Array,
-    tip: Array,
-    limits: Array,
-    target: Array,
-    weights: Array,
-    angles: Array,
-    twist: Array,
+    links: Array2D,
+    tip: Array1D,
+    limits: Array2D,
+    target: Array2D,
+    weights: Array1D,
+    angles: Array1D,
+    twist: Array1D,
     damping: float,
-    work: Array,
-    speeds: Array,
+    work: Array2D,
+    speeds: Array1D,
 ) -> None:
     """Joint velocities that move the foot as its target moves, by damped least squares.
 
@@ -240,8 +250,8 @@ def limb_velocity(
     for i in range(6):
         column[i, 0] = twist[i]
     weigh_rows(tip, pose, target, weights, column)
-    tx, ty, tz = float(column[3, 0]), float(column[4, 0]), float(column[5, 0])
-    x, y, z = float(column[0, 0]), float(column[1, 0]), float(column[2, 0])
+    tx, ty, tz = column[3, 0], column[4, 0], column[5, 0]
+    x, y, z = column[0, 0], column[1, 0], column[2, 0]
     task[0], task[1], task[2], task[3], task[4], task[5] = x, y, z, tx, ty, tz
     weigh_rows(tip, pose, target, weights, rows)
     points = 3 if tip[6] == 0.0 else 6
@@ -249,19 +259,19 @@ def limb_velocity(
         for j in range(n):
             value = 0.0
             for i in range(points):
-                value += float(rows[i, j]) * float(task[i])
+                value += rows[i, j] * task[i]
             speeds[j] = value
             for k in range(j + 1):
                 value = 0.0
                 for i in range(points):
-                    value += float(rows[i, j]) * float(rows[i, k])
+                    value += rows[i, j] * rows[i, k]
                 normal[j, k] = value
             normal[j, j] += damping * damping
         solve_positive(normal, speeds)
         again = False
         for j in range(n):
-            speed = float(speeds[j])
-            if speed != 0.0 and _stuck(limits, j, float(angles[j]), speed):
+            speed = speeds[j]
+            if speed != 0.0 and _stuck(limits, j, angles[j], speed):
                 again = True
                 for i in range(points):
                     rows[i, j] = 0.0
@@ -270,9 +280,9 @@ def limb_velocity(
 
 
 @kernel
-def _stuck(limits: Array, joint: int, angle: float, direction: float) -> bool:
+def _stuck(limits: Array2D, joint: int, angle: float, direction: float) -> bool:
     """Whether a joint stands at a limit and ``direction`` points beyond it."""
-    lower, upper = float(limits[joint, 0]), float(limits[joint, 1])
+    lower, upper = limits[joint, 0], limits[joint, 1]
     return (angle <= lower and direction <= 0.0) or (angle >= upper and direction >= 0.0)
 
 
@@ -297,27 +307,27 @@ class LimbGeometry(NamedTuple):
         radius: of the ball that the foot is [m], or zero.
     """
 
-    joints: Indices
-    links: Array
-    tip: Array
-    limits: Array
-    standing: Array
+    joints: Indices1D
+    links: Array2D
+    tip: Array1D
+    limits: Array2D
+    standing: Array1D
     radius: float
 
 
 class LimbScratch(NamedTuple):
     """Memory for intermediate results; ``target`` and ``twist`` lead from one kernel to the other."""
 
-    target: Array
-    twist: Array
-    rotation: Array
-    line: Array
-    place: Array
-    weights: Array
-    starts: Array
-    work: Array
-    angles: Array
-    speeds: Array
+    target: Rows3
+    twist: Array1D
+    rotation: Matrix3
+    line: Vector3
+    place: Vector3
+    weights: Vector3
+    starts: Array2D
+    work: Array2D
+    angles: Array1D
+    speeds: Array1D
 
 
 def limb_geometry(robot: RobotDescription, foot: int, margin: float) -> LimbGeometry:
@@ -351,10 +361,10 @@ def watch_foot(
     limb: LimbGeometry,
     foot: FootMotion,
     pitched: bool,
-    pitch: Array,
+    pitch: Array0D,
     period: float,
-    known: Flags,
-    last: Array,
+    known: Flags0D,
+    last: Rows3,
     scratch: LimbScratch,
 ) -> None:
     """The target of the limb, and how fast it turns.
@@ -369,7 +379,7 @@ def watch_foot(
         for k in range(3):
             rotation[i, k] = foot.rotation[i, k]
     if pitched:
-        pitched_line(rotation, float(pitch[()]), scratch.line)
+        pitched_line(rotation, pitch[()], scratch.line)
         for i in range(3):
             rotation[i, 0] = scratch.line[i]
     # A ball's centre is its radius above the ground, whichever way the leg comes.
@@ -391,9 +401,9 @@ def follow_limb(
     limb: LimbGeometry,
     number: int,
     foot: FootMotion,
-    measured: Array,
-    known: Flags,
-    found: Array,
+    measured: Array1D,
+    known: Flags0D,
+    found: Array1D,
     settings: LegSettings,
     scratch: LimbScratch,
     target: LegTargets,
@@ -411,8 +421,8 @@ def follow_limb(
     n, slides = limb.joints.shape[0], bool(settings.slides[0])
     for i in range(n):
         joint = int(limb.joints[i])
-        felt = min(max(float(measured[joint]), -_FASTEST), _FASTEST)
-        starts[0, i] = float(found[joint]) if known[()] else felt
+        felt = min(max(measured[joint], -_FASTEST), _FASTEST)
+        starts[0, i] = found[joint] if known[()] else felt
         starts[1, i] = felt
         starts[2, i] = limb.standing[i]
     weights[0], weights[1], weights[2] = 1.0, 1.0, float(settings.turn_length[0])

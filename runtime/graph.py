@@ -56,6 +56,7 @@ class Graph:
         self,
         duration: float | None = None,
         *,
+        seed: int | None = None,
         clock: ClockSpec | None = None,
         sinks: Sequence[Sink] = (),
         log: bool = True,
@@ -67,6 +68,7 @@ class Graph:
 
         Args:
             duration: how long [s of the graph's time]; by default as the graph says.
+            seed: the value of every parameter called ``seed``; by default as the graph says.
             clock: how to pace it; by default as the graph says.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
@@ -86,9 +88,10 @@ class Graph:
             ticks = round(duration * self.checked.base_rate)
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
-        sinks = [*path_sinks(self.checked, clock.kind if clock is not None else ""), *sinks]
+        graph = self.checked if seed is None else self.with_seed(seed).checked
+        sinks = [*path_sinks(graph, clock.kind if clock is not None else ""), *sinks]
         return Executor(
-            self.checked,
+            graph,
             clock=clock,
             sinks=sinks,
             log=log,

@@ -7,7 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array,
+    Array0D,
+    Array1D,
+    Array2D,
+    Array3D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import (
@@ -29,72 +41,72 @@ _THRUST, _LANDING, _RECOVER = int(Phase.THRUST), int(Phase.LANDING), int(Phase.R
 class Plan(NamedTuple):
     """The fields of ``JumpReference`` that are followed."""
 
-    time: Array
-    lift_off_time: Array
-    touchdown_time: Array
-    com: Array
-    com_velocity: Array
-    com_acceleration: Array
-    angular_momentum: Array
-    angular_momentum_rate: Array
-    orientation: Array
-    angular_velocity: Array
-    foot_position: Array
-    foot_yaw: Array
-    joint_position: Array
-    joint_velocity: Array
-    joint_acceleration: Array
+    time: Array0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    com: Vector3
+    com_velocity: Vector3
+    com_acceleration: Vector3
+    angular_momentum: Vector3
+    angular_momentum_rate: Vector3
+    orientation: Array1D
+    angular_velocity: Vector3
+    foot_position: Rows3
+    foot_yaw: Array1D
+    joint_position: Array1D
+    joint_velocity: Array1D
+    joint_acceleration: Array1D
 
 
 class Present(NamedTuple):
     """The fields of ``PhaseState`` and ``DynamicsTerms`` that say how the robot stands."""
 
-    phase: Indices
-    time_in_phase: Array
-    foot_position: Array
-    foot_rotation: Array
-    base_rotation: Array
-    mass_matrix: Array
+    phase: Indices0D
+    time_in_phase: Array0D
+    foot_position: Rows3
+    foot_rotation: Array3D
+    base_rotation: Matrix3
+    mass_matrix: Array2D
 
 
 class Aim(NamedTuple):
     """The fields of ``WholeBodyTarget``."""
 
-    com: Array
-    com_velocity: Array
-    com_acceleration: Array
-    angular_momentum: Array
-    angular_momentum_rate: Array
-    orientation: Array
-    angular_velocity: Array
-    joint_position: Array
-    joint_velocity: Array
-    joint_acceleration: Array
+    com: Vector3
+    com_velocity: Vector3
+    com_acceleration: Vector3
+    angular_momentum: Vector3
+    angular_momentum_rate: Vector3
+    orientation: Array1D
+    angular_velocity: Vector3
+    joint_position: Array1D
+    joint_velocity: Array1D
+    joint_acceleration: Array1D
 
 
 class Memory(NamedTuple):
     """The fields of ``BalanceMemory``."""
 
-    standing_height: Array
-    started: Flags
-    trim: Array
-    origin: Array
-    heading: Array
-    off_place: Array
+    standing_height: Array0D
+    started: Flags0D
+    trim: Vector3
+    origin: Vector3
+    heading: Array0D
+    off_place: Vector3
 
 
 class Gains(NamedTuple):
     """Parameters that may change during a run, each an array of one element but for ``corrections``
     (2, 3), of velocity [m/s] and angular momentum [N m s]."""
 
-    landing_depth: Array
-    rise_time: Array
-    trim_rate: Array
-    trim_limit: Array
-    place_gain: Array
-    place_limit: Array
-    place_time: Array
-    corrections: Array
+    landing_depth: Array1D
+    rise_time: Array1D
+    trim_rate: Array1D
+    trim_limit: Array1D
+    place_gain: Array1D
+    place_limit: Array1D
+    place_time: Array1D
+    corrections: Rows3
 
 
 class Stand(NamedTuple):
@@ -102,7 +114,7 @@ class Stand(NamedTuple):
     the description [kg], and the period [s]."""
 
     kind: int
-    counted: Flags
+    counted: Flags1D
     mass: float
     period: float
 
@@ -110,11 +122,11 @@ class Stand(NamedTuple):
 class Scratch(NamedTuple):
     """``turn`` and ``quaternion`` (4,); ``vector``, the ``middle`` of the feet and their planned one (3,)."""
 
-    turn: Array
-    quaternion: Array
-    vector: Array
-    middle: Array
-    planned_middle: Array
+    turn: Array1D
+    quaternion: Array1D
+    vector: Vector3
+    middle: Array1D
+    planned_middle: Vector3
 
 
 @kernel
@@ -151,14 +163,14 @@ def aim(
 
 
 @kernel
-def planned_heading(foot_yaw: Array, counted: Flags) -> float:
+def planned_heading(foot_yaw: Array1D, counted: Flags1D) -> float:
     """The mean of the planned headings [rad] of the feet that count."""
     count, planned = 0, 0.0
     for foot in range(counted.shape[0]):
         count += 1 if counted[foot] else 0
     for foot in range(counted.shape[0]):
         if counted[foot]:
-            planned += float(foot_yaw[foot]) / count
+            planned += foot_yaw[foot] / count
     return planned
 
 
@@ -178,7 +190,7 @@ def measured_heading(
 
 
 @kernel
-def set_heading(angle: float, quaternion: Array) -> None:
+def set_heading(angle: float, quaternion: Array1D) -> None:
     """The unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
     quaternion[0], quaternion[1] = 0.0, 0.0
     quaternion[2], quaternion[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
@@ -228,7 +240,7 @@ def correct_place(plan: Plan, gains: Gains, memory: Memory, out: Aim, scratch: S
 
 @kernel
 def correct_lift_off(
-    plan: Plan, present: Present, stand: Stand, turn: float, gains: Gains, out: Aim, vector: Array
+    plan: Plan, present: Present, stand: Stand, turn: float, gains: Gains, out: Aim, vector: Vector3
 ) -> None:
     """Add the known corrections of velocity and momentum during the thrust."""
     largest = 0.0
@@ -247,7 +259,7 @@ def correct_lift_off(
     add_quadratic_growth(vector, share, duration, out.com_velocity, out.com_acceleration)
     for k in range(3):
         way = duration * share * share * share / 3.0
-        out.com[k] = float(out.com[k]) + float(vector[k]) * way
+        out.com[k] = float(out.com[k]) + vector[k] * way
 
 
 @kernel
@@ -282,16 +294,17 @@ def balance(
 
 
 @kernel
-def middle_point(points: Array, out: Array) -> None:
+def middle_point(points: Rows3, out: Vector3) -> None:
     """The mean of points (n, 3)."""
     out[:] = 0.0
     for i in range(points.shape[0]):
-        for k in range(3):
-            out[k] += float(points[i, k]) / points.shape[0]
+        out[:] += points[i] / points.shape[0]
 
 
 @kernel
-def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: Array) -> float:
+def pattern_turn(
+    planned: Array2D, planned_middle: Array1D, points: Array2D, middle: Array1D
+) -> float:
     """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
 
     Args:
@@ -308,10 +321,10 @@ def pattern_turn(planned: Array, planned_middle: Array, points: Array, middle: A
 
 
 @kernel
-def turn_about_vertical(vector: Array, angle: float, out: Array) -> None:
+def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
     """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
     cosine, sine = math.cos(angle), math.sin(angle)
-    x, y = float(vector[0]), float(vector[1])
+    x, y = vector[0], vector[1]
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
 
 
@@ -367,8 +380,8 @@ def add_quadratic_growth(
 
 
 @kernel
-def integrate_trim(error: Array, gain: float, limit: float, trim: Array) -> None:
+def integrate_trim(error: Array1D, gain: float, limit: float, trim: Array1D) -> None:
     """One step of the integral of the tilt about x and y, within the limit; z stays zero."""
     for k in range(2):
-        trim[k] = min(max(float(trim[k]) + gain * float(error[k]), -limit), limit)
+        trim[k] = min(max(trim[k] + gain * error[k], -limit), limit)
     trim[2] = 0.0

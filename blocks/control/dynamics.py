@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Array3D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.body_dynamics import (
     BodyMotion,
     BodyTree,
@@ -110,23 +119,23 @@ class Dynamics(KernelBlock):
 class BaseAndJoints(NamedTuple):
     """The pose and velocity of the base, as in ``BaseState``, and the joints' motion."""
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
-    joint_position: Array
-    joint_velocity: Array
+    position: Vector3
+    orientation: Array1D
+    linear_velocity: Vector3
+    angular_velocity: Vector3
+    joint_position: Array1D
+    joint_velocity: Array1D
 
 
 class Weighing(NamedTuple):
     """The mass to use [kg], without a dimension (zero: the ``nominal`` one), and the offset of the
     torso's centre of mass from the ``described`` one [m], (3,); ``offset`` (3,) is scratch."""
 
-    mass: Array
-    com_offset: Array
+    mass: Array0D
+    com_offset: Vector3
     nominal: float
-    described: Array
-    offset: Array
+    described: Vector3
+    offset: Vector3
 
 
 class Feet(NamedTuple):
@@ -137,12 +146,12 @@ class Feet(NamedTuple):
     ``radius`` [m] is not negative, and ``centre`` (n_contacts, 3) [m, body] is the ball's.
     """
 
-    body: Indices
-    sole: Array
-    foot: Indices
-    point: Array
-    radius: Array
-    centre: Array
+    body: Indices1D
+    sole: Rows3
+    foot: Indices1D
+    point: Rows3
+    radius: Array1D
+    centre: Rows3
 
 
 class Scratch(NamedTuple):
@@ -150,22 +159,22 @@ class Scratch(NamedTuple):
 
     motion: BodyMotion
     inertias: Inertias
-    orientation: Array
-    places: Array
+    orientation: Array1D
+    places: Matrix3
 
 
 class FootTerms(NamedTuple):
     """The fields of ``DynamicsTerms`` that the kernel of the feet writes."""
 
-    velocity: Array
-    base_position: Array
-    base_rotation: Array
-    foot_position: Array
-    foot_rotation: Array
-    contact_position: Array
-    contact_velocity: Array
-    contact_jacobian: Array
-    contact_drift: Array
+    velocity: Array1D
+    base_position: Vector3
+    base_rotation: Matrix3
+    foot_position: Rows3
+    foot_rotation: Array3D
+    contact_position: Rows3
+    contact_velocity: Rows3
+    contact_jacobian: Array3D
+    contact_drift: Rows3
 
 
 @kernel
@@ -207,12 +216,13 @@ def set_state(state: BaseAndJoints, scratch: Scratch, terms: FootTerms) -> None:
 
 
 @kernel
-def write_jacobian(tree: BodyTree, motion: BodyMotion, body: int, place: Array, out: Array) -> None:
+def write_jacobian(
+    tree: BodyTree, motion: BodyMotion, body: int, place: Vector3, out: Array2D
+) -> None:
     """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
     for row in range(3):
-        for column in range(out.shape[1]):
-            out[row, column] = 0.0
-    x, y, z = float(place[0]), float(place[1]), float(place[2])
+        out[row, :] = 0.0
+    x, y, z = place[0], place[1], place[2]
     for k in range(3):
         a, b, c = (
             float(motion.rotation[0, 0, k]),
@@ -231,7 +241,7 @@ def write_jacobian(tree: BodyTree, motion: BodyMotion, body: int, place: Array, 
 
 
 @kernel
-def lowest_point(centre: Array, radius: float, rotation: Array, out: Array) -> None:
+def lowest_point(centre: Vector3, radius: float, rotation: Matrix3, out: Vector3) -> None:
     """The lowest point (3,) of a ball, in the frame of the body it belongs to.
 
     Args:
@@ -239,12 +249,13 @@ def lowest_point(centre: Array, radius: float, rotation: Array, out: Array) -> N
         radius: of the ball [m].
         rotation: from the body to the world, (3, 3).
     """
-    for k in range(3):
-        out[k] = float(centre[k]) - radius * float(rotation[2, k])
+    out[:] = centre - radius * rotation[2]
 
 
 @kernel
-def rolling_drift(motion: BodyMotion, body: int, centre: Array, lowest: Array, out: Array) -> None:
+def rolling_drift(
+    motion: BodyMotion, body: int, centre: Array1D, lowest: Array1D, out: Array1D
+) -> None:
     """The rate of change (3,) of the velocity of a ball's lowest point, while v' = 0.
 
     The lowest point consists of other material at every instant. So its velocity
@@ -255,14 +266,14 @@ def rolling_drift(motion: BodyMotion, body: int, centre: Array, lowest: Array, o
         centre, lowest: the places of the ball's centre and of its lowest point [m], (3,).
     """
     acceleration_at(motion, body, centre, out)
-    x = float(lowest[0]) - float(centre[0])
-    y = float(lowest[1]) - float(centre[1])
-    z = float(lowest[2]) - float(centre[2])
+    x = lowest[0] - centre[0]
+    y = lowest[1] - centre[1]
+    z = lowest[2] - centre[2]
     spatial = motion.acceleration[body]
     a, b, c = float(spatial[3]), float(spatial[4]), float(spatial[5])
-    out[0] = float(out[0]) + (b * z - c * y)
-    out[1] = float(out[1]) + (c * x - a * z)
-    out[2] = float(out[2]) + (a * y - b * x)
+    out[0] = out[0] + (b * z - c * y)
+    out[1] = out[1] + (c * x - a * z)
+    out[2] = out[2] + (a * y - b * x)
 
 
 @kernel
@@ -296,7 +307,7 @@ def evaluate(
     weighing: Weighing,
     tree: BodyTree,
     scratch: Scratch,
-    rotors: Array,
+    rotors: Array2D,
     feet: Feet,
     terms: MotionTerms,
     foot_terms: FootTerms,

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array3D,
+    Flags0D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
@@ -17,22 +24,22 @@ BEFORE = 0.006
 class PlannedJoints(NamedTuple):
     """The fields of ``JumpReference`` that say what the joints should do."""
 
-    phase: Indices
-    time: Array
-    lift_off_time: Array
-    touchdown_time: Array
-    orientation: Array
-    joint_position: Array
-    joint_velocity: Array
-    joint_acceleration: Array
+    phase: Indices0D
+    time: Array0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    orientation: Array1D
+    joint_position: Array1D
+    joint_velocity: Array1D
+    joint_acceleration: Array1D
 
 
 class Following(NamedTuple):
     """The parameters of ``LegInverseKinematics`` about a plan that is followed, (1,) each."""
 
-    plan_lead: Array
-    level_time: Array
-    late_time: Array
+    plan_lead: Array1D
+    level_time: Array1D
+    late_time: Array1D
 
 
 class Flown(NamedTuple):
@@ -40,11 +47,11 @@ class Flown(NamedTuple):
     ``position`` [rad], ``velocity`` [rad/s] and ``acceleration`` [rad/s^2]. Before a flight ``known`` is
     false."""
 
-    known: Flags
-    time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
+    known: Flags0D
+    time: Array0D
+    position: Array1D
+    velocity: Array1D
+    acceleration: Array1D
 
 
 class Soles(NamedTuple):
@@ -55,11 +62,11 @@ class Soles(NamedTuple):
     base's y axis, which is zero without such a joint, and the ``lowest`` and ``highest`` angle [rad].
     """
 
-    wanted: Array
-    joint: Indices
-    axis: Array
-    lowest: Array
-    highest: Array
+    wanted: Array3D
+    joint: Indices1D
+    axis: Array1D
+    lowest: Array1D
+    highest: Array1D
 
 
 @kernel

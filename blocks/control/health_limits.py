@@ -6,7 +6,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags0D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import RobotHealth
@@ -73,26 +79,26 @@ class Limits(NamedTuple):
 class Drives(NamedTuple):
     """What the drives report, and for how many ticks in a row it was beyond a limit."""
 
-    condition: Counts
-    age: Array
-    voltage: Array
-    temperature: Array
-    current: Array
-    low: Counts
-    hot: Counts
-    strong: Counts
+    condition: Indices1D
+    age: Array1D
+    voltage: Array1D
+    temperature: Array1D
+    current: Array1D
+    low: Indices1D
+    hot: Indices1D
+    strong: Indices1D
 
 
 class Sensors(NamedTuple):
     """What is reported of the sensors, and what is kept of it from tick to tick."""
 
-    imu_age: Array
-    stamp: Array
-    joints_valid: Flags
-    imu_valid: Flags
-    contacts_valid: Flags
-    invalid: Counts
-    stamps: Array
+    imu_age: Array0D
+    stamp: Array0D
+    joints_valid: Flags0D
+    imu_valid: Flags0D
+    contacts_valid: Flags0D
+    invalid: Indices1D
+    stamps: Array1D
 
 
 class Health(NamedTuple):
@@ -102,8 +108,8 @@ class Health(NamedTuple):
     drives: Drives
     sensors: Sensors
     limits: Limits
-    state: Counts
-    verdict: Counts
+    state: Indices0D
+    verdict: Indices1D
 
 
 class HealthTimers(Protocol):
@@ -206,7 +212,7 @@ def health_text(fault: Fault, who: str, value: float, params: HealthParameters) 
 
 
 @kernel
-def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Counts) -> None:
+def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Indices1D) -> None:
     """Write the gravest fault, and the drive that has it, to ``verdict``, (2,); all counts are updated.
     A voltage of zero is one that is not measured."""
     fault, place = 0, 0

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array1D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.joint_feedback import (
     Feedback,
     Motion,
@@ -32,11 +38,11 @@ class Legs(NamedTuple):
     ``free`` (n_joints,), the joints that are neither held nor in a leg.
     """
 
-    foot_of_point: Indices
-    foot_of_joint: Indices
-    held: Flags
-    angle: Array
-    free: Flags
+    foot_of_point: Indices1D
+    foot_of_joint: Indices1D
+    held: Flags1D
+    angle: Array1D
+    free: Flags1D
 
 
 class Inputs(NamedTuple):
@@ -46,16 +52,16 @@ class Inputs(NamedTuple):
     free ones, and ``acceleration`` (n_joints,) those of the whole-body controller [rad/s^2].
     """
 
-    phase: Indices
-    stance: Flags
-    stepping: Flags
-    torque: Array
-    acceleration: Array
+    phase: Indices0D
+    stance: Flags1D
+    stepping: Flags1D
+    torque: Array1D
+    acceleration: Array1D
     measured: Motion
     legs: Motion
     planned: Motion
-    planned_phase: Indices
-    planned_torque: Array
+    planned_phase: Indices0D
+    planned_torque: Array1D
 
 
 class Numbers(NamedTuple):
@@ -66,27 +72,27 @@ class Numbers(NamedTuple):
     is any friction to compensate.
     """
 
-    rate: Array
-    feedforward: Array
-    leak: Array
-    friction: Array
-    damping: Array
-    speed: Array
-    compensates: Flags
+    rate: Array1D
+    feedforward: Array1D
+    leak: Array1D
+    friction: Array1D
+    damping: Array1D
+    speed: Array1D
+    compensates: Flags1D
 
 
 class Following(NamedTuple):
     """The fields of ``JointFollower``."""
 
-    airborne: Array
+    airborne: Array1D
     targets: Motion
-    started: Flags
+    started: Flags0D
 
 
 class Joints(NamedTuple):
     """Memory: the weight of the flight gains of every joint (n_joints,), and both sets of gains."""
 
-    airborne: Array
+    airborne: Array1D
     flight: Feedback
     stance: Feedback
 
@@ -101,8 +107,8 @@ def command_joints(
     stops: SoftStops,
     following: Following,
     joints: Joints,
-    mode: Indices,
-    torque: Array,
+    mode: Indices0D,
+    torque: Array1D,
     out: Feedback,
 ) -> None:
     """Write the command: ``mode`` (), ``torque`` (n_joints,) [N m] and the feedback ``out``.
@@ -121,7 +127,7 @@ def command_joints(
         torque[i] = (1.0 - airborne) * float(inputs.torque[i])
         if flies:
             planned = airborne * float(inputs.planned_torque[i]) * float(numbers.feedforward[0])
-            torque[i] = float(torque[i]) + planned
+            torque[i] = torque[i] + planned
     if numbers.compensates[0]:
         add_friction(
             inputs.measured.velocity, numbers.friction, numbers.damping, float(numbers.speed[0]),
@@ -134,7 +140,7 @@ def command_joints(
 
 @kernel
 def blend_legs(
-    legs: Legs, inputs: Inputs, numbers: Numbers, following: Following, airborne: Array
+    legs: Legs, inputs: Inputs, numbers: Numbers, following: Following, airborne: Array1D
 ) -> None:
     """Change the weight of each leg's flight gains: up where no point of it is in stance.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import Array1D, Flags0D, Flags1D, Indices1D
 from ...mathematics.kernel import kernel
 from ...robots.five_joint_track import LegTargets
 from ..signals import Phase
@@ -13,12 +13,12 @@ _FLIGHT = int(Phase.FLIGHT)
 
 @kernel
 def begin_targets(
-    measured: Array,
-    held: Indices,
-    angles: Array,
-    may_slide: Flags,
-    toes_first: Flags,
-    slides: Flags,
+    measured: Array1D,
+    held: Indices1D,
+    angles: Array1D,
+    may_slide: Flags1D,
+    toes_first: Flags0D,
+    slides: Flags1D,
     target: LegTargets,
 ) -> None:
     """Joints that belong to no leg stay where they are measured; the ``held`` ones at ``angles``.
@@ -31,7 +31,7 @@ def begin_targets(
         target.position[joint] = measured[joint]
         target.velocity[joint] = 0.0
     for k in range(held.shape[0]):
-        target.position[int(held[k])] = angles[k]
+        target.position[held[k]] = angles[k]
 
 
 @kernel
@@ -42,8 +42,8 @@ def end_targets(
     plan: PlannedJoints,
     flown: Flown,
     target: LegTargets,
-    known: Flags,
-    found: Array,
+    known: Flags0D,
+    found: Array1D,
 ) -> None:
     """Take the plan's joints instead where it flies, or has just landed, and is followed; remember what
     was ``found``."""

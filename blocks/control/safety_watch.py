@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Flags0D, Indices0D, Indices1D
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
 from ..signals import CommandMode, DrivePhase, SwitchFault
@@ -24,48 +24,48 @@ _DAMPING_MODE = int(CommandMode.DAMPING)
 class Command(NamedTuple):
     """The fields of ``JointCommand``."""
 
-    mode: Counts
-    torque: Array
-    position: Array
-    velocity: Array
-    stiffness: Array
-    damping: Array
+    mode: Indices0D
+    torque: Array1D
+    position: Array1D
+    velocity: Array1D
+    stiffness: Array1D
+    damping: Array1D
 
 
 class RobotState(NamedTuple):
     """What is known of the robot: the fields of ``BaseState``, the joints' position and velocity, and
     whether the controller has solved."""
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
-    joint_position: Array
-    joint_velocity: Array
-    solved: Flags
+    position: Array1D
+    orientation: Array1D
+    linear_velocity: Array1D
+    angular_velocity: Array1D
+    joint_position: Array1D
+    joint_velocity: Array1D
+    solved: Flags0D
 
 
 class Timers(NamedTuple):
     """The fields of ``SafetyState`` that are counts of ticks, and the joints of the last tick."""
 
-    tilted: Counts
-    beyond: Counts
-    fast: Counts
-    stale: Counts
-    unsolved: Counts
-    last_position: Array
-    last_velocity: Array
-    started: Flags
+    tilted: Indices0D
+    beyond: Indices1D
+    fast: Indices1D
+    stale: Indices0D
+    unsolved: Indices0D
+    last_position: Array1D
+    last_velocity: Array1D
+    started: Flags0D
 
 
 class Bounds(NamedTuple):
     """The limits of joints and torques, each (n_joints,), the tilt's [rad], and how many ticks each
     may be beyond: ``stale`` and ``unsolved`` are not judged if zero."""
 
-    lower: Array
-    upper: Array
-    speed: Array
-    torque: Array
+    lower: Array1D
+    upper: Array1D
+    speed: Array1D
+    torque: Array1D
     tilt: float
     tilt_ticks: int
     joint_ticks: int
@@ -76,19 +76,19 @@ class Bounds(NamedTuple):
 class Switches(NamedTuple):
     """The fields of ``SwitchHealth``."""
 
-    fault: Counts
-    stop: Flags
+    fault: Indices1D
+    stop: Flags0D
 
 
 class Verdict(NamedTuple):
     """The fault of this tick and the place where it befell, (2,), and what was measured, (1,)."""
 
-    fault: Counts
-    value: Array
+    fault: Indices1D
+    value: Array1D
 
 
 @kernel
-def is_plausible(command: Command, torque: Array) -> bool:
+def is_plausible(command: Command, torque: Array1D) -> bool:
     """Whether a command is finite and within what drives can do."""
     return (
         within_each(command.torque, torque)
@@ -183,8 +183,8 @@ def watch(
     timers: Timers,
     health: Health,
     switches: Switches,
-    damping: Array,
-    lasting: Counts,
+    damping: Array1D,
+    lasting: Indices0D,
     command: Command,
     verdict: Verdict,
 ) -> None:
@@ -214,43 +214,43 @@ def watch(
 
 
 @kernel
-def within(values: Array, limit: float) -> bool:
+def within(values: Array1D, limit: float) -> bool:
     """Whether all values are finite and their magnitudes at most ``limit``."""
     inside = True
     for i in range(values.shape[0]):
-        inside = inside and abs(float(values[i])) <= limit
+        inside = inside and abs(values[i]) <= limit
     return inside
 
 
 @kernel
-def within_each(values: Array, limits: Array) -> bool:
+def within_each(values: Array1D, limits: Array1D) -> bool:
     """Whether every value is finite and its magnitude at most its limit."""
     inside = True
     for i in range(values.shape[0]):
-        inside = inside and abs(float(values[i])) <= float(limits[i])
+        inside = inside and abs(values[i]) <= limits[i]
     return inside
 
 
 @kernel
-def count_beyond(values: Array, lower: Array, upper: Array, counts: Counts) -> int:
+def count_beyond(values: Array1D, lower: Array1D, upper: Array1D, counts: Indices1D) -> int:
     """Count how many times in a row each value was out of bounds; returns the largest count."""
     largest = 0
     for i in range(values.shape[0]):
-        out = not float(lower[i]) <= float(values[i]) <= float(upper[i])
-        counts[i] = count = int(counts[i]) + 1 if out else 0
+        out = not lower[i] <= values[i] <= upper[i]
+        counts[i] = count = counts[i] + 1 if out else 0
         largest = max(largest, count)
     return largest
 
 
 @kernel
-def count_faster(values: Array, limits: Array, counts: Counts) -> int:
+def count_faster(values: Array1D, limits: Array1D, counts: Indices1D) -> int:
     """Count how many times in a row each value's magnitude was above its limit.
 
     Returns the largest count.
     """
     largest = 0
     for i in range(values.shape[0]):
-        above = abs(float(values[i])) > float(limits[i])
-        counts[i] = count = int(counts[i]) + 1 if above else 0
+        above = abs(values[i]) > limits[i]
+        counts[i] = count = counts[i] + 1 if above else 0
         largest = max(largest, count)
     return largest

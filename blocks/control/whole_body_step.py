@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array1D,
+    Array2D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.kernel import kernel
 from ...mathematics.whole_body_solution import SOLVED
 from ..signals import Phase
@@ -14,38 +21,38 @@ class Turns(NamedTuple):
     """Which calls a step makes, each (1,) and not zero where it makes them: the tasks with the gains
     of ``stand``, ``thrust`` or ``landing``, and what solves the program if a point is ``loaded``."""
 
-    stand: Indices
-    thrust: Indices
-    landing: Indices
-    loaded: Indices
+    stand: Indices1D
+    thrust: Indices1D
+    landing: Indices1D
+    loaded: Indices1D
 
 
 class Told(NamedTuple):
     """The fields of ``WholeBodyCommand``."""
 
-    torque: Array
-    acceleration: Array
-    force: Array
-    solved: Flags
-    failures: Indices
+    torque: Array1D
+    acceleration: Array1D
+    force: Array2D
+    solved: Flags0D
+    failures: Indices0D
 
 
 class Kept(NamedTuple):
     """The fields of ``SolverMemory``."""
 
-    torque: Array
-    failed: Indices
-    failures: Indices
+    torque: Array1D
+    failed: Indices0D
+    failures: Indices0D
 
 
 @kernel
-def take_turns(phase: Indices, stance: Flags, turns: Turns) -> None:
+def take_turns(phase: Indices0D, stance: Flags1D, turns: Turns) -> None:
     """Find which gains hold in the ``phase``, of shape (), and whether a point is in stance."""
     loaded = 0
     for i in range(stance.shape[0]):
         if stance[i]:
             loaded = 1
-    now = int(phase[()])
+    now = phase[()]
     turns.stand[0] = loaded if now < Phase.THRUST else 0
     turns.thrust[0] = loaded if now == Phase.THRUST else 0
     turns.landing[0] = loaded if now > Phase.THRUST else 0
@@ -54,7 +61,7 @@ def take_turns(phase: Indices, stance: Flags, turns: Turns) -> None:
 
 @kernel
 def keep_solution(
-    loaded: Indices, code: Indices, command: Told, memory: Kept, unsolved: Indices
+    loaded: Indices1D, code: Indices1D, command: Told, memory: Kept, unsolved: Indices1D
 ) -> None:
     """Remember a solution, or without a point in stance make everything zero.
 

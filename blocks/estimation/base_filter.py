@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array1D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Vector3,
+    Vector4,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     StandingPoints,
@@ -34,38 +41,38 @@ class Sample(NamedTuple):
     ``gyro``, ``force`` and ``joint_rates`` are what the filter uses, ``force`` without its bias.
     """
 
-    angular_velocity: Array
-    specific_force: Array
-    joint_velocity: Array
-    gyro: Array
-    force: Array
-    joint_rates: Array
+    angular_velocity: Vector3
+    specific_force: Vector3
+    joint_velocity: Array1D
+    gyro: Vector3
+    force: Vector3
+    joint_rates: Array1D
 
 
 class Filter(NamedTuple):
     """The fields of ``BaseEstimate``."""
 
-    position: Array
-    orientation: Array
-    velocity: Array
-    angular_velocity: Array
-    gyro_bias: Array
-    accelerometer_bias: Array
-    mean_rate: Array
-    mean_joint_rate: Array
-    ballistic_velocity: Array
-    flight_ticks: Counts
-    started: Flags
+    position: Vector3
+    orientation: Vector4
+    velocity: Vector3
+    angular_velocity: Vector3
+    gyro_bias: Vector3
+    accelerometer_bias: Vector3
+    mean_rate: Vector3
+    mean_joint_rate: Array1D
+    ballistic_velocity: Vector3
+    flight_ticks: Indices0D
+    started: Flags0D
 
 
 class Learning(NamedTuple):
     """The fields of ``BiasSamples``."""
 
-    samples: Counts
-    filled: Counts
-    held: Counts
-    filling_sum: Array
-    held_sum: Array
+    samples: Indices0D
+    filled: Indices0D
+    held: Indices0D
+    filling_sum: Vector3
+    held_sum: Vector3
 
 
 class Legs(NamedTuple):
@@ -81,10 +88,10 @@ class Legs(NamedTuple):
 class Settings(NamedTuple):
     """Parameters that may change during a run, each (1,)."""
 
-    velocity_gain: Array
-    position_gain: Array
-    tilt_gain: Array
-    still_rate: Array
+    velocity_gain: Array1D
+    position_gain: Array1D
+    tilt_gain: Array1D
+    still_rate: Array1D
 
 
 class Fixed(NamedTuple):
@@ -101,20 +108,20 @@ class Fixed(NamedTuple):
 class Scratch(NamedTuple):
     """Memory of a tick: the angular velocity of the tick before, and vectors."""
 
-    last_rate: Array
-    error: Array
-    spare: Array
-    middle: Array
-    acceleration: Array
+    last_rate: Vector3
+    error: Vector3
+    spare: Vector3
+    middle: Array1D
+    acceleration: Array1D
 
 
 class Base(NamedTuple):
     """The fields of ``BaseState``."""
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
+    position: Vector3
+    orientation: Vector4
+    linear_velocity: Vector3
+    angular_velocity: Vector3
 
 
 class Estimator(NamedTuple):
@@ -131,14 +138,13 @@ class Estimator(NamedTuple):
 
 
 @kernel
-def limit(values: Array, largest: float, out: Array) -> None:
+def limit(values: Array1D, largest: float, out: Array1D) -> None:
     """Values within plus and minus ``largest``; what is not a number stays so."""
-    for k in range(out.shape[0]):
-        out[k] = max(min(float(values[k]), largest), -largest)
+    out[:] = max(min(values, largest), -largest)
 
 
 @kernel
-def count_standing(active: Flags) -> int:
+def count_standing(active: Flags1D) -> int:
     """The number of points in contact."""
     standing = 0
     for point in range(active.shape[0]):
@@ -235,9 +241,9 @@ def place_points(estimator: Estimator) -> None:
 
 
 @kernel
-def is_unaccelerated(force: Array) -> bool:
+def is_unaccelerated(force: Array1D) -> bool:
     """Whether the accelerometer reads about 1 g, so that it shows the vertical."""
-    x, y, z = float(force[0]), float(force[1]), float(force[2])
+    x, y, z = force[0], force[1], force[2]
     return abs(math.sqrt(x * x + y * y + z * z) - GRAVITY) <= 0.1 * GRAVITY
 
 
@@ -250,7 +256,7 @@ def forget_samples(learning: Learning) -> None:
 
 
 @kernel
-def learn_bias(learning: Learning, block: int, bias: Array, prior: float) -> None:
+def learn_bias(learning: Learning, block: int, bias: Vector3, prior: float) -> None:
     """Count a sample that has been added to ``filling_sum``, and update the bias (3,).
 
     A full block of samples counts only once the block after it is full too, so that samples
@@ -266,7 +272,7 @@ def learn_bias(learning: Learning, block: int, bias: Array, prior: float) -> Non
         samples = min(int(learning.samples[()]) + filled, 1000)
         learning.samples[()] = samples
         for i in range(3):
-            excess = float(learning.held_sum[i]) - filled * float(bias[i])
+            excess = float(learning.held_sum[i]) - filled * bias[i]
             bias[i] += excess / (samples + prior)
     for axis in range(3):
         learning.held_sum[axis] = learning.filling_sum[axis]

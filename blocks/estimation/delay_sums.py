@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array0D, Array1D, Array2D, Indices0D
 from ...mathematics.kernel import kernel
 
 LAGS = 12
@@ -19,15 +19,15 @@ BETWEEN = 25
 class Memory(NamedTuple):
     """The fields of ``DelayMemory``."""
 
-    command: Array
-    torque: Array
-    changes: Array
-    square: Array
-    product: Array
-    energy: Array
-    ticks: Indices
-    delay: Array
-    matched: Array
+    command: Array1D
+    torque: Array1D
+    changes: Array2D
+    square: Array2D
+    product: Array1D
+    energy: Array0D
+    ticks: Indices0D
+    delay: Array0D
+    matched: Array0D
 
 
 @kernel
@@ -37,10 +37,10 @@ def give_delay(
     follows: bool,
     memory: Memory,
     tolerated: float,
-    measured: Array,
+    measured: Array0D,
     known: NDArray[np.bool_],
-    delay: Array,
-    ahead: Array,
+    delay: Array0D,
+    ahead: Array0D,
 ) -> None:
     """Write the fields of ``DelayEstimate``: what was measured, whether it counts, the delay, and how
     much of it is more than ``tolerated`` [s]."""
@@ -48,13 +48,13 @@ def give_delay(
     measured[()] = max(found, 0.0)
     known[()] = found >= 0.0
     delay[()] = max(found - usual, 0.0) if found >= 0.0 and follows else told
-    ahead[()] = max(float(delay[()]) - tolerated, 0.0)
+    ahead[()] = max(delay[()] - tolerated, 0.0)
 
 
 @kernel
 def follow_delay(
-    command: Array,
-    torque: Array,
+    command: Array1D,
+    torque: Array1D,
     least: int,
     last: int,
     least_match: float,
@@ -77,7 +77,7 @@ def follow_delay(
     for joint in range(command.shape[0]):
         for lag in range(LAGS - 1, 0, -1):
             changes[lag, joint] = changes[lag - 1, joint]
-        changes[0, joint] = float(command[joint]) - float(memory.command[joint])
+        changes[0, joint] = command[joint] - float(memory.command[joint])
         memory.command[joint] = command[joint]
         memory.torque[joint] = torque[joint]
     memory.ticks[()] = ticks + 1
@@ -86,18 +86,18 @@ def follow_delay(
 
 
 @kernel
-def add_changes(torque: Array, memory: Memory) -> None:
+def add_changes(torque: Array1D, memory: Memory) -> None:
     """Add the products of this tick's changes to the sums."""
     joints, changes = torque.shape[0], memory.changes
     energy = 0.0
     for joint in range(joints):
-        change = float(torque[joint]) - float(memory.torque[joint])
+        change = torque[joint] - float(memory.torque[joint])
         energy += change * change
     memory.energy[()] = float(memory.energy[()]) + energy
     for i in range(LAGS):
         total = 0.0
         for joint in range(joints):
-            change = float(torque[joint]) - float(memory.torque[joint])
+            change = torque[joint] - float(memory.torque[joint])
             total += float(changes[i, joint]) * change
         memory.product[i] = float(memory.product[i]) + total
         for j in range(LAGS):

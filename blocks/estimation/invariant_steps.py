@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices1D,
+    Matrix3,
+    Vector3,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.extended_pose import retract
 from ...mathematics.inertial_filter import misalignment, propagate, turn, upright
@@ -44,10 +51,10 @@ _OPENING = 1.0
 
 @kernel
 def take_samples(
-    gyro: Array,
-    force: Array,
-    position: Array,
-    foot: Indices,
+    gyro: Vector3,
+    force: Vector3,
+    position: Array1D,
+    foot: Indices1D,
     estimate: Estimate,
     tuning: Tuning,
     samples: Samples,
@@ -59,8 +66,8 @@ def take_samples(
     ``foot`` (N,) is the foot of every contact point.
     """
     for k in range(3):
-        samples.rate[k] = min(max(float(gyro[k]), -_FASTEST_TURN), _FASTEST_TURN)
-        samples.force[k] = min(max(float(force[k]), -_STRONGEST_FORCE), _STRONGEST_FORCE)
+        samples.rate[k] = min(max(gyro[k], -_FASTEST_TURN), _FASTEST_TURN)
+        samples.force[k] = min(max(force[k], -_STRONGEST_FORCE), _STRONGEST_FORCE)
     find_sample_noise(estimate, tuning, samples, health)
     for k in range(3):
         work.last_rate[k] = estimate.angular_velocity[k]
@@ -76,7 +83,7 @@ def take_samples(
         upright(samples.force, estimate.orientation)
     for joint in range(position.shape[0]):
         samples.used[joint] = estimate.encoder_offset[joint]
-        samples.angles[joint] = float(position[joint]) - float(samples.used[joint])
+        samples.angles[joint] = position[joint] - float(samples.used[joint])
 
 
 @kernel
@@ -100,7 +107,7 @@ def find_sample_noise(estimate: Estimate, tuning: Tuning, samples: Samples, heal
 
 @kernel
 def predict(
-    foot: Indices, estimate: Estimate, tuning: Tuning, samples: Samples, work: Work
+    foot: Indices1D, estimate: Estimate, tuning: Tuning, samples: Samples, work: Work
 ) -> None:
     """Propagate the state and the covariance over the period before this tick."""
     covariance, vectors, period = estimate.covariance, work.middle_vectors, tuning.period
@@ -133,7 +140,7 @@ def predict(
 
 @kernel
 def use_contacts(
-    active: Flags,
+    active: Flags1D,
     estimate: Estimate,
     tuning: Tuning,
     samples: Samples,
@@ -319,7 +326,7 @@ def correct_heights(
 
 
 @kernel
-def weigh_residual(noise: Array, estimate: Estimate, work: Work) -> float:
+def weigh_residual(noise: Array2D, estimate: Estimate, work: Work) -> float:
     """The squared Mahalanobis distance of the residual."""
     return weigh(
         estimate.covariance, work.sensitivity, noise, work.residual, work.seen, work.inverse,
@@ -328,7 +335,7 @@ def weigh_residual(noise: Array, estimate: Estimate, work: Work) -> float:
 
 
 @kernel
-def correct_estimate(noise: Array, estimate: Estimate, work: Work) -> None:
+def correct_estimate(noise: Matrix3, estimate: Estimate, work: Work) -> None:
     """Correct the estimate and its covariance by the residual that has just been weighed."""
     correction, joints = work.correction, estimate.encoder_offset.shape[0]
     correct(

@@ -5,7 +5,21 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Array3D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Indices2D,
+    Matrix3,
+    Rows3,
+    Vector3,
+    Vector4,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
@@ -29,28 +43,28 @@ _SQUAT = int(Phase.SQUAT)
 class Measured(NamedTuple):
     """The fields of ``DynamicsTerms``, ``JointState`` and ``PhaseState`` that the equations take."""
 
-    phase: Indices
-    stance: Flags
-    velocity: Array
-    torque: Array
-    mass_matrix: Array
-    nonlinear: Array
-    jacobian: Array
-    base_rotation: Array
-    com: Array
-    foot_position: Array
+    phase: Indices0D
+    stance: Flags1D
+    velocity: Array1D
+    torque: Array1D
+    mass_matrix: Array2D
+    nonlinear: Array1D
+    jacobian: Array3D
+    base_rotation: Matrix3
+    com: Vector3
+    foot_position: Rows3
 
 
 class Memory(NamedTuple):
     """The fields of ``MassMemory``."""
 
-    velocity: Array
-    torque: Array
-    unknowns: Array
-    covariance: Array
-    published: Array
-    ticks: Indices
-    over: Flags
+    velocity: Array1D
+    torque: Array1D
+    unknowns: Array1D
+    covariance: Array2D
+    published: Vector4
+    ticks: Indices0D
+    over: Flags0D
 
 
 class Model(NamedTuple):
@@ -59,10 +73,10 @@ class Model(NamedTuple):
 
     mass: float
     torso: float
-    friction: Array
-    damping: Array
-    foot_of_point: Indices
-    chains: Indices
+    friction: Array1D
+    damping: Array1D
+    foot_of_point: Indices1D
+    chains: Indices2D
 
 
 class Settings(NamedTuple):
@@ -83,7 +97,7 @@ class Settings(NamedTuple):
     friction_speed: float
     friction_left: float
     gate: float
-    noise: Array
+    noise: Array1D
     rotation_noise: float
 
 
@@ -92,21 +106,26 @@ class Scratch(NamedTuple):
     (6 + n,), ``known``, ``unknown`` and ``joint`` (n,), ``base`` and ``residual`` (6,), ``seen`` (s,)."""
 
     leg: LegScratch
-    map: Array
-    rows: Array
-    acceleration: Array
-    force: Array
-    known: Array
-    unknown: Array
-    joint: Array
-    base: Array
-    residual: Array
-    seen: Array
+    map: Array2D
+    rows: Array2D
+    acceleration: Array1D
+    force: Array1D
+    known: Array1D
+    unknown: Array1D
+    joint: Array1D
+    base: Array1D
+    residual: Array1D
+    seen: Array1D
 
 
 @kernel
 def publish_mass(
-    mass: float, memory: Memory, out: Array, deviation: Array, offset: Array, offset_std: Array
+    mass: float,
+    memory: Memory,
+    out: Array0D,
+    deviation: Array0D,
+    offset: Vector3,
+    offset_std: Vector3,
 ) -> None:
     """Write the estimate's ``mass`` and ``deviation`` () [kg], and the torso's offset (3,) [m]."""
     # Rounding may leave a variance that is all but zero just below it.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array0D, Array1D, Flags0D, Indices0D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import misalignment, right_up, turn, weigh
@@ -42,20 +42,20 @@ class GroundTrust(Signal):
 class Trust(NamedTuple):
     """The fields of ``GroundTrust``."""
 
-    gate: Array
-    flown: Flags
-    facing: Flags
-    heading: Array
-    aligned: Counts
+    gate: Array0D
+    flown: Flags0D
+    facing: Flags0D
+    heading: Array0D
+    aligned: Indices0D
 
 
 class GroundSettings(NamedTuple):
     """Parameters that may change during a run, each (1,)."""
 
-    gate: Array
-    gate_growth: Array
-    support: Array
-    slow_rate: Array
+    gate: Array1D
+    gate_growth: Array1D
+    support: Array1D
+    slow_rate: Array1D
 
 
 @kernel

@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices0D,
+    Vector3,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -83,42 +90,41 @@ class StatePredictor(KernelBlock):
 class Sent(NamedTuple):
     """The last command: its ``acceleration`` (n_velocities,), ``phase`` () and ``stance`` (n_contacts,)."""
 
-    acceleration: Array
-    phase: Indices
-    stance: Flags
+    acceleration: Array1D
+    phase: Indices0D
+    stance: Flags1D
 
 
 class Body(NamedTuple):
     """The fields of ``BaseState``, then those of ``JointState``."""
 
-    position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
-    joint_position: Array
-    joint_velocity: Array
-    torque: Array
+    position: Vector3
+    orientation: Array1D
+    linear_velocity: Vector3
+    angular_velocity: Vector3
+    joint_position: Array1D
+    joint_velocity: Array1D
+    torque: Array1D
 
 
 class Change(NamedTuple):
     """Memory: the base's acceleration in free fall (6,) and the changes of velocities and of places,
     (n_velocities,), vectors (3,) and a quaternion (4,)."""
 
-    fall: Array
-    speed: Array
-    way: Array
-    vector: Array
-    spare: Array
-    turn: Array
+    fall: Array1D
+    speed: Array1D
+    way: Array1D
+    vector: Vector3
+    spare: Vector3
+    turn: Array1D
 
 
 @kernel
-def remember_command(sent: Sent, acceleration: Array, loaded: Flags) -> None:
+def remember_command(sent: Sent, acceleration: Array2D, loaded: Flags1D) -> None:
     """Put the last command before the others."""
     for i in range(loaded.shape[0] - 1, 0, -1):
         loaded[i] = loaded[i - 1]
-        for k in range(acceleration.shape[1]):
-            acceleration[i, k] = acceleration[i - 1, k]
+        acceleration[i, :] = acceleration[i - 1]
     loaded[0] = False
     for point in range(sent.stance.shape[0]):
         loaded[0] = loaded[0] or bool(sent.stance[point])
@@ -145,8 +151,8 @@ def add_commands(
     delay: float,
     ahead: float,
     period: float,
-    acceleration: Array,
-    loaded: Flags,
+    acceleration: Array2D,
+    loaded: Flags1D,
     change: Change,
 ) -> None:
     """The changes of velocities and places within ``ahead`` by the commands that act then.
@@ -166,8 +172,8 @@ def add_commands(
         weight = lasts * (ahead - 0.5 * (begin + end))
         if loaded[i]:
             for k in range(n):
-                change.speed[k] = float(change.speed[k]) + lasts * float(acceleration[i, k])
-                change.way[k] = float(change.way[k]) + weight * float(acceleration[i, k])
+                change.speed[k] = float(change.speed[k]) + lasts * acceleration[i, k]
+                change.way[k] = float(change.way[k]) + weight * acceleration[i, k]
         elif flies:
             for k in range(3):
                 change.speed[k] = float(change.speed[k]) + lasts * float(change.fall[k])
@@ -177,21 +183,21 @@ def add_commands(
 @kernel
 def predict_state(
     sent: Sent,
-    delay: Array,
-    ahead: Array,
+    delay: Array0D,
+    ahead: Array0D,
     period: float,
-    acceleration: Array,
-    loaded: Flags,
+    acceleration: Array2D,
+    loaded: Flags1D,
     measured: Body,
     predicted: Body,
     change: Change,
 ) -> None:
     """One tick of ``StatePredictor``."""
     remember_command(sent, acceleration, loaded)
-    time = float(ahead[()])
+    time = ahead[()]
     flies = int(sent.phase[()]) == _FLIGHT
     free_fall(measured, change)
-    add_commands(flies, float(delay[()]), time, period, acceleration, loaded, change)
+    add_commands(flies, delay[()], time, period, acceleration, loaded, change)
     speed, way, vector, spare, turn = (
         change.speed, change.way, change.vector, change.spare, change.turn,
     )  # fmt: skip

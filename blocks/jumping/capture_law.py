@@ -5,7 +5,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array,
+    Array0D,
+    Array1D,
+    Array2D,
+    Array3D,
+    Flags,
+    Flags1D,
+    Indices,
+    Indices0D,
+    Indices1D,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.capture_step import (
     capture_point,
     choose_foothold,
@@ -31,56 +44,56 @@ _LANDING, _RECOVER = int(Phase.LANDING), int(Phase.RECOVER)
 class PhaseFields(NamedTuple):
     """The fields of ``PhaseState``."""
 
-    phase: Indices
-    time_in_phase: Array
-    time_to_touchdown: Array
-    time_since_touchdown: Array
-    stance: Flags
-    stepping: Flags
-    step_acceleration: Array
+    phase: Indices0D
+    time_in_phase: Array0D
+    time_to_touchdown: Array0D
+    time_since_touchdown: Array0D
+    stance: Flags1D
+    stepping: Flags1D
+    step_acceleration: Rows3
 
 
 class Terms(NamedTuple):
     """The fields of ``DynamicsTerms`` that tell how the robot moves and where its feet are."""
 
-    com: Array
-    com_velocity: Array
-    angular_momentum: Array
-    mass_matrix: Array
-    contact_position: Array
-    contact_velocity: Array
-    foot_position: Array
-    foot_rotation: Array
+    com: Vector3
+    com_velocity: Vector3
+    angular_momentum: Vector3
+    mass_matrix: Array2D
+    contact_position: Rows3
+    contact_velocity: Rows3
+    foot_position: Rows3
+    foot_rotation: Array3D
 
 
 class Memory(NamedTuple):
     """The fields of ``StepMemory``."""
 
-    foot: Indices
-    elapsed: Array
-    taken: Indices
-    outside: Array
-    last: Array
-    ground: Array
-    heading: Array
-    foothold: Array
+    foot: Indices0D
+    elapsed: Array0D
+    taken: Indices0D
+    outside: Array0D
+    last: Array0D
+    ground: Array0D
+    heading: Array0D
+    foothold: Rows3
 
 
 class Settings(NamedTuple):
     """The parameters of ``CaptureStep``: arrays of one element, ``apart`` of two."""
 
-    steps: Indices
-    margin: Array
-    confirmation: Array
-    after: Array
-    turn: Array
-    duration: Array
-    height: Array
-    beyond: Array
-    reach: Array
-    apart: Array
-    settle: Array
-    flat: Array
+    steps: Indices1D
+    margin: Array1D
+    confirmation: Array1D
+    after: Array1D
+    turn: Array1D
+    duration: Array1D
+    height: Array1D
+    beyond: Array1D
+    reach: Array1D
+    apart: Array1D
+    settle: Array1D
+    flat: Array1D
 
 
 class Feet(NamedTuple):
@@ -91,10 +104,10 @@ class Feet(NamedTuple):
     the ``mass`` of the description [kg], and the ``period`` of a tick [s].
     """
 
-    foot_of_point: Indices
-    side: Array
-    apart: Array
-    offset: Array
+    foot_of_point: Indices1D
+    side: Array1D
+    apart: Array1D
+    offset: Rows3
     mass: float
     period: float
 
@@ -103,19 +116,19 @@ class Scratch(NamedTuple):
     """``capture``, ``nearest`` and ``other`` (2,), ``middle`` (3,), ``standing`` (n_contacts,), and ``all``
     (n_feet,), which is true."""
 
-    capture: Array
-    nearest: Array
-    other: Array
-    middle: Array
-    standing: Flags
-    all: Flags
+    capture: Array1D
+    nearest: Array1D
+    other: Array1D
+    middle: Array1D
+    standing: Flags1D
+    all: Flags1D
 
 
 @kernel
 def take_steps(
     before: PhaseFields,
-    time: Array,
-    lift_off_time: Array,
+    time: Array0D,
+    lift_off_time: Array0D,
     terms: Terms,
     settings: Settings,
     feet: Feet,
@@ -135,7 +148,7 @@ def take_steps(
         for k in range(3):
             out.step_acceleration[i, k] = 0.0
     lands = phase in (_LANDING, _RECOVER)
-    goes_on = float(lift_off_time[()]) > float(time[()])
+    goes_on = lift_off_time[()] > time[()]
     if not lands or goes_on or feet.side.shape[0] < 2:
         memory.foot[()] = 0
         memory.taken[()] = 0

@@ -8,7 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Indices2D,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -168,33 +177,33 @@ class JumpPhase(KernelBlock):
 class Planned(NamedTuple):
     """The fields of ``JumpReference`` that the phases follow."""
 
-    time: Array
-    phase: Indices
-    lift_off_time: Array
-    touchdown_time: Array
-    com: Array
-    com_velocity: Array
-    contact: Flags
+    time: Array0D
+    phase: Indices0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    com: Vector3
+    com_velocity: Vector3
+    contact: Flags1D
 
 
 class Present(NamedTuple):
     """The fields of ``DynamicsTerms`` that tell the time to touchdown, and the points."""
 
-    com: Array
-    com_velocity: Array
-    contact_position: Array
+    com: Vector3
+    com_velocity: Vector3
+    contact_position: Rows3
 
 
 class Memory(NamedTuple):
     """The fields of ``PhaseMemory``."""
 
-    phase: Indices
-    began: Array
-    touchdown: Array
-    lift_off_time: Array
-    touchdown_time: Array
-    unloaded: Array
-    stance: Flags
+    phase: Indices0D
+    began: Array0D
+    touchdown: Array0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    unloaded: Array1D
+    stance: Flags1D
 
 
 class Table(NamedTuple):
@@ -204,21 +213,21 @@ class Table(NamedTuple):
     may be above the lowest [m].
     """
 
-    transitions: Indices
-    limits: Array
-    stance_limits: Array
-    times: Array
-    holds: Flags
+    transitions: Indices2D
+    limits: Array1D
+    stance_limits: Array1D
+    times: Array1D
+    holds: Flags1D
 
 
 @kernel
 def follow_phases(
     period: float,
     planned: Planned,
-    active: Flags,
-    ahead: Array,
+    active: Flags1D,
+    ahead: Array0D,
     present: Present,
-    foot_of_point: Indices,
+    foot_of_point: Indices1D,
     table: Table,
     memory: Memory,
     out: PhaseFields,
@@ -245,7 +254,7 @@ def follow_phases(
     times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
     if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
         shortest = min(shortest, float(times[IN_PHASE]))
-    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, float(ahead[()])
+    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, ahead[()]
     find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
     phase = next_phase(table.transitions, before, table.holds)
     if phase != before:

@@ -8,7 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import (
+    Array1D,
+    Array2D,
+    Array3D,
+    Indices1D,
+    Matrix3,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import (
@@ -92,18 +100,18 @@ class PredictionGains(Parameters):
 class Terms(NamedTuple):
     """The fields of ``DynamicsTerms`` that the landing law takes."""
 
-    velocity: Array
-    mass_matrix: Array
-    contact_position: Array
-    contact_jacobian: Array
-    com: Array
-    com_velocity: Array
-    linear_momentum: Array
-    angular_momentum: Array
-    centroidal_matrix: Array
-    base_position: Array
-    base_rotation: Array
-    foot_position: Array
+    velocity: Array1D
+    mass_matrix: Array2D
+    contact_position: Rows3
+    contact_jacobian: Array3D
+    com: Vector3
+    com_velocity: Vector3
+    linear_momentum: Vector3
+    angular_momentum: Vector3
+    centroidal_matrix: Array2D
+    base_position: Vector3
+    base_rotation: Matrix3
+    foot_position: Rows3
 
 
 class Soles(NamedTuple):
@@ -111,9 +119,9 @@ class Soles(NamedTuple):
     side (1, -1 or 0), (n_contacts,) both, and its place from the sole's, (n_contacts, 3) [m]."""
 
     mass: float
-    foot_of_point: Indices
-    side: Array
-    offset: Array
+    foot_of_point: Indices1D
+    side: Array1D
+    offset: Rows3
 
 
 class Gains(NamedTuple):
@@ -132,16 +140,16 @@ class Gains(NamedTuple):
     """
 
     cost: LandingCost
-    per_linear: Array
-    per_angular: Array
-    clearance: Array
-    lowest: Array
-    highest: Array
-    early: Array
-    stroke: Array
-    damping: Array
-    place_gain: Array
-    place_range: Array
+    per_linear: Array1D
+    per_angular: Array1D
+    clearance: Array1D
+    lowest: Array1D
+    highest: Array1D
+    early: Array1D
+    stroke: Array1D
+    damping: Array1D
+    place_gain: Array1D
+    place_range: Array1D
 
 
 class PredictionScratch(NamedTuple):
@@ -149,14 +157,14 @@ class PredictionScratch(NamedTuple):
     ``tilt`` (2,), ``turn`` (2, 4), ``matrix`` (4, 4)."""
 
     flight: FlightMap
-    way: Array
-    heading: Array
-    vector: Array
-    quaternion: Array
-    turned: Array
-    tilt: Array
-    turn: Array
-    matrix: Array
+    way: Array1D
+    heading: Matrix3
+    vector: Vector3
+    quaternion: Array1D
+    turned: Array1D
+    tilt: Array1D
+    turn: Array2D
+    matrix: Array2D
 
 
 class Prediction(NamedTuple):
@@ -215,17 +223,17 @@ def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) ->
 @kernel
 def choose_shift_of_feet(
     terms: Terms,
-    foot_yaw: Array,
-    planned: Array,
-    orientation: Array,
-    linear: Array,
-    angular: Array,
-    miss: Array,
+    foot_yaw: Array1D,
+    planned: Array2D,
+    orientation: Array1D,
+    linear: Array1D,
+    angular: Array1D,
+    miss: Array1D,
     left: float,
     duration: float,
     speed: float,
     prediction: Prediction,
-    shift: Array,
+    shift: Array1D,
 ) -> None:
     """Choose the ``shift`` (4,) [m] of all feet: ahead, to the left, apart, upwards.
 
@@ -256,24 +264,24 @@ def choose_shift_of_feet(
     )  # fmt: skip
     cost.bounds[0] = max(float(gains.lowest[0]), -float(gains.early[0]) * duration * speed)
     cost.bounds[1] = max(float(gains.highest[0]) - speed * speed * float(gains.stroke[0]), 0.0)
-    ahead = float(gains.per_linear[0]) * float(linear[0])
-    cost.goal[0] = ahead + float(gains.per_angular[0]) * float(angular[1])
-    aside = float(gains.per_linear[1]) * float(linear[1])
-    cost.goal[1] = aside - float(gains.per_angular[1]) * float(angular[0])
-    cost.goal[2] = float(gains.clearance[0]) * abs(float(linear[1]))
+    ahead = float(gains.per_linear[0]) * linear[0]
+    cost.goal[0] = ahead + float(gains.per_angular[0]) * angular[1]
+    aside = float(gains.per_linear[1]) * linear[1]
+    cost.goal[1] = aside - float(gains.per_angular[1]) * angular[0]
+    cost.goal[2] = float(gains.clearance[0]) * abs(linear[1])
     pull_to_place(cost.goal, miss, float(gains.place_gain[0]), float(gains.place_range[0]))
     choose_shift(scratch.tilt, scratch.turn, cost, scratch.matrix, shift)
 
 
 @kernel
 def find_ways(
-    terms: Terms, foot_yaw: Array, planned: Array, soles: Soles, scratch: PredictionScratch
+    terms: Terms, foot_yaw: Array1D, planned: Rows3, soles: Soles, scratch: PredictionScratch
 ) -> None:
     """How far every contact point is from its planned place, with flat soles."""
     for point in range(soles.foot_of_point.shape[0]):
         foot = int(soles.foot_of_point[point])
-        heading_matrix(float(foot_yaw[foot]), scratch.heading)
+        heading_matrix(foot_yaw[foot], scratch.heading)
         multiply_vector(scratch.heading, soles.offset[point], scratch.vector)
         for k in range(3):
-            place = float(scratch.vector[k]) + float(planned[foot, k]) + float(terms.com[k])
+            place = float(scratch.vector[k]) + planned[foot, k] + float(terms.com[k])
             scratch.way[3 * point + k] = place - float(terms.contact_position[point, k])

@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Array3D,
+    Flags0D,
+    Indices0D,
+    Matrix3,
+    Rows3,
+    Vector2,
+    Vector3,
+    Vector4,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
@@ -41,55 +53,55 @@ _FLIGHT, _LANDING = int(Phase.FLIGHT), int(Phase.LANDING)
 class Now(NamedTuple):
     """The fields of ``PhaseState`` that the law takes."""
 
-    phase: Indices
-    time_in_phase: Array
-    time_to_touchdown: Array
+    phase: Indices0D
+    time_in_phase: Array0D
+    time_to_touchdown: Array0D
 
 
 class Plan(NamedTuple):
     """The fields of ``JumpReference`` that the law takes."""
 
-    time: Array
-    phase: Indices
-    lift_off_time: Array
-    touchdown_time: Array
-    com: Array
-    com_velocity: Array
-    orientation: Array
-    angular_velocity: Array
-    angular_momentum: Array
-    foot_position: Array
-    foot_velocity: Array
-    foot_yaw: Array
-    toes_first: Flags
+    time: Array0D
+    phase: Indices0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    com: Vector3
+    com_velocity: Vector3
+    orientation: Vector4
+    angular_velocity: Vector3
+    angular_momentum: Vector3
+    foot_position: Rows3
+    foot_velocity: Rows3
+    foot_yaw: Array1D
+    toes_first: Flags0D
 
 
 class Memory(NamedTuple):
     """The fields of ``LandingMemory``."""
 
-    flying: Flags
-    offset: Array
-    goal: Array
-    planned: Array
-    swing: Array
-    linear: Array
-    angular: Array
-    orientation: Array
-    shift: Array
-    started: Flags
-    origin: Array
-    lift_off_time: Array
-    wished: Array
-    due: Array
+    flying: Flags0D
+    offset: Rows3
+    goal: Rows3
+    planned: Rows3
+    swing: Rows3
+    linear: Vector3
+    angular: Vector3
+    orientation: Vector4
+    shift: Vector4
+    started: Flags0D
+    origin: Vector3
+    lift_off_time: Array0D
+    wished: Vector3
+    due: Array0D
 
 
 class Targets(NamedTuple):
     """The fields of ``FootTarget``."""
 
-    position: Array
-    velocity: Array
-    rotation: Array
-    landing: Array
+    position: Array2D
+    velocity: Array2D
+    rotation: Array3D
+    landing: Rows3
 
 
 class Law(NamedTuple):
@@ -103,8 +115,8 @@ class Law(NamedTuple):
     predicts: bool
     deviates: bool
     turned: bool
-    side: Array
-    stance: Array
+    side: Array1D
+    stance: Rows3
     mass: float
     period: float
 
@@ -112,16 +124,16 @@ class Law(NamedTuple):
 class Settings(NamedTuple):
     """Live parameters: arrays of two elements, the alphas of three, from ``w_c`` on of one."""
 
-    w_l: Array
-    w_k: Array
-    p_max: Array
-    alpha: Array
-    toes_alpha: Array
-    w_c: Array
-    reach_share: Array
-    retraction: Array
-    retraction_time: Array
-    lead_time: Array
+    w_l: Vector2
+    w_k: Vector2
+    p_max: Vector2
+    alpha: Vector3
+    toes_alpha: Vector3
+    w_c: Array1D
+    reach_share: Array1D
+    retraction: Array1D
+    retraction_time: Array1D
+    lead_time: Array1D
 
 
 class Scratch(NamedTuple):
@@ -132,20 +144,20 @@ class Scratch(NamedTuple):
     axes; ``speed`` is that of the foot in hand.
     """
 
-    place: Array
-    centre: Array
-    quaternion: Array
-    turn: Array
-    rotation: Array
-    heading: Array
-    linear: Array
-    angular: Array
-    miss: Array
-    vector: Array
-    com_body: Array
-    rate: Array
-    speed: Array
-    spare: Array
+    place: Rows3
+    centre: Rows3
+    quaternion: Vector4
+    turn: Vector4
+    rotation: Matrix3
+    heading: Matrix3
+    linear: Vector3
+    angular: Vector3
+    miss: Vector3
+    vector: Vector3
+    com_body: Vector3
+    rate: Vector3
+    speed: Vector3
+    spare: Vector3
 
 
 @kernel
@@ -326,7 +338,7 @@ def fall_time(speed: float, height: float) -> float:
 
 @kernel
 def choose_place(
-    foot: int, law: Law, settings: Settings, memory: Memory, place: Array, scratch: Scratch
+    foot: int, law: Law, settings: Settings, memory: Memory, place: Array1D, scratch: Scratch
 ) -> None:
     """The landing ``place`` (3,) of a foot from the centre of mass, by the law."""
     planned, side = memory.planned[foot], float(law.side[foot])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array1D
 from ...mathematics.kernel import kernel
 from ..signals import Phase
 
@@ -82,7 +82,7 @@ LEAST_AHEAD = 0.0015
 
 @kernel
 def find_conditions(
-    times: Array, limits: Array, planned: int, another: bool, holds: NDArray[np.bool_]
+    times: Array1D, limits: Array1D, planned: int, another: bool, holds: NDArray[np.bool_]
 ) -> None:
     """Which conditions hold in this tick.
 
@@ -92,12 +92,12 @@ def find_conditions(
         another: whether the plan has a flight after the one that ``times`` is about.
         holds: becomes true for each ``Condition`` that holds.
     """
-    now, in_phase = float(times[NOW]), float(times[IN_PHASE])
-    lift_off, unloaded = float(times[LIFT_OFF]), float(times[UNLOADED])
-    flight = float(times[TOUCHDOWN]) - lift_off
+    now, in_phase = times[NOW], times[IN_PHASE]
+    lift_off, unloaded = times[LIFT_OFF], times[UNLOADED]
+    flight = times[TOUCHDOWN] - lift_off
     due = now >= lift_off
-    waiting = unloaded == 0.0 and now < lift_off + float(limits[LATE_LIFT_OFF])
-    share = float(limits[TOUCHDOWN_SHARE]) * (in_phase + float(times[REMAINING]))
+    waiting = unloaded == 0.0 and now < lift_off + limits[LATE_LIFT_OFF]
+    share = limits[TOUCHDOWN_SHARE] * (in_phase + times[REMAINING])
     # `.value`: before its version 0.68 Numba takes no member of an enumeration as an index.
     holds[Condition.PLAN_SQUATS.value] = planned >= Phase.SQUAT
     holds[Condition.PLAN_THRUSTS.value] = planned >= Phase.THRUST or due
@@ -105,10 +105,10 @@ def find_conditions(
     holds[Condition.LEFT_EARLY.value] = (
         now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
     )
-    ahead = float(times[AHEAD])
-    early = ahead > LEAST_AHEAD and float(times[REMAINING]) < ahead * float(limits[EARLY_LANDING])
+    ahead = times[AHEAD]
+    early = ahead > LEAST_AHEAD and times[REMAINING] < ahead * limits[EARLY_LANDING]
     holds[Condition.TOUCHED_DOWN.value] = (unloaded == 0.0 or early) and in_phase >= share
-    holds[Condition.OVERDUE.value] = in_phase > flight + float(limits[LOST_CONTACT])
+    holds[Condition.OVERDUE.value] = in_phase > flight + limits[LOST_CONTACT]
     holds[Condition.RESTED.value] = not another and in_phase >= limits[LANDING_TIME]
     holds[Condition.THRUSTS_AGAIN.value] = another and planned == Phase.THRUST
     holds[Condition.LOST_CONTACT.value] = unloaded > limits[LOST_CONTACT]

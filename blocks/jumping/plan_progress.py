@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array,
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags0D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -57,18 +65,18 @@ class Motion(NamedTuple):
     ``com`` and ``com_velocity`` (3,) [m, m/s], and ``foot_position`` (n_feet, 3) [m], all in the world.
     """
 
-    com: Array
-    com_velocity: Array
-    foot_position: Array
+    com: Array1D
+    com_velocity: Array1D
+    foot_position: Array2D
 
 
 class Planned(NamedTuple):
     """What else the plan says: its phase, when it lifts off [s], of shape () each, and the
     acceleration of the centre of mass [m/s^2, world], (3,)."""
 
-    phase: Indices
-    lift_off_time: Array
-    com_acceleration: Array
+    phase: Indices0D
+    lift_off_time: Array0D
+    com_acceleration: Array1D
 
 
 class ProgressSettings(NamedTuple):
@@ -85,9 +93,9 @@ class Flight(NamedTuple):
     """What else the plan says of a flight: its phase, when it ends [s], and whether the toes land first,
     of shape () each."""
 
-    phase: Indices
-    touchdown_time: Array
-    toes_first: Flags
+    phase: Indices0D
+    touchdown_time: Array0D
+    toes_first: Flags0D
 
 
 class FallSettings(NamedTuple):
@@ -101,19 +109,19 @@ class FallSettings(NamedTuple):
 class Progress(NamedTuple):
     """The fields of ``PlanProgress``, of shape () each."""
 
-    late: Array
-    before: Array
+    late: Array0D
+    before: Array0D
 
 
 @kernel
 def plan_instant(
-    present: Indices,
+    present: Indices1D,
     base_period: float,
-    late: Array,
-    lead: Array,
-    ahead: Array,
+    late: Array0D,
+    lead: Array0D,
+    ahead: Array0D,
     hold: float,
-    instant: Array,
+    instant: Array1D,
 ) -> None:
     """The instant at which the plan is read.
 
@@ -126,15 +134,15 @@ def plan_instant(
         hold: the seconds over which the feedforward is the mean.
         instant: the time, the lead and the hold [s], (3,).
     """
-    early = min(float(ahead[()]), float(lead[()]))
-    instant[0] = base_period * int(present[0]) - float(late[()]) + early
-    instant[1] = float(lead[()]) - early
+    early = min(ahead[()], lead[()])
+    instant[0] = base_period * present[0] - late[()] + early
+    instant[1] = lead[()] - early
     instant[2] = hold
 
 
 @kernel
 def follow_motion(
-    instant: Array,
+    instant: Array1D,
     measured: Motion,
     reference: Motion,
     planned: Planned,
@@ -146,7 +154,7 @@ def follow_motion(
     Args:
         instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
     """
-    left = float(planned.lift_off_time[()]) - float(instant[0])
+    left = float(planned.lift_off_time[()]) - instant[0]
     if int(planned.phase[()]) != Phase.THRUST or not 0.0 < left <= settings.time:
         progress.before[()] = float(progress.late[()])
         return
@@ -165,7 +173,7 @@ def follow_motion(
 
 @kernel
 def follow_fall(
-    instant: Array,
+    instant: Array1D,
     measured: Motion,
     reference: Motion,
     planned: Flight,
@@ -179,7 +187,7 @@ def follow_fall(
     """
     if int(planned.phase[()]) != Phase.FLIGHT or not planned.toes_first[()]:
         return
-    left = float(planned.touchdown_time[()]) - float(instant[0])
+    left = float(planned.touchdown_time[()]) - instant[0]
     sinking = GRAVITY * left - float(reference.com_velocity[2])
     lowest = float(reference.com[2]) - 0.5 * (sinking - float(reference.com_velocity[2])) * left
     fall = time_to_fall(float(measured.com[2]) - lowest, float(measured.com_velocity[2]))
@@ -196,11 +204,11 @@ def time_to_fall(height: float, speed: float) -> float:
 
 
 @kernel
-def mean_height(position: Array) -> float:
+def mean_height(position: Array2D) -> float:
     """The mean height [m] of positions (n, 3)."""
     total = 0.0
     for i in range(position.shape[0]):
-        total += float(position[i, 2])
+        total += position[i, 2]
     return total / len(position)
 
 

@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Flags0D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Input, Output, State
@@ -46,12 +53,12 @@ class SwitchLimits(NamedTuple):
 class Watched(NamedTuple):
     """What is kept of the switches: see ``SwitchMemory``."""
 
-    started: Flags
-    last: Flags
-    changes: Array
-    closed: Counts
-    opened: Counts
-    fault: Counts
+    started: Flags0D
+    last: Flags1D
+    changes: Array1D
+    closed: Indices1D
+    opened: Indices1D
+    fault: Indices1D
 
 
 class SwitchMonitor(KernelBlock):
@@ -116,13 +123,13 @@ class SwitchMonitor(KernelBlock):
 
 @kernel
 def watch_switches(
-    switches: Flags,
-    phase: Counts,
-    time_to_touchdown: Array,
+    switches: Flags1D,
+    phase: Indices0D,
+    time_to_touchdown: Array0D,
     limits: SwitchLimits,
     watched: Watched,
-    fault: Counts,
-    stop: Flags,
+    fault: Indices1D,
+    stop: Flags0D,
 ) -> None:
     """Update what is kept of all switches in a tick, and write what is wrong to ``fault`` and ``stop``.
 
@@ -131,8 +138,8 @@ def watch_switches(
         phase: see ``Phase``, ().
         time_to_touchdown: in flight [s], ().
     """
-    now = int(phase[()])
-    in_the_air = now == _FLIGHT and float(time_to_touchdown[()]) > limits.approach
+    now = phase[()]
+    in_the_air = now == _FLIGHT and time_to_touchdown[()] > limits.approach
     found = False
     for k in range(switches.shape[0]):
         closed = bool(switches[k])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -31,13 +31,13 @@ class Ball(NamedTuple):
 
     foot: int
     radius: float
-    joints: Counts
-    links: Array
-    tip: Array
-    angles: Array
-    anchors: Array
-    pose: Array
-    axis: Array
+    joints: Indices1D
+    links: Array2D
+    tip: Array1D
+    angles: Array1D
+    anchors: Array2D
+    pose: Array2D
+    axis: Array1D
 
 
 class Footing:
@@ -86,7 +86,7 @@ class Footing:
 
 
 @kernel
-def points_of(foot_of_point: Counts, foot: int) -> int:
+def points_of(foot_of_point: Indices1D, foot: int) -> int:
     """The number of contact points of a foot."""
     count = 0
     for point in range(foot_of_point.shape[0]):
@@ -97,7 +97,11 @@ def points_of(foot_of_point: Counts, foot: int) -> int:
 
 @kernel
 def measure_feet(
-    foot_of_point: Counts, points: Array, orientation: Array, middle: Array, direction: Array
+    foot_of_point: Indices1D,
+    points: Array2D,
+    orientation: Array1D,
+    middle: Array2D,
+    direction: Array2D,
 ) -> None:
     """Measure the horizontal position and direction of every foot.
 
@@ -117,7 +121,7 @@ def measure_feet(
             total, first, last, found = 0.0, 0.0, 0.0, False
             for point in range(points.shape[0]):
                 if foot_of_point[point] == foot:
-                    last = float(points[point, axis])
+                    last = points[point, axis]
                     first = first if found else last
                     total, found = total + last, True
             middle[foot, axis] = total / size
@@ -132,12 +136,12 @@ def measure_feet(
         for axis in range(2):
             total = 0.0
             for other in range(feet):
-                total += float(middle[other, axis])
-            direction[foot, axis] = float(middle[foot, axis]) - total / feet
+                total += middle[other, axis]
+            direction[foot, axis] = middle[foot, axis] - total / feet
 
 
 @kernel
-def unroll(ball: Ball, joints: Array, orientation: Array, middle: Array) -> None:
+def unroll(ball: Ball, joints: Array1D, orientation: Array1D, middle: Array2D) -> None:
     """Subtract from the position of a ball foot how far it has rolled.
 
     A ball that rolls without sliding moves by its radius times the angle by which its foot
@@ -162,7 +166,7 @@ def unroll(ball: Ball, joints: Array, orientation: Array, middle: Array) -> None
 
 
 @kernel
-def points_missing(foot_of_point: Counts, touched: Flags, feet: int) -> int:
+def points_missing(foot_of_point: Indices1D, touched: Flags1D, feet: int) -> int:
     """The number of further points that must carry load for every sole to be flat.
 
     A point or line foot needs all of its points, a foot with more points needs three.
@@ -178,14 +182,14 @@ def points_missing(foot_of_point: Counts, touched: Flags, feet: int) -> int:
 
 
 @kernel
-def least_load(foot_of_point: Counts, force: Array, feet: int, weight: float) -> float:
+def least_load(foot_of_point: Indices1D, force: Array2D, feet: int, weight: float) -> float:
     """The least loaded foot's share of the ``weight`` [N]; ``force`` on each point [N, world]."""
     least = 0.0
     for foot in range(feet):
         load = 0.0
         for point in range(foot_of_point.shape[0]):
             if foot_of_point[point] == foot:
-                load += float(force[point, 2])
+                load += force[point, 2]
         if foot == 0 or load < least:
             least = load
     return least / weight

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import atan2, cos, degrees, pi, radians, sin
 
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array2D
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field
@@ -91,7 +91,7 @@ def feet_turned(record: JumpRecord) -> float:
 
 
 @kernel
-def mean_turn(start: Array, now: Array) -> float:
+def mean_turn(start: Array2D, now: Array2D) -> float:
     """The mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left.
 
     Half a turn is the same to the left and to the right, so all angles count as within half a turn
@@ -99,8 +99,8 @@ def mean_turn(start: Array, now: Array) -> float:
     """
     total, first = 0.0, 0.0
     for foot in range(start.shape[0]):
-        ax, ay = float(start[foot, 0]), float(start[foot, 1])
-        bx, by = float(now[foot, 0]), float(now[foot, 1])
+        ax, ay = start[foot, 0], start[foot, 1]
+        bx, by = now[foot, 0], now[foot, 1]
         angle = atan2(ax * by - ay * bx, ax * bx + ay * by)
         if foot == 0:
             first = angle

@@ -5,7 +5,16 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts
+from ...mathematics.arrays import (
+    Array,
+    Array0D,
+    Array1D,
+    Array2D,
+    Indices0D,
+    Indices1D,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -46,13 +55,13 @@ _FELL, _ALONE, _RESTED = int(Ending.FELL), int(Ending.ALONE), int(Ending.RESTED)
 class Reference(NamedTuple):
     """The fields of ``JumpReference`` that a jump is compared with."""
 
-    time: Array
-    lift_off_time: Array
-    touchdown_time: Array
-    com: Array
-    com_velocity: Array
-    foot_position: Array
-    foot_yaw: Array
+    time: Array0D
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    com: Vector3
+    com_velocity: Vector3
+    foot_position: Rows3
+    foot_yaw: Array1D
 
 
 class Times(NamedTuple):
@@ -70,15 +79,15 @@ class Times(NamedTuple):
 class Verdict(NamedTuple):
     """What a tick asks for, (1,): the ``Ending``, and how long after touchdown that is [s]."""
 
-    ending: Counts
-    landed: Array
+    ending: Indices1D
+    landed: Array1D
 
 
 @kernel
 def follow_reference(
-    tick: Counts,
+    tick: Indices1D,
     base_period: float,
-    ticks: Counts,
+    ticks: Indices0D,
     reference: Reference,
     planned: Planned,
     series: Series,
@@ -89,7 +98,7 @@ def follow_reference(
         tick: the present tick, (1,), each of ``base_period`` [s].
         ticks: of the record so far, without a dimension.
     """
-    now, first = base_period * int(tick[0]), ticks[()] == 0
+    now, first = base_period * tick[0], ticks[()] == 0
     feet, turn = planned.foot.shape[0], 0.0
     for foot in range(feet):
         turn += float(reference.foot_yaw[foot])
@@ -123,12 +132,12 @@ def follow_reference(
 
 @kernel
 def follow_jump(
-    tick: Counts,
+    tick: Indices1D,
     base_period: float,
     truth: Truth,
-    momentum: Array,
+    momentum: Array1D,
     reference: Reference,
-    failures: Counts,
+    failures: Indices0D,
     stand: Stand,
     jump: Jump,
     planned: Planned,
@@ -144,14 +153,14 @@ def follow_jump(
         momentum: the angular momentum about the com [N m s, world], (3,).
         failures: of the solver so far, without a dimension.
     """
-    now = base_period * int(tick[0])
+    now = base_period * tick[0]
     stand.now[()] = now
     if stand.ticks[()] == 0:
         begin(stand, truth)
         begin_jump(jump, planned, stand.foot, float(truth.com[2]))
     stand.ticks[()] = int(stand.ticks[()]) + 1
     note_machine(stand, truth)
-    stand.failures[()] = int(failures[()])
+    stand.failures[()] = failures[()]
     verdict.ending[0] = _FELL if note_fall(stand, truth, limits) else 0
     touched, made = any_touched(truth.contact_touched), int(series.made[()])
     early = float(reference.time[()]) < float(reference.lift_off_time[()]) - EARLY_LIFT_OFF
@@ -169,7 +178,7 @@ def follow_jump(
 
 
 @kernel
-def begin_jump(jump: Jump, planned: Planned, foot: Array, height: float) -> None:
+def begin_jump(jump: Jump, planned: Planned, foot: Array2D, height: float) -> None:
     """Start the record of a jump; ``foot`` (n_feet, 2) is where the feet are, ``height`` the com's."""
     jump.unloaded_time[()] = jump.lift_off_time[()] = jump.touchdown_time[()] = NEVER
     planned.speed_time[()] = NEVER
@@ -186,7 +195,7 @@ def follow_flight(
     touched: bool,
     bounces: bool,
     truth: Truth,
-    momentum: Array,
+    momentum: Vector3,
     stand: Stand,
     jump: Jump,
     planned: Planned,

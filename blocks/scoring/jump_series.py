@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import degrees, pi, sqrt
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts
+from ...mathematics.arrays import Array, Array0D, Array1D, Array2D, Counts, Indices0D
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
 from .jump_criteria import JumpCriteria, mean_turn
@@ -41,56 +41,56 @@ class JumpSeries(Signal):
 class Jump(NamedTuple):
     """The fields of ``JumpRecord`` that are followed in a jump, and where the feet point now."""
 
-    direction: Array
-    unloaded_time: Array
-    unloaded_speed: Array
-    unloaded_momentum: Array
-    lift_off_time: Array
-    lift_off_speed: Array
-    lift_off_momentum: Array
-    touchdown_time: Array
-    touchdown_speed: Array
-    vertical_speed: Array
-    squat_height: Array
-    apex_height: Array
-    start_foot: Array
-    start_direction: Array
-    ground_low: Array
-    ground_high: Array
+    direction: Array2D
+    unloaded_time: Array0D
+    unloaded_speed: Array0D
+    unloaded_momentum: Array1D
+    lift_off_time: Array0D
+    lift_off_speed: Array0D
+    lift_off_momentum: Array1D
+    touchdown_time: Array0D
+    touchdown_speed: Array0D
+    vertical_speed: Array0D
+    squat_height: Array0D
+    apex_height: Array0D
+    start_foot: Array2D
+    start_direction: Array2D
+    ground_low: Array0D
+    ground_high: Array0D
 
 
 class Planned(NamedTuple):
     """The fields of ``JumpRecord`` whose names begin with ``planned_``."""
 
-    flight: Array
-    speed: Array
-    speed_time: Array
-    standing: Array
-    apex: Array
-    start: Array
-    foot: Array
-    yaw_start: Array
-    yaw: Array
+    flight: Array0D
+    speed: Array0D
+    speed_time: Array0D
+    standing: Array0D
+    apex: Array0D
+    start: Array2D
+    foot: Array2D
+    yaw_start: Array0D
+    yaw: Array0D
 
 
 class Series(NamedTuple):
     """The fields of ``JumpSeries``."""
 
-    made: Counts
-    landed_time: Array
-    planned_lift_off: Array
-    flight_share: Array
-    flight_jump: Counts
-    speed_error: Array
-    speed_jump: Counts
-    rise_error: Array
-    rise_jump: Counts
-    place_error: Array
-    place_now: Array
-    place_jump: Counts
-    turn_error: Array
-    turn_now: Array
-    turn_jump: Counts
+    made: Indices0D
+    landed_time: Array0D
+    planned_lift_off: Array0D
+    flight_share: Array0D
+    flight_jump: Indices0D
+    speed_error: Array0D
+    speed_jump: Indices0D
+    rise_error: Array0D
+    rise_jump: Indices0D
+    place_error: Array0D
+    place_now: Array0D
+    place_jump: Indices0D
+    turn_error: Array0D
+    turn_now: Array0D
+    turn_jump: Indices0D
 
 
 @kernel

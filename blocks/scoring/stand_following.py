@@ -5,7 +5,14 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any, NamedTuple, TypeVar
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.capture_step import support_margin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -19,55 +26,55 @@ Fields = TypeVar("Fields", bound=tuple[Any, ...])
 class Truth(NamedTuple):
     """The fields of ``RobotTruth`` that a judge of a robot on its feet reads."""
 
-    base_position: Array
-    base_orientation: Array
-    base_angular_velocity: Array
-    com: Array
-    com_velocity: Array
-    contact_position: Array
-    contact_force: Array
-    contact_touched: Flags
-    ground_height: Array
-    forbidden_contacts: Counts
-    joint_limit_violation: Array
-    motor_overload: Array
-    saturated_share: Array
-    motor_torque: Array
-    motor_speed: Array
+    base_position: Array1D
+    base_orientation: Array1D
+    base_angular_velocity: Array1D
+    com: Array1D
+    com_velocity: Array1D
+    contact_position: Array2D
+    contact_force: Array2D
+    contact_touched: Flags1D
+    ground_height: Array1D
+    forbidden_contacts: Indices0D
+    joint_limit_violation: Array0D
+    motor_overload: Array0D
+    saturated_share: Array0D
+    motor_torque: Array1D
+    motor_speed: Array1D
 
 
 class Stand(NamedTuple):
     """The fields of ``StandRecord`` that are followed here."""
 
-    now: Array
-    ticks: Counts
-    fall_time: Array
-    fall_tilt: Array
-    fall_height: Array
-    standing_height: Array
-    foot: Array
-    landed_foot: Array
-    foot_slip: Array
-    lifted_time: Array
-    steps: Counts
-    step_end: Array
-    longest_lift: Array
-    peak_tilt: Array
-    judged_time: Array
-    tilt: Array
-    com_speed: Array
-    angular_speed: Array
-    margin: Array
-    load_share: Array
-    points_unloaded: Counts
-    forbidden: Counts
-    forbidden_time: Array
-    violation: Array
-    overload: Array
-    peak_torque: Array
-    peak_speed: Array
-    saturated: Array
-    failures: Counts
+    now: Array0D
+    ticks: Indices0D
+    fall_time: Array0D
+    fall_tilt: Array0D
+    fall_height: Array0D
+    standing_height: Array0D
+    foot: Array2D
+    landed_foot: Array2D
+    foot_slip: Array0D
+    lifted_time: Array1D
+    steps: Indices0D
+    step_end: Array1D
+    longest_lift: Array0D
+    peak_tilt: Array0D
+    judged_time: Array0D
+    tilt: Array0D
+    com_speed: Array0D
+    angular_speed: Array0D
+    margin: Array0D
+    load_share: Array0D
+    points_unloaded: Indices0D
+    forbidden: Indices0D
+    forbidden_time: Array0D
+    violation: Array0D
+    overload: Array0D
+    peak_torque: Array0D
+    peak_speed: Array0D
+    saturated: Array0D
+    failures: Indices0D
 
 
 class Limits(NamedTuple):
@@ -83,7 +90,7 @@ class Limits(NamedTuple):
     settling: float
     period: float
     weight: float
-    foot_of_point: Counts
+    foot_of_point: Indices1D
 
 
 def fields_of(kind: type[Fields], signal: Signal) -> Fields:
@@ -104,37 +111,37 @@ def following_limits(
 
 
 @kernel
-def keep_largest(largest: Array, value: float) -> None:
+def keep_largest(largest: Array0D, value: float) -> None:
     """``largest``, without a dimension, becomes ``value`` if that is larger."""
-    largest[()] = max(float(largest[()]), value)
+    largest[()] = max(largest[()], value)
 
 
 @kernel
-def keep_least(least: Array, value: float) -> None:
+def keep_least(least: Array0D, value: float) -> None:
     """``least``, without a dimension, becomes ``value`` if that is smaller."""
-    least[()] = min(float(least[()]), value)
+    least[()] = min(least[()], value)
 
 
 @kernel
-def largest_of(values: Array) -> float:
+def largest_of(values: Array1D) -> float:
     """The largest of at least one value, (n,)."""
-    largest = float(values[0])
+    largest = values[0]
     for k in range(1, values.shape[0]):
-        largest = max(largest, float(values[k]))
+        largest = max(largest, values[k])
     return largest
 
 
 @kernel
-def largest_magnitude(values: Array) -> float:
+def largest_magnitude(values: Array1D) -> float:
     """The largest magnitude of at least one value, (n,)."""
-    largest = abs(float(values[0]))
+    largest = abs(values[0])
     for k in range(1, values.shape[0]):
-        largest = max(largest, abs(float(values[k])))
+        largest = max(largest, abs(values[k]))
     return largest
 
 
 @kernel
-def any_touched(touched: Flags) -> bool:
+def any_touched(touched: Flags1D) -> bool:
     """Whether any contact point carries load."""
     found = False
     for point in range(touched.shape[0]):
@@ -178,7 +185,7 @@ def note_fall(record: Stand, truth: Truth, limits: Limits) -> bool:
 
 
 @kernel
-def note_feet(record: Stand, touched: Flags, limits: Limits, stay: bool) -> None:
+def note_feet(record: Stand, touched: Flags1D, limits: Limits, stay: bool) -> None:
     """How far the feet slide and for how long one is off the ground, once they should ``stay``.
 
     A foot that is off the ground for longer than a step takes has stepped, if it may. Then it may
@@ -193,7 +200,7 @@ def note_feet(record: Stand, touched: Flags, limits: Limits, stay: bool) -> None
 
 
 @kernel
-def note_foot(record: Stand, touched: Flags, limits: Limits, foot: int) -> None:
+def note_foot(record: Stand, touched: Flags1D, limits: Limits, foot: int) -> None:
     """The same of one foot that should stay."""
     now, loaded = float(record.now[()]), False
     for point in range(touched.shape[0]):
@@ -220,9 +227,9 @@ def note_foot(record: Stand, touched: Flags, limits: Limits, foot: int) -> None:
 
 
 @kernel
-def speed_of(velocity: Array) -> float:
+def speed_of(velocity: Array1D) -> float:
     """The magnitude of a vector (3,)."""
-    x, y, z = float(velocity[0]), float(velocity[1]), float(velocity[2])
+    x, y, z = velocity[0], velocity[1], velocity[2]
     return sqrt(x * x + y * y + z * z)
 
 

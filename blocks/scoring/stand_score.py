@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts
+from ...mathematics.arrays import Array0D, Array1D, Indices0D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -61,9 +61,9 @@ class SquatRecord(StandRecord):
 class Squat(NamedTuple):
     """The fields of ``SquatRecord`` beside those of ``StandRecord``."""
 
-    lowest_height: Array
-    planned_standing: Array
-    planned_lowest: Array
+    lowest_height: Array0D
+    planned_standing: Array0D
+    planned_lowest: Array0D
 
 
 class SquatCriteria(StandCriteria):
@@ -180,17 +180,17 @@ class StandScore(KernelBlock):
 
 @kernel
 def follow_stand(
-    tick: Counts,
+    tick: Indices1D,
     base_period: float,
     truth: Truth,
-    planned_com: Array,
-    failures: Counts,
+    planned_com: Array1D,
+    failures: Indices0D,
     stand: Stand,
     squat: Squat,
     limits: Limits,
     settle_time: float,
     judge_time: float,
-    ending: Counts,
+    ending: Indices1D,
 ) -> None:
     """Follow a robot on its feet by one tick, once these have been measured.
 
@@ -201,7 +201,7 @@ def follow_stand(
         settle_time, judge_time: of ``SquatCriteria`` [s].
         ending: becomes why the end of the run is asked for, or zero, (1,).
     """
-    now, height, planned = base_period * int(tick[0]), float(truth.com[2]), float(planned_com[2])
+    now, height, planned = base_period * tick[0], float(truth.com[2]), planned_com[2]
     stand.now[()] = now
     if stand.ticks[()] == 0:
         begin(stand, truth)
@@ -209,7 +209,7 @@ def follow_stand(
         squat.planned_standing[()] = squat.planned_lowest[()] = planned
     stand.ticks[()] = int(stand.ticks[()]) + 1
     note_machine(stand, truth)
-    stand.failures[()] = int(failures[()])
+    stand.failures[()] = failures[()]
     ending[0] = _FELL if note_fall(stand, truth, limits) else 0
     keep_least(squat.lowest_height, height)
     keep_least(squat.planned_lowest, planned)

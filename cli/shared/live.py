@@ -63,14 +63,14 @@ def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import place
-    from ...runtime.transports.keys import secured
+    from ...runtime.transports.registry import transport_type
 
     placed = place(run.graph)
     keys = elsewhere.keys if elsewhere is not None else None
-    if keys is None and any(spec.endpoint.startswith("tls/") for spec in placed.machines):
+    if keys is None and transport_type(placed.machines).needs_keys(placed):
         typer.echo(
-            f"only the part on {run.machine} is shown: the links use TLS, and the other parts need "
-            "--keys FOLDER",
+            f"only the part on {run.machine} is shown: the links are encrypted, and the other parts "
+            "need --keys FOLDER",
             err=True,
         )
         return run
@@ -83,7 +83,7 @@ def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
         return place(run.graph)
 
     observer = elsewhere.observer if elsewhere is not None else "viewer"
-    return SpreadRun(placed, None if keys is None else secured(placed, keys, observer), again, path)
+    return SpreadRun(placed, keys, again, path, observer)
 
 
 def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
@@ -95,7 +95,6 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.loading import load
     from ...runtime.placement.placed import place
-    from ...runtime.transports.keys import secured
     from .running_graphs import settings_of
 
     def settings() -> tuple[str, ...]:
@@ -105,7 +104,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     graph = load(elsewhere.graph, [*known, *elsewhere.overrides])
     if not graph.machines:
         return None
-    placed, keys = place(graph), elsewhere.keys
+    placed = place(graph)
 
     def again() -> PlacedGraph | None:
         nonlocal known
@@ -117,12 +116,7 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
         except AloftError:
             return None
 
-    run = SpreadRun(
-        placed,
-        None if keys is None else secured(placed, keys, elsewhere.observer),
-        again,
-        _control(placed),
-    )
+    run = SpreadRun(placed, elsewhere.keys, again, _control(placed), elsewhere.observer)
     # the parts of a run that is registered here are there, or come as soon as they have started
     if not known and not run.is_heard(PATIENCE):
         run.close()

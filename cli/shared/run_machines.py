@@ -1,6 +1,6 @@
 """Runs the parts of a graph that is spread over machines, for ``aloft run --machine`` and ``--local``.
 
-``--machine NAME`` runs the part of one machine, over Zenoh, together with the others. ``--local`` starts such
+``--machine NAME`` runs the part of one machine together with the others. ``--local`` starts such
 a process for each machine here, with endpoints on the loopback. One table, one exit code and one recording come
 out, as of a run in one process.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -33,8 +32,7 @@ from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.sinks import Sink
 from ...runtime.running.timing import BlockTimes
-from ...runtime.transports.keys import check_endpoints, secured
-from ...runtime.transports.zenoh_transport import ZenohTransport
+from ...runtime.transports.registry import network_transport, transport_type
 from .output import (
     number,
     print_error,
@@ -140,7 +138,7 @@ def _run_processes(
     Raises:
         AloftError: a part has said nothing.
     """
-    endpoints = _free_endpoints(len(files), "tcp" if wishes.keys is None else "tls")
+    endpoints = transport_type(placed.machines).local_endpoints(len(files), wishes.keys)
     settings = [
         f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
     ]
@@ -217,15 +215,6 @@ def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.S
         for number, handler in before.items():
             signal.signal(number, handler)
     return received
-
-
-def _free_endpoints(count: int, protocol: str) -> list[str]:
-    """Endpoints on the loopback that nobody uses at present."""
-    with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for made in sockets:
-            made.bind(("127.0.0.1", 0))
-        return [f"{protocol}/127.0.0.1:{made.getsockname()[1]}" for made in sockets]
 
 
 def _whole_result(
@@ -354,20 +343,7 @@ class Part:
 
     def __init__(self, graph: CheckedGraph, machine: str, keys: Path | None = None) -> None:
         placed = place(graph)
-        if keys is not None:
-            check_endpoints(placed)
-        elif any(spec.endpoint.startswith("tls/") for spec in placed.machines):
-            raise AloftError(
-                "links over TLS need certificates: `aloft keys GRAPH` makes them, and "
-                "--keys FOLDER takes them"
-            )
-        transport = ZenohTransport(
-            graph.name,
-            placed.machines,
-            wait=graph.links.mode == "lockstep",
-            secured=None if keys is None else secured(placed, keys, machine),
-        )
-        self.bound = BoundPart(placed, machine, transport)
+        self.bound = BoundPart(placed, machine, network_transport(placed, machine, keys))
         self._result: RunResult | None = None
 
     @property

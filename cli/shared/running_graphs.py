@@ -198,7 +198,6 @@ def observer_of(
     from ...runtime.links.observer import Observer
     from ...runtime.loading import load
     from ...runtime.placement.placed import place
-    from ...runtime.transports.keys import secured
 
     placed = place(load(graph, [*settings_of(graph, process), *overrides]))
-    return Observer(placed, None if keys is None else secured(placed, keys, name))
+    return Observer(placed, keys, name)

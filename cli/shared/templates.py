@@ -118,7 +118,7 @@ A graph of blocks for [aloft](https://pypi.org/project/aloft).
     aloft graph graph.yaml --web  # the block diagram in the browser
     aloft run graph.yaml          # writes recordings/graph.rrd
     aloft view recordings/graph.rrd
-    pytest                        # the tests
+    pytest                        # the tests; pip install pytest
 
 | file | what it is |
 |---|---|

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...blocks.signals import ContactSwitches
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices0D, Indices1D
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -14,7 +14,7 @@ from .sensor import Sensor
 
 
 @kernel
-def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
+def count_bouncing(step: Indices0D, bounce_end: Indices1D, count: Indices1D) -> None:
     """How many switches chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
     count[0] = 0
     for point in range(bounce_end.shape[0]):
@@ -24,7 +24,12 @@ def count_bouncing(step: Counts, bounce_end: Counts, count: Counts) -> None:
 
 @kernel
 def sample_switches(
-    present: bool, step: Counts, pressed: Flags, bounce_end: Counts, draws: Array, closed: Flags
+    present: bool,
+    step: Indices0D,
+    pressed: Flags1D,
+    bounce_end: Indices1D,
+    draws: Array1D,
+    closed: Flags1D,
 ) -> None:
     """A sample of the switches that the robot may have (``present``).
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from ...blocks.signals import RobotTruth
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Array1D, Vector3
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 class BaseTruth(NamedTuple):
     """The fields of ``RobotTruth`` of the base."""
 
-    base_position: Array
-    base_orientation: Array
-    base_linear_velocity: Array
-    base_angular_velocity: Array
+    base_position: Vector3
+    base_orientation: Array1D
+    base_linear_velocity: Vector3
+    base_angular_velocity: Vector3
 
 
 def _base_truth(truth: RobotTruth) -> BaseTruth:
@@ -51,7 +51,7 @@ def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
 
 
 @kernel
-def report_floating(position: Array, velocity: Array, truth: BaseTruth) -> None:
+def report_floating(position: Array1D, velocity: Array1D, truth: BaseTruth) -> None:
     """The pose and velocity of a base whose coordinates are position and quaternion w, x, y, z."""
     for axis in range(3):
         truth.base_position[axis] = position[axis]

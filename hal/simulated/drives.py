@@ -14,7 +14,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...blocks.signals import CommandMode, JointCommand
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array,
+    Array1D,
+    Array2D,
+    Counts,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
@@ -33,40 +41,40 @@ class Motors(NamedTuple):
     ``motor_torque_limits``.
     """
 
-    joint_to_motor: Array
-    torque_to_motor: Array
-    motor_to_torque: Array
-    peak: Array
-    slope: Array
-    no_load: Array
+    joint_to_motor: Array2D
+    torque_to_motor: Array2D
+    motor_to_torque: Array2D
+    peak: Array1D
+    slope: Array1D
+    no_load: Array1D
 
 
 class MotorRecord(NamedTuple):
     """Sums and extremes of the motors over some physics steps, each (n,): see ``TickRecord``."""
 
-    saturated: Counts
-    torque_high: Array
-    torque_low: Array
-    speed_high: Array
-    speed_low: Array
-    overload: Array
-    joint_torque: Array
+    saturated: Indices1D
+    torque_high: Array1D
+    torque_low: Array1D
+    speed_high: Array1D
+    speed_low: Array1D
+    overload: Array1D
+    joint_torque: Array1D
 
 
 class MotorScratch(NamedTuple):
     """What the motors do in the present physics step, each (n,): their speeds [rad/s], torque limits,
     the torques asked of them and those that they produce [N m]."""
 
-    speed: Array
-    lower: Array
-    upper: Array
-    requested: Array
-    torque: Array
+    speed: Array1D
+    lower: Array1D
+    upper: Array1D
+    requested: Array1D
+    torque: Array1D
 
 
 @kernel
 def motor_torque_limits(
-    speed: Array, peak: Array, slope: Array, no_load: Array, lower: Array, upper: Array
+    speed: Array1D, peak: Array1D, slope: Array1D, no_load: Array1D, lower: Array1D, upper: Array1D
 ) -> None:
     """Write the torque limits [N m] of motors at ``speed`` [rad/s] to ``lower`` and ``upper``.
 
@@ -76,40 +84,40 @@ def motor_torque_limits(
     All arguments have one element a motor.
     """
     for k in range(speed.shape[0]):
-        turning, most = float(speed[k]), float(peak[k])
-        idle, fall = float(no_load[k]), float(slope[k])
+        turning, most = speed[k], peak[k]
+        idle, fall = no_load[k], slope[k]
         upper[k] = max(min(most, (idle - turning) * fall), 0.0)
         lower[k] = min(-min(most, (idle + turning) * fall), 0.0)
 
 
 @kernel
 def joint_feedback_torque(
-    feedforward: Array,
-    stiffness: Array,
-    damping: Array,
-    position_target: Array,
-    velocity_target: Array,
-    position: Array,
-    velocity: Array,
-    out: Array,
+    feedforward: Array1D,
+    stiffness: Array1D,
+    damping: Array1D,
+    position_target: Array1D,
+    velocity_target: Array1D,
+    position: Array1D,
+    velocity: Array1D,
+    out: Array1D,
 ) -> None:
     """Write feedforward plus joint feedback [N m] to ``out`` (paper, V, first equation):
     ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
     for k in range(out.shape[0]):
-        spring = (float(position_target[k]) - float(position[k])) * float(stiffness[k])
-        damper = (float(velocity_target[k]) - float(velocity[k])) * float(damping[k])
-        out[k] = (spring + float(feedforward[k])) + damper
+        spring = (position_target[k] - position[k]) * stiffness[k]
+        damper = (velocity_target[k] - velocity[k]) * damping[k]
+        out[k] = (spring + feedforward[k]) + damper
 
 
 @kernel
 def clip_joint_torque(
-    torque: Array,
-    torque_to_motor: Array,
-    motor_to_torque: Array,
-    lower: Array,
-    upper: Array,
-    motor_requested: Array,
-    motor_torque: Array,
+    torque: Array1D,
+    torque_to_motor: Array2D,
+    motor_to_torque: Array2D,
+    lower: Array1D,
+    upper: Array1D,
+    motor_requested: Array1D,
+    motor_torque: Array1D,
 ) -> None:
     """Limit the joint ``torque`` [N m] to what the motors can produce.
 
@@ -119,18 +127,16 @@ def clip_joint_torque(
     """
     multiply_vector(torque_to_motor, torque, motor_requested)
     for k in range(motor_torque.shape[0]):
-        produced = float(motor_requested[k])
-        if produced < lower[k]:
-            produced = float(lower[k])
-        if produced > upper[k]:
-            produced = float(upper[k])
+        produced = motor_requested[k]
+        produced = max(produced, lower[k])
+        produced = min(produced, upper[k])
         motor_torque[k] = produced
     multiply_vector(motor_to_torque, motor_torque, torque)
 
 
 @kernel
 def drive_motors(
-    velocity: Array, torque: Array, motors: Motors, scratch: MotorScratch, record: MotorRecord
+    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: MotorRecord
 ) -> None:
     """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
     the motors come to their limits. Of what is not a number the record says so too."""
@@ -161,10 +167,10 @@ _ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
 class CommandRing(NamedTuple):
     """A ring of commands, of which one is active and some are on their way: see ``DriveState``."""
 
-    active: Counts
-    pending: Counts
-    due: Counts
-    mode: Counts
+    active: Indices0D
+    pending: Indices0D
+    due: Indices1D
+    mode: Indices1D
     targets: Targets
 
 
@@ -173,15 +179,15 @@ class Joints(NamedTuple):
     dimension, whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
     each (n_joints,)."""
 
-    step: Counts
-    arrived: Flags
-    position: Array
-    velocity: Array
-    torque: Array
+    step: Indices0D
+    arrived: Flags1D
+    position: Array1D
+    velocity: Array1D
+    torque: Array1D
 
 
 @kernel
-def follow_commands(commands: CommandRing, released: Array, joints: Joints) -> None:
+def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) -> None:
     """Let the commands act that are due, and write the joint torques that the active one asks for.
 
     Args:
@@ -206,7 +212,7 @@ def follow_commands(commands: CommandRing, released: Array, joints: Joints) -> N
         )  # fmt: skip
         return
     for k in range(joints.torque.shape[0]):
-        joints.torque[k] = float(joints.velocity[k]) * -float(released[k])
+        joints.torque[k] = float(joints.velocity[k]) * -released[k]
         if mode != _DAMPING:
             joints.torque[k] = 0.0
 
@@ -214,7 +220,7 @@ def follow_commands(commands: CommandRing, released: Array, joints: Joints) -> N
 @kernel
 def drive_joints(
     commands: CommandRing,
-    released: Array,
+    released: Array1D,
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
@@ -228,7 +234,7 @@ def drive_joints(
 @kernel
 def drive_loops(
     commands: CommandRing,
-    released: Array,
+    released: Array1D,
     loops: MotorLoops,
     joints: Joints,
     motors: Motors,
@@ -249,31 +255,31 @@ def drive_loops(
 class CommandFields(NamedTuple):
     """The fields of ``JointCommand``."""
 
-    mode: Counts
-    torque: Array
-    position: Array
-    velocity: Array
-    stiffness: Array
-    damping: Array
+    mode: Indices0D
+    torque: Array1D
+    position: Array1D
+    velocity: Array1D
+    stiffness: Array1D
+    damping: Array1D
 
 
 class CommandLatency(NamedTuple):
     """The latency of a command: ``minimum + draw * jitter`` [s], rounded up to physics steps of
     ``timestep`` [s]. ``minimum`` and ``draw``, a random number from zero to one, are (1,)."""
 
-    minimum: Array
+    minimum: Array1D
     jitter: float
-    draw: Array
+    draw: Array1D
     timestep: float
 
 
 @kernel
 def send_command(
     command: CommandFields,
-    step: Counts,
+    step: Indices0D,
     latency: CommandLatency,
     commands: CommandRing,
-    last_due: Counts,
+    last_due: Indices0D,
 ) -> None:
     """Put a command into the ring, behind those that have not arrived.
 
@@ -282,8 +288,8 @@ def send_command(
     delay = float(latency.minimum[0])
     if latency.jitter != 0.0:
         delay += latency.jitter * float(latency.draw[0])
-    due = int(step[()]) + math.ceil(delay / latency.timestep - 1e-9)
-    due = max(due, int(last_due[()]))
+    due = step[()] + math.ceil(delay / latency.timestep - 1e-9)
+    due = max(due, last_due[()])
     pending = int(commands.pending[()])
     slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
     targets = commands.targets

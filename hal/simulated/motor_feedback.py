@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Flags0D, Indices0D
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.robot_description import RobotDescription
@@ -52,14 +52,14 @@ class MotorLoops(NamedTuple):
 
     gears: Gears
     steps: int
-    following: Flags
-    age: Counts
+    following: Flags0D
+    age: Indices0D
     goals: Goals
     seen: MeasuredMotion
     errors: TrackingErrors
-    angle: Array
-    speed: Array
-    torque: Array
+    angle: Array1D
+    speed: Array1D
+    torque: Array1D
 
 
 class MotorFeedback:
@@ -120,9 +120,9 @@ def close_loops(
     targets: Targets,
     row: int,
     arrived: bool,
-    position: Array,
-    velocity: Array,
-    out: Array,
+    position: Array1D,
+    velocity: Array1D,
+    out: Array1D,
 ) -> bool:
     """As ``MotorFeedback.write``, for the command in a row of ``targets``."""
     gears, seen = loops.gears, loops.seen
@@ -155,19 +155,16 @@ def close_loops(
 
 @kernel
 def motor_feedback(
-    torque: Array,
-    position_goal: Array,
-    velocity_goal: Array,
-    stiffness: Array,
-    damping: Array,
-    position: Array,
-    velocity: Array,
-    out: Array,
+    torque: Array1D,
+    position_goal: Array1D,
+    velocity_goal: Array1D,
+    stiffness: Array1D,
+    damping: Array1D,
+    position: Array1D,
+    velocity: Array1D,
+    out: Array1D,
 ) -> None:
     """Write what drives in direct-force mode ask of their motors to ``out``, each (n_motors,):
     ``torque + P (position_goal - position) + D (velocity_goal - velocity)``. Torques and gains may as
     well be in A, A/rad and A s/rad."""
-    for k in range(out.shape[0]):
-        spring = (float(position_goal[k]) - float(position[k])) * float(stiffness[k])
-        damper = (float(velocity_goal[k]) - float(velocity[k])) * float(damping[k])
-        out[k] = (spring + float(torque[k])) + damper
+    out[:] = (position_goal - position) * stiffness + torque + (velocity_goal - velocity) * damping

@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState
-from ...mathematics.arrays import Array, Flags, Indices
+from ...mathematics.arrays import (
+    Array,
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices,
+    Indices0D,
+    Indices1D,
+)
 from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.library_call import LibraryCall, address_of
@@ -64,16 +72,16 @@ class PushPoints(NamedTuple):
     a point that there is not.
     """
 
-    sites: Indices
-    bodies: Indices
-    places: Array
-    centres: Array
-    wrenches: Array
-    missing: Flags
+    sites: Indices1D
+    bodies: Indices1D
+    places: Array2D
+    centres: Array2D
+    wrenches: Array2D
+    missing: Flags1D
 
 
 @kernel
-def clear_wrenches(wrenches: Array) -> None:
+def clear_wrenches(wrenches: Array2D) -> None:
     """Nothing acts on any body."""
     for body in range(wrenches.shape[0]):
         for axis in range(6):
@@ -81,13 +89,13 @@ def clear_wrenches(wrenches: Array) -> None:
 
 
 @kernel
-def apply_push(force: Array, point: Indices, points: PushPoints) -> None:
+def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
     """Let the ``force`` (3,) [N, world] act at the ``point``, without a dimension, of its body, which
     moves with the body."""
-    fx, fy, fz = float(force[0]), float(force[1]), float(force[2])
+    fx, fy, fz = force[0], force[1], force[2]
     if fx == 0.0 and fy == 0.0 and fz == 0.0:
         return
-    number = int(point[()])
+    number = point[()]
     if number < 0 or number >= points.sites.shape[0]:
         points.missing[0] = True
         return

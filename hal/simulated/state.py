@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Vector3,
+)
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
 
@@ -74,40 +81,42 @@ class StepSensors(NamedTuple):
     contacts, and ``position`` (n_joints,) are the joint angles [rad].
     """
 
-    load: Array
-    accelerometer: Array
-    contacts: Array
-    position: Array
+    load: Array2D
+    accelerometer: Vector3
+    contacts: Array1D
+    position: Array1D
 
 
 class StepRecord(NamedTuple):
     """Where it is noted: see ``TickRecord``."""
 
-    steps: Counts
-    load: Array
-    accelerometer: Array
-    forbidden: Counts
-    violation: Array
-    closed: Flags
-    bounce_end: Counts
+    steps: Indices0D
+    load: Array2D
+    accelerometer: Vector3
+    forbidden: Indices0D
+    violation: Array1D
+    closed: Flags1D
+    bounce_end: Indices1D
 
 
 class RecordTotals(NamedTuple):
     """The sums and extremes of numbers that begin anew with every tick: see ``TickRecord``."""
 
-    load: Array
-    accelerometer: Array
-    joint_torque: Array
-    violation: Array
-    overload: Array
-    torque_high: Array
-    torque_low: Array
-    speed_high: Array
-    speed_low: Array
+    load: Array2D
+    accelerometer: Vector3
+    joint_torque: Array1D
+    violation: Array1D
+    overload: Array1D
+    torque_high: Array1D
+    torque_low: Array1D
+    speed_high: Array1D
+    speed_low: Array1D
 
 
 @kernel
-def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: RecordTotals) -> None:
+def clear(
+    steps: Indices0D, forbidden: Indices0D, saturated: Indices1D, record: RecordTotals
+) -> None:
     """Begin a new record. ``steps`` and ``forbidden`` are without a dimension."""
     steps[()] = forbidden[()] = 0
     for point in range(record.load.shape[0]):
@@ -123,27 +132,25 @@ def clear(steps: Counts, forbidden: Counts, saturated: Counts, record: RecordTot
 
 
 @kernel
-def mean_over_steps(total: Array, steps: Counts, mean: Array) -> None:
+def mean_over_steps(total: Array1D, steps: Indices0D, mean: Array1D) -> None:
     """The ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
-    for k in range(mean.shape[0]):
-        mean[k] = float(total[k]) / int(steps[()])
+    mean[:] = total / steps[()]
 
 
 @kernel
-def read_encoders(position: Array, offset: Array, reading: Array) -> None:
+def read_encoders(position: Array1D, offset: Array1D, reading: Array1D) -> None:
     """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
-    for joint in range(reading.shape[0]):
-        reading[joint] = float(position[joint]) + float(offset[joint])
+    reading[:] = position + offset
 
 
 @kernel
 def watch_switches(
     step: int,
-    load: Array,
-    ground_force: Array,
+    load: Array2D,
+    ground_force: Array1D,
     bounce_steps: int,
-    closed: Flags,
-    bounce_end: Counts,
+    closed: Flags1D,
+    bounce_end: Indices1D,
 ) -> None:
     """Update the switches in one physics step.
 
@@ -155,21 +162,21 @@ def watch_switches(
         closed, bounce_end: as in ``TickRecord``.
     """
     for point in range(closed.shape[0]):
-        now = float(load[point, 3]) <= float(ground_force[point])
+        now = load[point, 3] <= ground_force[point]
         if bounce_steps > 0 and now != closed[point]:
             bounce_end[point] = step + 1 + bounce_steps
         closed[point] = now
 
 
 @kernel
-def update_maximum(highest: Array, k: int, value: float) -> None:
+def update_maximum(highest: Array1D, k: int, value: float) -> None:
     """Element ``k`` becomes ``value`` if that is higher, or not a number."""
     if value > highest[k] or math.isnan(value):
         highest[k] = value
 
 
 @kernel
-def update_minimum(lowest: Array, k: int, value: float) -> None:
+def update_minimum(lowest: Array1D, k: int, value: float) -> None:
     """Element ``k`` becomes ``value`` if that is lower, or not a number."""
     if value < lowest[k] or math.isnan(value):
         lowest[k] = value
@@ -177,11 +184,11 @@ def update_minimum(lowest: Array, k: int, value: float) -> None:
 
 @kernel
 def record_step(
-    step: Counts,
+    step: Indices0D,
     sensors: StepSensors,
-    lower: Array,
-    upper: Array,
-    ground_force: Array,
+    lower: Array1D,
+    upper: Array1D,
+    ground_force: Array1D,
     bounce_steps: int,
     record: StepRecord,
 ) -> None:
@@ -193,9 +200,9 @@ def record_step(
         ground_force, bounce_steps: as for ``watch_switches``.
     """
     watch_switches(
-        int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
+        step[()], sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
-    step[()] = int(step[()]) + 1
+    step[()] = step[()] + 1
     record.steps[()] = int(record.steps[()]) + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
@@ -208,5 +215,5 @@ def record_step(
         record.forbidden[()] = int(record.forbidden[()]) + 1
     for joint in range(lower.shape[0]):
         angle = float(sensors.position[joint])
-        update_maximum(record.violation, joint, float(lower[joint]) - angle)
-        update_maximum(record.violation, joint, angle - float(upper[joint]))
+        update_maximum(record.violation, joint, lower[joint] - angle)
+        update_maximum(record.violation, joint, angle - upper[joint])

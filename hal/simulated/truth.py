@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...blocks.signals import RobotTruth
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import (
+    Array0D,
+    Array1D,
+    Array2D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Rows3,
+    Vector3,
+)
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
@@ -30,70 +39,70 @@ class TrueState(NamedTuple):
     and to in y, top [m].
     """
 
-    joint_position: Array
-    joint_velocity: Array
-    com: Array
-    com_velocity: Array
-    angular_momentum: Array
-    places: Array
-    contacts: Counts
-    below: Array
-    floor: Array
-    boxes: Array
+    joint_position: Array1D
+    joint_velocity: Array1D
+    com: Vector3
+    com_velocity: Vector3
+    angular_momentum: Vector3
+    places: Rows3
+    contacts: Indices1D
+    below: Array1D
+    floor: Array1D
+    boxes: Array2D
 
 
 class TickExtremes(NamedTuple):
     """Sums and extremes over the physics steps of a tick: see ``TickRecord``."""
 
-    steps: Counts
-    load: Array
-    forbidden: Counts
-    violation: Array
-    overload: Array
-    saturated: Counts
-    torque_high: Array
-    torque_low: Array
-    speed_high: Array
-    speed_low: Array
+    steps: Indices0D
+    load: Array2D
+    forbidden: Indices0D
+    violation: Array1D
+    overload: Array1D
+    saturated: Indices1D
+    torque_high: Array1D
+    torque_low: Array1D
+    speed_high: Array1D
+    speed_low: Array1D
 
 
 class TruthFields(NamedTuple):
     """The fields of ``RobotTruth`` but those of the base."""
 
-    joint_position: Array
-    joint_velocity: Array
-    com: Array
-    com_velocity: Array
-    angular_momentum: Array
-    contact_position: Array
-    contact_force: Array
-    contact_touched: Flags
-    ground_height: Array
-    forbidden_contacts: Counts
-    joint_limit_violation: Array
-    motor_overload: Array
-    saturated_share: Array
-    motor_torque: Array
-    motor_speed: Array
+    joint_position: Array1D
+    joint_velocity: Array1D
+    com: Vector3
+    com_velocity: Vector3
+    angular_momentum: Vector3
+    contact_position: Rows3
+    contact_force: Rows3
+    contact_touched: Flags1D
+    ground_height: Array1D
+    forbidden_contacts: Indices0D
+    joint_limit_violation: Array0D
+    motor_overload: Array0D
+    saturated_share: Array0D
+    motor_torque: Array1D
+    motor_speed: Array1D
 
 
 @kernel
-def height_of_ground(floor: Array, boxes: Array, x: float, y: float) -> float:
+def height_of_ground(floor: Array1D, boxes: Array2D, x: float, y: float) -> float:
     """The height [m, world] of the highest surface at a place: as ``Scene.ground_height``."""
-    height = float(floor[0])
+    height = floor[0]
     for box in range(boxes.shape[0]):
         inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
         if boxes[box, 4] > height and inside:
-            height = float(boxes[box, 4])
+            height = boxes[box, 4]
     return height
 
 
 @kernel
-def largest(values: Array) -> float:
+def largest(values: Array1D) -> float:
     """The largest value, and zero of none."""
-    found = float(values[0]) if values.shape[0] > 0 else 0.0
+    found = values[0] if values.shape[0] > 0 else 0.0
     for k in range(1, values.shape[0]):
-        found = max(found, float(values[k]))
+        found = max(found, values[k])
     return found
 
 

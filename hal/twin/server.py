@@ -28,6 +28,7 @@ class PseudoTerminal:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._ours, theirs = os.openpty()
+        os.set_blocking(self._ours, False)
         tty.setraw(self._ours)
         tty.setraw(theirs)
         self.path = os.ttyname(theirs)
@@ -39,11 +40,23 @@ class PseudoTerminal:
         self._thread.start()
 
     def send(self, data: bytes) -> None:
-        """What the device sends without being asked."""
+        """What the device sends without being asked.
+
+        While nobody reads and the terminal's buffer is full, this waits until ``stop`` is called.
+        """
         with self._write_lock:
             while data:
-                written = os.write(self._ours, data)
-                data = data[written:]
+                stopped, _, _ = select.select([self._wake], [self._ours], [])
+                if stopped:
+                    return
+                try:
+                    data = data[os.write(self._ours, data) :]
+                except BlockingIOError:
+                    continue
+
+    def stop(self) -> None:
+        """Serve no more: from now on nothing is received, and what waits to be sent is dropped."""
+        os.write(self._woken, b"x")
 
     def close(self) -> None:
         """Close both sides: from now on reading and writing fail, as with an unplugged cable.
@@ -54,7 +67,7 @@ class PseudoTerminal:
             if self._closed:
                 return
             self._closed = True
-            os.write(self._woken, b"x")
+            self.stop()
             self._thread.join()
             for descriptor in (self._ours, self._theirs, self._wake, self._woken):
                 os.close(descriptor)
@@ -120,6 +133,8 @@ class TwinServer:
     def close(self) -> None:
         """Close both ports."""
         self._stop.set()
+        self._bus.stop()  # the clock may wait for a driver that reads no more
+        self._board.stop()
         if self._clock is not None:
             self._clock.join()
         self._bus.close()

@@ -57,7 +57,7 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
         return RecordKind(annotation.__name__, annotation.kernel_kinds())
     for mark in getattr(annotation, "__metadata__", ()):
         if isinstance(mark, Rank):
-            return ArrayKind((None,) * mark.dimensions, mark.element)
+            return ArrayKind(mark.sizes or (None,) * mark.dimensions, mark.element)
     if (
         isinstance(annotation, type)
         and issubclass(annotation, tuple)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import JumpReference, Phase
-from ...mathematics.arrays import Array, Flags
+from ...mathematics.arrays import Array, Array0D, Array1D, Array2D, Flags0D, Flags1D, Flags2D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
@@ -86,46 +86,46 @@ class Rows(NamedTuple):
     ``contact`` (n, n_contacts), or no row where all points carry load but in flight.
     """
 
-    time: Array
-    rows: Array
-    sums: Array
-    fed: Flags
-    marks: Array
-    jumps: Array
-    touchdowns: Array
-    toes_first: Flags
-    contact: Flags
+    time: Array1D
+    rows: Array2D
+    sums: Array2D
+    fed: Flags1D
+    marks: Array1D
+    jumps: Array2D
+    touchdowns: Array1D
+    toes_first: Flags1D
+    contact: Flags2D
 
 
 class Fields(NamedTuple):
     """The fields of ``JumpReference`` that are columns of a table, each flat."""
 
-    com: Array
-    com_velocity: Array
-    com_acceleration: Array
-    orientation: Array
-    angular_velocity: Array
-    angular_momentum: Array
-    angular_momentum_rate: Array
-    foot_position: Array
-    foot_velocity: Array
-    foot_yaw: Array
-    foot_pitch: Array
-    joint_position: Array
-    joint_velocity: Array
-    joint_acceleration: Array
-    joint_torque: Array
+    com: Array1D
+    com_velocity: Array1D
+    com_acceleration: Array1D
+    orientation: Array1D
+    angular_velocity: Array1D
+    angular_momentum: Array1D
+    angular_momentum_rate: Array1D
+    foot_position: Array1D
+    foot_velocity: Array1D
+    foot_yaw: Array1D
+    foot_pitch: Array1D
+    joint_position: Array1D
+    joint_velocity: Array1D
+    joint_acceleration: Array1D
+    joint_torque: Array1D
 
 
 class Marks(NamedTuple):
     """The other fields of ``JumpReference``."""
 
-    time: Array
+    time: Array0D
     phase: NDArray[np.int64]
-    lift_off_time: Array
-    touchdown_time: Array
-    contact: Flags
-    toes_first: Flags
+    lift_off_time: Array0D
+    touchdown_time: Array0D
+    contact: Flags1D
+    toes_first: Flags0D
 
 
 class JumpTableReader:
@@ -177,7 +177,7 @@ class JumpTableReader:
 
 
 @kernel
-def sum_to(table: Rows, time: float, sign: float, out: Array) -> None:
+def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
     """Add ``sign`` times the integral of what is fed forward, from the first row to ``time``.
 
     Between its rows a column is linear.
@@ -199,7 +199,7 @@ def sum_to(table: Rows, time: float, sign: float, out: Array) -> None:
 
 
 @kernel
-def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Array) -> None:
+def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Array1D) -> None:
     """All columns at ``time``, and what is fed forward as ``JumpTableReader.read`` says."""
     rows = table.rows
     here, part = locate(table.time, time)
@@ -219,7 +219,7 @@ def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Ar
 
 
 @kernel
-def take(values: Array, first: int, out: Array) -> int:
+def take(values: Array1D, first: int, out: Array1D) -> int:
     """Fill ``out`` with the values from ``first`` on; returns where the next ones begin."""
     for k in range(out.shape[0]):
         out[k] = values[first + k]
@@ -227,7 +227,7 @@ def take(values: Array, first: int, out: Array) -> int:
 
 
 @kernel
-def write_fields(values: Array, fields: Fields) -> None:
+def write_fields(values: Array1D, fields: Fields) -> None:
     """Write the columns to the fields of the reference."""
     first = take(values, 0, fields.com)
     first = take(values, first, fields.com_velocity)
@@ -271,15 +271,17 @@ def write_marks(table: Rows, time: float, marks: Marks) -> None:
 
 
 @kernel
-def read_table(table: Rows, instant: Array, values: Array, fields: Fields, marks: Marks) -> None:
+def read_table(
+    table: Rows, instant: Array1D, values: Array1D, fields: Fields, marks: Marks
+) -> None:
     """The reference at an instant.
 
     Args:
         instant: the time, the lead and the hold of ``JumpTableReader.read`` [s], (3,).
         values: scratch, (width,).
     """
-    time = float(instant[0])
-    interpolate_rows(table, time, float(instant[1]), float(instant[2]), values)
+    time = instant[0]
+    interpolate_rows(table, time, instant[1], instant[2], values)
     write_fields(values, fields)
     write_marks(table, time, marks)
 
@@ -302,7 +304,7 @@ def integral(times: Array, rows: Array) -> Array:
 
 
 @kernel
-def locate(times: Array, time: float) -> tuple[int, float]:
+def locate(times: Array1D, time: float) -> tuple[int, float]:
     """The row before ``time`` and the share of the way from it to the next, from 0 to 1."""
     low, high = 0, times.shape[0] - 1
     if time <= times[0]:
@@ -319,10 +321,10 @@ def locate(times: Array, time: float) -> tuple[int, float]:
 
 
 @kernel
-def present_jump(time: float, touchdowns: Array) -> int:
+def present_jump(time: float, touchdowns: Array1D) -> int:
     """The jump that is under way or comes next, by when the jumps end; behind the last one that."""
     number = 0
-    while number + 1 < touchdowns.shape[0] and time >= float(touchdowns[number]):
+    while number + 1 < touchdowns.shape[0] and time >= touchdowns[number]:
         number += 1
     return number
 

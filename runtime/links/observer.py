@@ -11,18 +11,18 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from struct import Struct
 from typing import Any, Self
 from zlib import crc32
 
-from ..language.errors import AloftError
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
 from ..running.sinks import Note
+from ..transports.registry import network_transport
 from ..transports.transport import MessageCallback, Transport, rows_key, status_key, window_key
-from ..transports.zenoh_transport import as_chunk, prefix_of, session_config
 from .free_link import LatestReceiver
 from .identity import Identity
 from .lockstep_link import LockstepReceiver
@@ -169,45 +169,36 @@ class Observer:
 
     Args:
         placed: the graph.
-        secured: TLS and access control, as ``key_folder.secured`` gives them.
+        keys: the folder of ``aloft keys``, or the observer's own, where links are encrypted.
+        name: the observer's, by which its keys are known.
+
+    Raises:
+        AloftError: the endpoints and the keys do not fit together.
 
     Attributes:
         statuses: the latest status of each machine that was heard.
     """
 
-    def __init__(self, placed: PlacedGraph, secured: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, placed: PlacedGraph, keys: Path | None = None, name: str = "viewer") -> None:
         self.placed = placed
         self.statuses: dict[str, dict[str, Any]] = {}
         self._received_at: dict[str, float] = {}
         self._hash = Identity.of(placed).graph_hash
-        self._secured = secured
-        self._prefix = prefix_of(placed.graph.name)
-        self._session: Any = None
-        self._kept: list[Any] = []
+        self._transport = network_transport(placed, name, keys)
 
     def __enter__(self) -> Self:
         """Connect to whoever is there, and go on trying.
 
         Raises:
-            AloftError: the session cannot be opened.
+            AloftError: this is not possible.
         """
-        import zenoh
-
-        machines = self.placed.machines
-        endpoints = [spec.endpoint for spec in machines]
-        try:
-            self._session = zenoh.open(session_config([], endpoints, self._secured))
-        except zenoh.ZError as error:
-            raise AloftError(f"no session of Zenoh could be opened: {error}") from error
-        for spec in machines:
-            self._subscribe(status_key(spec.name), self._take)
+        self._transport.observe()
+        for spec in self.placed.machines:
+            self._transport.subscribe(status_key(spec.name), self._take)
         return self
 
     def __exit__(self, *_: object) -> None:
-        session, self._session = self._session, None
-        self._kept.clear()
-        with suppress(Exception):  # whatever a network does, watching ends
-            session.close()
+        self._transport.close()
 
     def rows(self, machine: str, size: int, take: Callable[[int, bytes], None]) -> None:
         """Have the bus of a part taken as it comes, with its tick; ``size`` are its bytes."""
@@ -217,11 +208,11 @@ class Observer:
             if found is not None:
                 take(*found)
 
-        self._subscribe(rows_key(machine), heard)
+        self._transport.subscribe(rows_key(machine), heard)
 
     def windows(self, machine: str, take: Callable[[bytes], None]) -> None:
         """Have what a part shows of itself for a page taken as it comes; see ``live.part_feed``."""
-        self._subscribe(window_key(machine), take)
+        self._transport.subscribe(window_key(machine), take)
 
     def seconds_since(self, machine: str) -> float | None:
         """How long ago a machine was heard [s]; ``None`` if it never was."""
@@ -255,15 +246,3 @@ class Observer:
                 float(status["rate_hz"]), int(status["tick"]), status["hash"] + status["phase"]
                 self.statuses[name] = status
                 self._received_at[name] = time.monotonic()
-
-    def _subscribe(self, key: str, take: Callable[[bytes], None]) -> None:
-        import zenoh
-
-        def heard(sample: Any) -> None:
-            take(sample.payload.to_bytes())
-
-        self._kept.append(
-            self._session.declare_subscriber(
-                f"{self._prefix}/{as_chunk(key)}", zenoh.handlers.Callback(heard, indirect=False)
-            )
-        )

@@ -35,10 +35,11 @@ class SpreadRun:
 
     Args:
         placed: the graph, with the endpoints of its parts.
-        secured: TLS and access control, as ``key_folder.secured`` gives them.
+        keys: the folder of ``aloft keys``, where links are encrypted.
         find: how to find a run that has been started anew.
         control: the socket of a part on this machine that takes changes of parameters, if there is
             one; see ``parameter_endpoint``.
+        observer: the name by which the keys of the observer are known.
 
     Raises:
         AloftError: no session can be opened.
@@ -47,11 +48,13 @@ class SpreadRun:
     def __init__(
         self,
         placed: PlacedGraph,
-        secured: dict[str, Any] | None = None,
+        keys: Path | None = None,
         find: Find = lambda: None,
         control: Path | None = None,
+        observer: str = "viewer",
     ) -> None:
-        self._secured, self._find, self._control = secured, find, control
+        self._keys, self._observer_name = keys, observer
+        self._find, self._control = find, control
         self._lock = threading.Lock()
         self._observer: Observer | None = None
         self._watch(placed)
@@ -62,7 +65,7 @@ class SpreadRun:
         return self._control is not None
 
     def _watch(self, placed: PlacedGraph) -> None:
-        observer = Observer(placed, self._secured)
+        observer = Observer(placed, self._keys, self._observer_name)
         parts = {spec.name: _Part(placed, spec.name) for spec in placed.machines}
         observer.__enter__()
         self.close()

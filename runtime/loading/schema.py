@@ -12,6 +12,7 @@ from typing import Any
 
 from ..language.block import Block
 from ..language.registry import all_blocks
+from ..transports.registry import endpoint_pattern
 from .reading.written import CLOCK_KEYS
 
 Schema = dict[str, Any]
@@ -126,7 +127,7 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
             "clock": _clock_schema(),
             "machines": {
                 "type": "object",
-                "additionalProperties": {"type": "string", "pattern": "^(tcp|tls)/.+:[0-9]+$"},
+                "additionalProperties": {"type": "string", "pattern": endpoint_pattern()},
                 "description": "machines that share the graph: name and endpoint",
             },
             "links": {

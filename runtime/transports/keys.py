@@ -22,8 +22,7 @@ from typing import Any
 
 from ..language.errors import AloftError
 from ..placement.placed import PlacedGraph
-from .access import access_control, observers_access
-from .zenoh_transport import session_settings
+from .zenoh_session import access_control, observers_access, session_settings
 
 CERTIFICATE, KEY, AUTHORITY = "certificate.pem", "key.pem", "authority.pem"
 """The files of one party: what it is known by, its secret, and whom it trusts."""

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable
-from typing import Protocol
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Protocol, Self
+
+from ..placement.placed import PlacedGraph
 
 MessageCallback = Callable[[bytes], None]
 """Takes a message. It is called on a thread of the network, so it must copy and return."""
@@ -39,6 +44,50 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Disconnect; also after a failed ``open``."""
+
+
+class NetworkTransport(Transport, Protocol):
+    """A transport between processes; ``registry.TRANSPORTS`` lists it by the scheme of its endpoints."""
+
+    @classmethod
+    def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
+        """The transport of the machine or the observer ``name``, not yet connected.
+
+        ``keys`` is the folder of ``aloft keys``.
+
+        Raises:
+            AloftError: the endpoints and the keys do not fit together.
+        """
+
+    @classmethod
+    def host_fault(cls, host: str) -> str:
+        """Why no machine can listen at ``host``, or an empty text."""
+        return ""
+
+    @classmethod
+    def needs_keys(cls, placed: PlacedGraph) -> bool:
+        """Whether only who has keys can connect to the machines of this graph."""
+        return False
+
+    @classmethod
+    def local_endpoints(cls, count: int, keys: Path | None = None) -> list[str]:
+        """Endpoints on the loopback that nobody uses at present."""
+
+    def observe(self) -> None:
+        """Connect to all machines, wherever there are any yet, to subscribe and send nothing.
+
+        Raises:
+            AloftError: this is not possible.
+        """
+
+
+def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> list[int]:
+    """Ports of the loopback that nobody uses at present."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket(type=kind)) for _ in range(count)]
+        for made in sockets:
+            made.bind(("127.0.0.1", 0))
+        return [made.getsockname()[1] for made in sockets]
 
 
 def data_key(sender: str, receiver: str, source: str) -> str:

@@ -1,75 +1,27 @@
 """The transport over Zenoh. Sessions are peers that know each other's endpoints and nothing else.
 
-Each machine listens at its own endpoint and connects to those before it in the graph. Nothing is
-left to Zenoh's defaults: multicast and gossip are off, and congestion control, ``express``,
-priority and reliability are said for every publisher. A machine shows by a liveliness token that it
-is there. Where its process ends, the others know within milliseconds; where it freezes or the
+Each machine listens at its own endpoint and connects to those before it in the graph. Congestion control,
+``express``, priority and reliability are given for every publisher. A machine shows by a liveliness token
+that it is there. Where its process ends, the others know within milliseconds; where it freezes or the
 network is cut, after ``LEASE``.
 """
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 from ..language.errors import AloftError
 from ..language.stages import MachineSpec
-from .transport import MessageCallback
-
-LEASE = 500
-"""Milliseconds after which a peer that says nothing is taken for lost."""
-ROOT = "aloft"
-"""The first part of every key expression."""
+from ..placement.placed import PlacedGraph
+from .keys import check_endpoints, secured
+from .transport import MessageCallback, NetworkTransport, free_ports
+from .zenoh_session import as_chunk, prefix_of, session_config
 
 
-def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
-    """The settings of a peer that listens and connects only at these endpoints, by their paths in
-    Zenoh's configuration."""
-    return {
-        "mode": "peer",
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "listen/endpoints": list(listen),
-        "listen/exit_on_failure": True,
-        "connect/endpoints": list(connect),
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": {
-            "period_init_ms": 50,
-            "period_max_ms": 200,
-            "period_increase_factor": 1.5,
-        },
-        "transport/link/tx/lease": LEASE,
-        "transport/shared_memory/enabled": False,
-    }
-
-
-def session_config(
-    listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
-) -> Any:
-    """Those settings as a Zenoh configuration; ``secured`` are more of them, for TLS and access."""
-    import zenoh
-
-    config = zenoh.Config()
-    for key, value in {**session_settings(listen, connect), **(secured or {})}.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
-
-
-def as_chunk(name: str) -> str:
-    """A name as one or more chunks of a key expression, without what is special there."""
-    return re.sub(r"[^A-Za-z0-9_./~-]", "_", name)
-
-
-def prefix_of(graph: str) -> str:
-    """What all key expressions of a graph begin with."""
-    return f"{ROOT}/{as_chunk(graph).replace('/', '_')}"
-
-
-class ZenohTransport:
+class ZenohTransport(NetworkTransport):
     """Carries the messages of one part of a graph.
 
     Args:
@@ -77,7 +29,7 @@ class ZenohTransport:
         machines: all machines of the graph, in its order.
         wait: whether sending waits where the queue is full. Lockstep waits, since nothing may be
             lost; a free-running part drops, since nothing may wait.
-        secured: TLS and access control, as ``key_folder.secured`` gives them; none: neither.
+        security: TLS and access control, as ``keys.secured`` gives them; none: neither.
     """
 
     def __init__(
@@ -86,15 +38,53 @@ class ZenohTransport:
         machines: Sequence[MachineSpec],
         *,
         wait: bool = True,
-        secured: Mapping[str, Any] | None = None,
+        security: Mapping[str, Any] | None = None,
     ) -> None:
         self._prefix = prefix_of(graph)
-        self._secured = secured
+        self._security = security
         self._machines = tuple(machines)
         self._wait = wait
         self._session: Any = None
-        self._kept: list[Any] = []
+        self._declared: list[Any] = []
         self._farewells: list[Callable[[], None]] = []
+
+    @classmethod
+    def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
+        """The transport of a machine or an observer; ``tls`` endpoints need keys."""
+        if keys is not None:
+            check_endpoints(placed)
+        elif cls.needs_keys(placed):
+            raise AloftError(
+                "links over TLS need certificates: `aloft keys GRAPH` makes them, and "
+                "--keys FOLDER takes them"
+            )
+        return cls(
+            placed.graph.name,
+            placed.machines,
+            wait=placed.graph.links.mode == "lockstep",
+            security=None if keys is None else secured(placed, keys, name),
+        )
+
+    @classmethod
+    def needs_keys(cls, placed: PlacedGraph) -> bool:
+        """Whether an endpoint is ``tls``."""
+        return any(spec.endpoint.startswith("tls/") for spec in placed.machines)
+
+    @classmethod
+    def local_endpoints(cls, count: int, keys: Path | None = None) -> list[str]:
+        """TCP endpoints, with keys TLS."""
+        scheme = "tcp" if keys is None else "tls"
+        return [f"{scheme}/127.0.0.1:{port}" for port in free_ports(count)]
+
+    def observe(self) -> None:
+        """Open a session that connects to all machines and listens nowhere."""
+        import zenoh
+
+        endpoints = [spec.endpoint for spec in self._machines]
+        try:
+            self._session = zenoh.open(session_config([], endpoints, self._security))
+        except zenoh.ZError as error:
+            raise AloftError(f"no session of Zenoh could be opened: {error}") from error
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Open the session and say that the machine is there."""
@@ -106,7 +96,7 @@ class ZenohTransport:
         try:
             self._session = zenoh.open(
                 session_config(
-                    [own], [spec.endpoint for spec in self._machines[:place]], self._secured
+                    [own], [spec.endpoint for spec in self._machines[:place]], self._security
                 )
             )
         except zenoh.ZError as error:
@@ -132,7 +122,7 @@ class ZenohTransport:
         self._keep(liveliness.declare_token(f"{self._prefix}/alive/{machine}"))
 
     def _keep(self, declared: Any) -> None:
-        self._kept.append(declared)
+        self._declared.append(declared)
 
     @property
     def is_open(self) -> bool:
@@ -196,7 +186,7 @@ class ZenohTransport:
             with suppress(Exception):  # whatever somebody wants to say, a part ends
                 call()
         session, self._session = self._session, None
-        self._kept.clear()
+        self._declared.clear()
         if session is not None:
             with suppress(Exception):  # whatever a network does, a part ends
                 session.close()

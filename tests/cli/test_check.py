@@ -1,9 +1,11 @@
-"""``aloft doctor``, and the flags of a run that it speaks of."""
+"""``aloft check`` and ``aloft doctor``, and the flags of a run that the latter speaks of."""
 
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -34,3 +36,20 @@ def test_a_run_that_is_refused_a_processor_does_not_begin(folder: Path, call: Ca
 def test_the_flags_are_for_one_run(folder: Path, call: Call) -> None:
     done = call("run", "count.yaml", "--seeds", "0:2", "--lock-memory", code=2)
     assert "are for one run, in one process" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [("check",), ("run",), ("run", "--seeds", "0:2"), ("graph",), ("test",), ("keys",)],
+    ids=" ".join,
+)
+def test_the_report_of_a_wrong_graph_as_json(
+    folder: Path, call_json: Callable[..., dict[str, Any]], verb: tuple[str, ...]
+) -> None:
+    (folder / "wrong.yaml").write_text(
+        "rate: 1\nblocks:\n  a: {use: blocks.Constant, with: {valeu: 1}}\n"
+    )
+    answer = call_json(verb[0], "wrong.yaml", *verb[1:], code=2)
+    (problem, *_) = answer["problems"]
+    assert answer["success"] is False and answer["count"] == len(answer["problems"])
+    assert (problem["code"], problem["line"]) == ("unknown-parameter", 3)

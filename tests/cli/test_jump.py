@@ -53,6 +53,11 @@ def test_words_become_a_task(words: dict[str, str], task: dict[str, Any]) -> Non
         ({"turn": "30"}, "--turn 30: the unit is missing; expected such as --turn 30deg"),
         ({"turn": "30cm"}, "--turn 30cm: '30cm' is not in rad; expected such as --turn 30deg"),
         ({"rise": "high"}, "--rise high: "),
+        ({"forward": "3m"}, "--forward 3m: no jump is planned beyond 2 m"),
+        ({"back": "210cm"}, "--back 210cm: no jump is planned beyond 2 m"),
+        ({"down": "3m"}, "--down 3m: no jump is planned beyond 2 m"),
+        ({"turn": "400deg"}, "--turn 400deg: no jump is planned beyond 361 deg"),
+        ({"rise": "0cm"}, "--rise 0cm: it must be more than 0 m"),
         ({"up": "5cm", "down": "5cm"}, "--up and --down contradict each other: give one"),
     ],
 )

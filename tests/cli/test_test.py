@@ -13,11 +13,44 @@ CallJson = Callable[..., dict[str, Any]]
 
 def test_blocks_and_graphs(folder: Path, call: Call, call_json: CallJson) -> None:
     done = call("test", "blocks.ContactDetector")
-    assert "11 of 11 checks of 1 blocks passed" in done.stdout
+    assert "12 of 12 checks of 1 blocks passed" in done.stdout
     answer = call_json("test", "count.yaml", code=1)  # its block has undocumented ports
     problems = {(c["block"], c["check"]): c["problem"] for c in answer["checks"] if c["problem"]}
     assert problems["counter (Counter)", "documented"] == "Counter: port 'y' has no text"
     assert "counter (Counter)" in call("test", "counter:Counter", "count.yaml", code=1).stdout
+
+
+def test_the_blocks_of_a_graph_are_tested_with_its_robot(folder: Path, call: Call) -> None:
+    (folder / "dog.py").write_text(DOG)
+    (folder / "dog.yaml").write_text(
+        "rate: 100\nrobot: go2\ndimensions: {m: 2}\nblocks: {dog: {use: dog:Dog}}\n"
+    )
+    call("test", "dog.yaml")
+    done = call("test", "dog.yaml", "--robot", "bruce", code=1)
+    assert "this is bruce" in " ".join(done.stdout.split())
+
+
+DOG = """\
+from aloft import Block, Field, Output, Signal
+
+
+class Size(Signal):
+    value = Field("m", text="any")
+
+
+class Dog(Block):
+    'A block for one robot.'
+
+    y = Output(Size, text="the number of joints and the period")
+
+    def setup(self):
+        name = self.context.robot.name
+        if name != "go2":
+            raise ValueError(f"this is {name}")
+
+    def step(self):
+        self.y.value[:] = self.period
+"""
 
 
 def test_a_recording_becomes_a_test_that_pytest_runs(

@@ -26,6 +26,7 @@ def test_derived_figures() -> None:
 def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
     (tmp_path / "hopper.yaml").write_text(yaml.safe_dump(hopper()))
     assert find_robot("hopper.yaml", tmp_path) == read_description(tmp_path / "hopper.yaml")
+    assert find_robot("hopper.yaml", str(tmp_path)) == find_robot("hopper.yaml", tmp_path)
     with pytest.raises(LookupError, match=r"no robot description at .*other\.yaml"):
         find_robot("other.yaml", tmp_path)
 

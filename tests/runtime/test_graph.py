@@ -67,6 +67,21 @@ def test_seed_parameters_are_found_everywhere() -> None:
     assert "robot.seed" in aloft.load(jump).seed_parameters
 
 
+NOISE = """\
+rate: 100
+duration: 0.1
+blocks: {noise: {use: blocks.WhiteNoise, with: {seed: 1}}}
+"""
+
+
+def test_a_run_may_have_another_seed() -> None:
+    graph = aloft.load(NOISE)
+    assert graph.seed_parameters == ("noise.seed",)
+    hashes = {graph.run(seed=seed).run_hash for seed in (1, 2)}
+    assert len(hashes) == 2
+    assert graph.run(seed=1).run_hash == graph.run().run_hash
+
+
 def test_the_package_offers_what_users_need_and_nothing_else() -> None:
     for name in aloft.__all__:
         assert getattr(aloft, name) is not None

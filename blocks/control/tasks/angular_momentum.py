@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array
+from ....mathematics.arrays import Array1D, Array2D, Vector3
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -34,16 +34,16 @@ class AngularGains(Parameters):
 class Feedback(NamedTuple):
     """Weights and gains as arrays, (3,) each, and whether the target is tracked."""
 
-    weight: Array
-    damping: Array
+    weight: Array1D
+    damping: Array1D
     track: bool
 
 
 class Momentum(NamedTuple):
     """An angular momentum [N m s] and its rate [N m] about the centre of mass, (3,) each, world."""
 
-    value: Array
-    rate: Array
+    value: Vector3
+    rate: Vector3
 
 
 class AngularMomentum(KernelTask):
@@ -78,7 +78,7 @@ class AngularMomentum(KernelTask):
 
 @kernel
 def angular_rows(
-    matrix: Array, measured: Momentum, target: Momentum, gains: Feedback, rows: TaskRows
+    matrix: Array2D, measured: Momentum, target: Momentum, gains: Feedback, rows: TaskRows
 ) -> None:
     """Three rows for the rate of the angular momentum.
 

@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array, Flags, Indices
+from ....mathematics.arrays import (
+    Array1D,
+    Array3D,
+    Flags1D,
+    Indices0D,
+    Indices1D,
+    Rows3,
+)
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -71,33 +78,33 @@ class PointGains(NamedTuple):
 class Points(NamedTuple):
     """The contact points: (n, 3, n_velocities), then (n, 3) each [m, m/s, m/s^2, world]."""
 
-    jacobian: Array
-    drift: Array
-    position: Array
-    velocity: Array
+    jacobian: Array3D
+    drift: Rows3
+    position: Rows3
+    velocity: Rows3
 
 
 class Steps(NamedTuple):
     """The points of a foot that takes a step, (n,), and their acceleration [m/s^2, world] (n, 3)."""
 
-    stepping: Flags
-    acceleration: Array
+    stepping: Flags1D
+    acceleration: Rows3
 
 
 class Ankles(NamedTuple):
     """The joint that each foot rolls with: its index in the generalised velocity, -1 for none, and
     its desired acceleration [rad/s^2], (n_feet,) each."""
 
-    place: Indices
-    acceleration: Array
+    place: Indices1D
+    acceleration: Array1D
 
 
 class JointMotion(NamedTuple):
     """Joint angles [rad], velocities and accelerations, (n_joints,) each."""
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array1D
+    velocity: Array1D
+    acceleration: Array1D
 
 
 class ContactPoints(KernelTask):
@@ -149,14 +156,14 @@ class ContactPoints(KernelTask):
 @kernel
 def contact_task(
     points: Points,
-    stance: Flags,
+    stance: Flags1D,
     steps: Steps,
-    phase: Indices,
-    foot: Indices,
-    foot_rotation: Array,
+    phase: Indices0D,
+    foot: Indices1D,
+    foot_rotation: Array3D,
     planned: JointMotion,
-    position: Array,
-    velocity: Array,
+    position: Array1D,
+    velocity: Array1D,
     ankles: Ankles,
     gains: PointGains,
     rows: TaskRows,
@@ -173,7 +180,7 @@ def contact_task(
         gains.swing_stiffness, gains.swing_damping, rows,
     )  # fmt: skip
     step_rows(points, steps, gains.step_weight, rows)
-    if int(phase[()]) == _THRUST:
+    if phase[()] == _THRUST:
         follow_plan(
             planned, position, velocity, gains.rolling_stiffness, gains.rolling_damping, ankles
         )
@@ -186,7 +193,7 @@ def contact_task(
 @kernel
 def contact_rows(
     points: Points,
-    stance: Flags,
+    stance: Flags1D,
     stance_weight: float,
     stance_damping: float,
     swing_weight: float,
@@ -238,8 +245,8 @@ def step_rows(points: Points, steps: Steps, weight: float, rows: TaskRows) -> No
 @kernel
 def follow_plan(
     planned: JointMotion,
-    position: Array,
-    velocity: Array,
+    position: Array1D,
+    velocity: Array1D,
     stiffness: float,
     damping: float,
     ankles: Ankles,
@@ -257,17 +264,17 @@ def follow_plan(
             joint = place - first
             ankles.acceleration[foot] = (
                 float(planned.acceleration[joint])
-                + stiffness * (float(planned.position[joint]) - float(position[joint]))
-                + damping * (float(planned.velocity[joint]) - float(velocity[place]))
+                + stiffness * (float(planned.position[joint]) - position[joint])
+                + damping * (float(planned.velocity[joint]) - velocity[place])
             )
 
 
 @kernel
 def lifting_rows(
     points: Points,
-    stance: Flags,
-    foot: Indices,
-    foot_rotation: Array,
+    stance: Flags1D,
+    foot: Indices1D,
+    foot_rotation: Array3D,
     ankles: Ankles,
     weight: float,
     damping: float,
@@ -296,7 +303,7 @@ def lifting_rows(
             continue
         rows.jacobian[row, :] = 0.0
         for k in range(3):
-            across = float(foot_rotation[foot[i], k, 1])
+            across = foot_rotation[foot[i], k, 1]
             wanted -= across * (damping * float(points.velocity[i, k]) + float(points.drift[i, k]))
             for j in range(rows.jacobian.shape[1]):
                 rows.jacobian[row, j] += across * float(points.jacobian[i, k, j])

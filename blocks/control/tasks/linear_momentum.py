@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array
+from ....mathematics.arrays import Array1D, Array2D, Vector3
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -34,17 +34,17 @@ class LinearGains(Parameters):
 class Feedback(NamedTuple):
     """Weights and gains as arrays, (3,) each."""
 
-    weight: Array
-    stiffness: Array
-    damping: Array
+    weight: Array1D
+    stiffness: Array1D
+    damping: Array1D
 
 
 class Centre(NamedTuple):
     """A centre of mass: position, velocity and acceleration [m, m/s, m/s^2, world], (3,) each."""
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Vector3
+    velocity: Vector3
+    acceleration: Array1D
 
 
 class LinearMomentum(KernelTask):
@@ -82,22 +82,22 @@ class LinearMomentum(KernelTask):
 
 @kernel
 def linear_task(
-    mass_matrix: Array,
+    mass_matrix: Array2D,
     described: float,
-    matrix: Array,
+    matrix: Array2D,
     measured: Centre,
     target: Centre,
     gains: Feedback,
     rows: TaskRows,
 ) -> None:
     """``linear_rows`` with the mass of the mass matrix, or where that is zero the ``described`` one."""
-    mass = float(mass_matrix[0, 0])
+    mass = mass_matrix[0, 0]
     linear_rows(matrix, mass if mass != 0.0 else described, measured, target, gains, rows)
 
 
 @kernel
 def linear_rows(
-    matrix: Array, mass: float, measured: Centre, target: Centre, gains: Feedback, rows: TaskRows
+    matrix: Array2D, mass: float, measured: Centre, target: Centre, gains: Feedback, rows: TaskRows
 ) -> None:
     """Three rows for the acceleration of the centre of mass.
 
@@ -109,7 +109,7 @@ def linear_rows(
     """
     for i in range(3):
         for k in range(matrix.shape[1]):
-            rows.jacobian[i, k] = float(matrix[i, k]) / mass
+            rows.jacobian[i, k] = matrix[i, k] / mass
         rows.desired[i] = (
             float(target.acceleration[i])
             + float(gains.stiffness[i]) * (float(target.position[i]) - float(measured.position[i]))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array, Flags, Indices
+from ....mathematics.arrays import Array1D, Flags, Flags1D, Indices, Indices1D
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
@@ -41,7 +41,7 @@ class PostureChoice(PostureGains):
 class Feedback(NamedTuple):
     """Weights by row (n,), and the two gains."""
 
-    weight: Array
+    weight: Array1D
     stiffness: float
     damping: float
 
@@ -49,9 +49,9 @@ class Feedback(NamedTuple):
 class JointTargets(NamedTuple):
     """Joint angles [rad], velocities and accelerations by row, (n,) each."""
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array1D
+    velocity: Array1D
+    acceleration: Array1D
 
 
 class Posture(KernelTask):
@@ -120,12 +120,12 @@ def chosen_joints(robot: RobotDescription, gains: PostureChoice) -> list[int]:
 
 @kernel
 def posture_task(
-    joints: Indices,
-    is_held: Flags,
-    held: Array,
+    joints: Indices1D,
+    is_held: Flags1D,
+    held: Array1D,
     planned: JointTargets,
-    position: Array,
-    velocity: Array,
+    position: Array1D,
+    velocity: Array1D,
     reference: JointTargets,
     gains: Feedback,
     rows: TaskRows,
@@ -138,7 +138,7 @@ def posture_task(
         reference: scratch, by row.
     """
     for row in range(joints.shape[0]):
-        joint = int(joints[row])
+        joint = joints[row]
         if is_held[joint]:
             reference.position[row] = held[joint]
             reference.velocity[row] = reference.acceleration[row] = 0.0
@@ -151,9 +151,9 @@ def posture_task(
 
 @kernel
 def posture_rows(
-    joints: Indices,
-    position: Array,
-    velocity: Array,
+    joints: Indices1D,
+    position: Array1D,
+    velocity: Array1D,
     reference: JointTargets,
     gains: Feedback,
     rows: TaskRows,
@@ -167,11 +167,11 @@ def posture_rows(
     first = velocity.shape[0] - position.shape[0]
     rows.jacobian[:, :] = 0.0
     for row in range(joints.shape[0]):
-        joint = int(joints[row])
+        joint = joints[row]
         rows.jacobian[row, first + joint] = 1.0
         rows.desired[row] = (
             float(reference.acceleration[row])
-            + gains.stiffness * (float(reference.position[row]) - float(position[joint]))
-            + gains.damping * (float(reference.velocity[row]) - float(velocity[first + joint]))
+            + gains.stiffness * (float(reference.position[row]) - position[joint])
+            + gains.damping * (float(reference.velocity[row]) - velocity[first + joint])
         )
         rows.weights[row] = gains.weight[row]

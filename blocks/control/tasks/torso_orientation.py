@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array
+from ....mathematics.arrays import Array1D, Array2D, Vector3
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.rotations import conjugate, from_matrix, logarithm, multiply
@@ -33,16 +33,16 @@ class TorsoGains(Parameters):
 class Feedback(NamedTuple):
     """Weights and gains as arrays, (3,) each."""
 
-    weight: Array
-    stiffness: Array
-    damping: Array
+    weight: Array1D
+    stiffness: Array1D
+    damping: Array1D
 
 
 class Attitude(NamedTuple):
     """An orientation as quaternion x, y, z, w and an angular velocity [rad/s, body]."""
 
-    orientation: Array
-    angular_velocity: Array
+    orientation: Array1D
+    angular_velocity: Vector3
 
 
 class TorsoOrientation(KernelTask):
@@ -77,12 +77,12 @@ class TorsoOrientation(KernelTask):
 
 @kernel
 def torso_task(
-    rotation: Array,
+    rotation: Array2D,
     measured: Attitude,
     target: Attitude,
     gains: Feedback,
-    error: Array,
-    quaternion: Array,
+    error: Array1D,
+    quaternion: Array1D,
     rows: TaskRows,
 ) -> None:
     """``torso_rows`` for a base whose ``rotation`` (3, 3) is given instead of its quaternion."""
@@ -95,8 +95,8 @@ def torso_rows(
     measured: Attitude,
     target: Attitude,
     gains: Feedback,
-    error: Array,
-    quaternion: Array,
+    error: Vector3,
+    quaternion: Array1D,
     rows: TaskRows,
 ) -> None:
     """Three rows for the angular acceleration of the base.
@@ -112,7 +112,7 @@ def torso_rows(
     logarithm(quaternion, error)
     for i in range(3):
         rows.jacobian[i, 3 + i] = 1.0
-        rows.desired[i] = float(gains.stiffness[i]) * float(error[i]) + float(gains.damping[i]) * (
+        rows.desired[i] = float(gains.stiffness[i]) * error[i] + float(gains.damping[i]) * (
             float(target.angular_velocity[i]) - float(measured.angular_velocity[i])
         )
         rows.weights[i] = gains.weight[i]

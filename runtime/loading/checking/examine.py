@@ -177,11 +177,12 @@ def _check_dimensions(draft: Draft, settings: Settings, problems: Problems) -> b
             continue  # it would come from the robot, whose problem is reported
         value = draft.dimensions.get(name)
         near = nearest(name, draft.dimensions)
-        fix = f"dimensions: {{{name}: 3}}"
+        size = 3
+        if near:
+            size = draft.dimensions[near[0]]
+        fix = f"for the whole graph, beside 'blocks': dimensions: {{{name}: {size}}}"
         if settings.robot is None and name in find_robot(robot_names()[0]).dimensions:
             fix = fix_without_robot()
-        elif near:
-            fix = f"dimensions: {{{name}: {draft.dimensions[near[0]]}}}"
         problems.add(
             Code.DIMENSION,
             f"{flat.path} ({flat.use}) needs the dimension {name!r}, which nothing gives"

@@ -13,14 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
+from ...transports.registry import EXAMPLE, endpoint_fault, transport_type
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from .flat import FlatBlock, FlatGraph
 from .subgraphs import Instance
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
-_ENDPOINT = re.compile(r"(?:tcp|tls)/(?P<host>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):(?P<port>[0-9]+)$")
-EXAMPLE = "tcp/127.0.0.1:7450"
 
 
 def placed(
@@ -75,6 +74,17 @@ def read_machines(graph: FlatGraph, problems: Problems) -> tuple[MachineSpec, ..
             )
         elif machine is not None:
             machines.append(machine)
+            if transport_type([machine]) is not transport_type(machines):
+                problems.add(
+                    Code.MACHINE,
+                    f"machines {machines[0].name!r} and {machine.name!r} use different transports",
+                    entry.value.where,
+                    at=f"machines.{entry.key}",
+                    other=f"machines.{machines[0].name}",
+                    other_where=machines[0].where,
+                    expected=f"an endpoint as that of {machines[0].name}, {machines[0].endpoint}",
+                    found=machine.endpoint,
+                )
     names = [entry.key for entry in graph.machines or ()]
     for block in graph.blocks:
         node = block.machine
@@ -137,7 +147,7 @@ def _read_machine(entry: Entry, problems: Problems) -> MachineSpec | None:
         )
         return None
     text = entry.value.value if isinstance(entry.value, ScalarNode) else None
-    reason = _fault(text) if isinstance(text, str) else "it is no text"
+    reason = endpoint_fault(text) if isinstance(text, str) else "it is no text"
     if reason:
         problems.add(
             Code.MACHINE,
@@ -150,23 +160,3 @@ def _read_machine(entry: Entry, problems: Problems) -> MachineSpec | None:
         )
         return None
     return MachineSpec(entry.key, str(text), entry.key_where)
-
-
-def _fault(text: str) -> str:
-    """What is wrong with an endpoint; empty if nothing is."""
-    import ipaddress
-
-    match = _ENDPOINT.match(text)
-    if match is None:
-        return "it is not of the form tcp/ADDRESS:PORT or tls/ADDRESS:PORT"
-    if not 1 <= int(match["port"]) <= 65535:
-        return f"port {match['port']} is not between 1 and 65535"
-    try:
-        address = ipaddress.ip_address(match["host"].strip("[]"))
-    except ValueError:
-        return ""  # a name, which is looked up when the run begins
-    if address.is_unspecified:
-        return "it stands for all addresses of a machine, and the others need one to connect to"
-    if address.is_multicast:
-        return "a multicast address is not the address of one machine"
-    return ""

@@ -91,3 +91,27 @@ def test_many_threads_may_close_it_at_once():
         thread.join()
     os.close(port)
     assert errors == []
+
+
+def test_it_can_be_closed_while_nobody_reads() -> None:
+    # the terminal's buffer is full, and the clock's thread waits until somebody makes room
+    cable = PseudoTerminal(lambda sent: b"")
+    sending = threading.Thread(target=cable.send, args=(bytes(1_000_000),), daemon=True)
+    sending.start()
+    sending.join(0.2)
+    assert sending.is_alive()
+    cable.close()
+    sending.join(5.0)
+    assert not sending.is_alive()
+
+
+def test_a_server_ends_while_its_packets_are_not_read() -> None:
+    twin = standing_twin(ROBOT, SimulatorParameters(timestep=0.001), Hardware.for_twin(ROBOT))
+    server = TwinServer(twin, virtual=False, period=0.002)
+    filling = threading.Thread(target=server._board.send, args=(bytes(1_000_000),), daemon=True)
+    filling.start()
+    time.sleep(0.3)  # by now the clock's thread waits to send as well
+    closing = threading.Thread(target=server.close, daemon=True)
+    closing.start()
+    closing.join(10.0)
+    assert not closing.is_alive()

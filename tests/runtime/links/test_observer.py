@@ -34,7 +34,7 @@ class Running:
                 placed, m.name,
                 ZenohTransport(
                     placed.graph.name, placed.machines, wait=False,
-                    secured=None if keys is None else secured(placed, keys, m.name),
+                    security=None if keys is None else secured(placed, keys, m.name),
                 ),
             )
             for m in placed.machines
@@ -108,8 +108,8 @@ def test_over_tls_an_observer_sees_and_a_stranger_does_not(
     make_keys(placed, tmp_path / "others", ["viewer"])  # of another authority
     running = Running(placed, tmp_path / "keys")
     stack.callback(running.end)
-    viewer = Observer(placed, secured(placed, tmp_path / "keys", "viewer"))
-    stranger = Observer(placed, secured(placed, tmp_path / "others", "viewer"))
+    viewer = Observer(placed, tmp_path / "keys")
+    stranger = Observer(placed, tmp_path / "others")
     with viewer, stranger:
         assert viewer.wait_for(tuple(running.parts), 60.0) == ()
         assert stranger.statuses == {}

@@ -79,6 +79,33 @@ def test_dimensions_of_robot_graph_and_block() -> None:
     assert (sizes["n"], sizes["m"], sizes["n_joints"]) == (3, 5, 10)
 
 
+SIZED = """\
+from aloft import Block, Field, Output, Signal
+
+
+class Sized(Signal):
+    value = Field("m")
+
+
+class Source(Block):
+    y = Output(Sized)
+
+    def step(self):
+        self.y.value[:] = 1.0
+"""
+
+
+def test_the_fix_for_a_missing_dimension_is_a_key_of_the_graph(tmp_path: Path) -> None:
+    (tmp_path / "sized.py").write_text(SIZED)
+    path = tmp_path / "graph.yaml"
+    path.write_text("rate: 1\nblocks:\n  one: {use: sized:Source}\n")
+    (problem,) = check(path).problems
+    assert problem.message == "one (sized:Source) needs the dimension 'm', which nothing gives"
+    assert problem.fix == "for the whole graph, beside 'blocks': dimensions: {m: 3}"
+    path.write_text(f"{problem.fix.partition(': ')[2]}\n{path.read_text()}")
+    assert load(path).block("one").dimensions["m"] == 3
+
+
 def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:
     shipped = Path(__file__).parents[3] / "robots" / "bruce" / "bruce.yaml"
     (tmp_path / "mine.yaml").write_text(shipped.read_text().replace("name: bruce", "name: mine", 1))

@@ -121,6 +121,57 @@ def test_an_output_that_is_not_always_written() -> None:
         )
 
 
+def test_a_constant_output_may_be_filled_in_setup() -> None:
+    class Constant(Sound):
+        """A block."""
+
+        label = Output(Vector, text="what does not change")
+
+        def setup(self) -> None:
+            super().setup()
+            self.label.value[:] = 3.0
+
+    class Forgotten(Sound):
+        """A block."""
+
+        label = Output(Vector, text="what nobody writes")
+
+    class Overwritten(Constant):
+        """A block."""
+
+        def step(self) -> None:
+            super().step()
+            if self.tick == 5:
+                self.label.value[:] = 4.0
+
+    check_block(Constant, cases=["outputs written"])
+    for block_type in (Forgotten, Overwritten):
+        assert "output label.value is not written by every run" in (
+            failure(block_type, "outputs written")
+        )
+
+
+def test_an_index_beyond_an_array() -> None:
+    class Beyond(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            super().step()
+            self.y.value[0] = self.u.value[self.params.n]
+
+    class FromTheEnd(Sound):
+        """A block."""
+
+        def step(self) -> None:
+            super().step()
+            self.y.value[0] = self.u.value[-1]
+
+    text = failure(Beyond, "bounds")
+    assert text.startswith("Beyond: index 3 is out of bounds for axis 0 with size 3, in step (")
+    assert text.endswith("compiled, it would read or write beyond the array")
+    check_block(FromTheEnd, cases=["bounds"])  # the same in both tiers
+
+
 def test_an_input_that_is_written() -> None:
     class Rude(Sound):
         """A block."""

@@ -15,7 +15,6 @@ import pytest
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
 from aloft.runtime.placement.placed import PlacedGraph, place
-from aloft.runtime.transports.access import access_control, keys_from, observers_access
 from aloft.runtime.transports.keys import (
     AUTHORITY_KEY,
     KEY,
@@ -26,7 +25,13 @@ from aloft.runtime.transports.keys import (
     secured,
 )
 from aloft.runtime.transports.transport import data_key
-from aloft.runtime.transports.zenoh_transport import ZenohTransport, session_config
+from aloft.runtime.transports.zenoh_session import (
+    access_control,
+    keys_from,
+    observers_access,
+    session_config,
+)
+from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port, wait_for
 from ..links.example_graphs import ring
@@ -77,7 +82,7 @@ class Onboard:
 
     def __init__(self, placed: PlacedGraph, folder: Path) -> None:
         self.transport = ZenohTransport(
-            placed.graph.name, placed.machines, secured=secured(placed, folder, "onboard")
+            placed.graph.name, placed.machines, security=secured(placed, folder, "onboard")
         )
         self.heard: list[bytes] = []
         self.transport.open("onboard", lambda name: None)

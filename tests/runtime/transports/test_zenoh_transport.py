@@ -12,7 +12,8 @@ import zenoh
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.transports.zenoh_transport import LEASE, ZenohTransport, as_chunk, session_config
+from aloft.runtime.transports.zenoh_session import LEASE, as_chunk, session_config
+from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port, wait_for
 

@@ -1,19 +1,71 @@
-"""The least access that each part of a graph needs, as Zenoh's access control, from the wires.
+"""The configuration of a Zenoh session: where it listens and connects, and what it may send and receive.
 
-Every session enforces it by itself, on what comes in and on what goes out, for peers that it knows by
-the names in their certificates (mutual TLS). Whatever no rule allows is denied. A machine may send the
-messages of its own links and its own beacons, and nothing else. An observer may
-subscribe to what parts say of themselves (``watch/``), and send nothing at all.
+Nothing is left to Zenoh's defaults: multicast and gossip are off. Of access, each part of a graph has the
+least that it needs, from the wires. Every session enforces it by itself, on what comes in and on what goes
+out, for peers that it knows by the names in their certificates (mutual TLS). Whatever no rule allows is
+denied. A machine may send the messages of its own links and its own beacons, and nothing else. An observer
+may subscribe to what parts publish about themselves (``watch/``), and send nothing at all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..placement.placed import PlacedGraph
 from .transport import beacon_key, data_key, tick_key
-from .zenoh_transport import as_chunk, prefix_of
+
+LEASE = 500
+"""Milliseconds after which a peer that says nothing is taken for lost."""
+ROOT = "aloft"
+"""The first part of every key expression."""
+
+
+def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
+    """The settings of a peer that listens and connects only at these endpoints, by their paths in
+    Zenoh's configuration."""
+    return {
+        "mode": "peer",
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "listen/endpoints": list(listen),
+        "listen/exit_on_failure": True,
+        "connect/endpoints": list(connect),
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": {
+            "period_init_ms": 50,
+            "period_max_ms": 200,
+            "period_increase_factor": 1.5,
+        },
+        "transport/link/tx/lease": LEASE,
+        "transport/shared_memory/enabled": False,
+    }
+
+
+def session_config(
+    listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
+) -> Any:
+    """Those settings as a Zenoh configuration; ``secured`` are more of them, for TLS and access."""
+    import zenoh
+
+    config = zenoh.Config()
+    for key, value in {**session_settings(listen, connect), **(secured or {})}.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def as_chunk(name: str) -> str:
+    """A name as one or more chunks of a key expression, without what is special there."""
+    return re.sub(r"[^A-Za-z0-9_./~-]", "_", name)
+
+
+def prefix_of(graph: str) -> str:
+    """What all key expressions of a graph begin with."""
+    return f"{ROOT}/{as_chunk(graph).replace('/', '_')}"
+
 
 WATCH = "watch"
 """What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``; see ``showing``."""

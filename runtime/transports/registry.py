@@ -1,0 +1,72 @@
+"""Which transport carries the links of a graph, and what its endpoints look like.
+
+An endpoint is ``SCHEME/ADDRESS:PORT``. All machines of a graph use one transport. Another transport is a
+class with the methods of ``NetworkTransport`` in a file of its own, and a line in ``TRANSPORTS``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from ipaddress import ip_address
+from pathlib import Path
+
+from ..language.stages import MachineSpec
+from ..placement.placed import PlacedGraph
+from .transport import NetworkTransport
+from .zenoh_transport import ZenohTransport
+
+TRANSPORTS: dict[str, type[NetworkTransport]] = {
+    "tcp": ZenohTransport,
+    "tls": ZenohTransport,
+}
+"""The class of each scheme."""
+EXAMPLE = "tcp/127.0.0.1:7450"
+_ENDPOINT = re.compile(
+    r"(?P<scheme>[a-z0-9]+)/(?P<host>\[[0-9a-fA-F:.]+\]|[A-Za-z0-9.-]+):(?P<port>[0-9]+)$"
+)
+
+
+def endpoint_pattern() -> str:
+    """A regular expression for endpoints, as in a JSON Schema."""
+    return f"^({'|'.join(TRANSPORTS)})/.+:[0-9]+$"
+
+
+def endpoint_fault(text: str) -> str:
+    """What is wrong with an endpoint; empty if nothing is."""
+    match = _ENDPOINT.match(text)
+    if match is None or match["scheme"] not in TRANSPORTS:
+        *most, last = [f"{scheme}/ADDRESS:PORT" for scheme in TRANSPORTS]
+        return f"it is not of the form {', '.join(most)} or {last}"
+    if not 1 <= int(match["port"]) <= 65535:
+        return f"port {match['port']} is not between 1 and 65535"
+    host = match["host"].strip("[]")
+    try:
+        address = ip_address(host)
+    except ValueError:
+        pass  # a name, which is looked up when the run begins
+    else:
+        if address.is_unspecified:
+            return "it stands for all addresses of a machine, and the others need one to connect to"
+        if address.is_multicast:
+            return "a multicast address is not the address of one machine"
+    return TRANSPORTS[match["scheme"]].host_fault(host)
+
+
+def transport_type(machines: Sequence[MachineSpec]) -> type[NetworkTransport]:
+    """The transport that these machines use, of which there is one."""
+    return TRANSPORTS[machines[0].endpoint.partition("/")[0]]
+
+
+def network_transport(placed: PlacedGraph, name: str, keys: Path | None = None) -> NetworkTransport:
+    """The transport of the machine or the observer ``name``, not yet connected.
+
+    Args:
+        placed: the graph.
+        name: of the machine or the observer.
+        keys: the folder of ``aloft keys``, where links are encrypted.
+
+    Raises:
+        AloftError: the endpoints and the keys do not fit together.
+    """
+    return transport_type(placed.machines).of(placed, name, keys)
