@@ -34,24 +34,23 @@ from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
 class Reduction(NamedTuple):
     """The matrices of the elimination, for n velocities, 6 of the base, and up to m force elements.
 
-    ``factor`` U (n, n), ``base`` W (6, n), ``wanted`` y (n,), ``shape`` R (6, 6), ``lever`` K (6, m),
-    ``pull`` k (6,), ``response`` X' (6, n), ``rest`` the acceleration without forces (n,), ``price``
-    (6,) the cost of pushing the base, ``free`` N' (n - 6, n), ``mirrors`` (6, n) the reflections
-    that make N, ``torque_map`` (n - 6, m + n - 6) and ``torque_rest`` (n - 6,) the torques as an affine
-    function of f and e.
+    As in the module's equations: ``factor`` U (n, n), ``base`` W (6, n), ``y`` (n,), ``R`` (6, 6), ``K`` (6, m),
+    ``k_0`` the vector k (6,), ``X_t`` X' (6, n), ``a_0`` the acceleration without forces (n,), ``multiplier`` (6,) of
+    the equations of motion of the base, ``N_t`` N' (n - 6, n), ``reflections`` (6, n) the Householder vectors that make
+    N, ``torque_map`` (n - 6, m + n - 6) and ``torque_rest`` (n - 6,) the torques as an affine function of f and e.
     """
 
     factor: Array2D
     base: Array2D
-    wanted: Array1D
-    shape: Array2D
-    lever: Array2D
-    pull: Array1D
-    response: Array2D
-    rest: Array1D
-    price: Array1D
-    free: Array2D
-    mirrors: Array2D
+    y: Array1D
+    R: Array2D
+    K: Array2D
+    k_0: Array1D
+    X_t: Array2D
+    a_0: Array1D
+    multiplier: Array1D
+    N_t: Array2D
+    reflections: Array2D
     torque_map: Array2D
     torque_rest: Array1D
 
@@ -79,10 +78,10 @@ def eliminate(
     Args:
         active: the points in stance, of which the first ``count`` are used.
     """
-    factor, wanted, base = reduction.factor, reduction.wanted, reduction.base
-    n = wanted.shape[0]
+    factor, y, base = reduction.factor, reduction.y, reduction.base
+    n = y.shape[0]
     for i in range(n):
-        wanted[i] = 0.0
+        y[i] = 0.0
         for k in range(n):
             factor[i, k] = 0.0
         factor[i, i] = acceleration_weight
@@ -94,48 +93,48 @@ def eliminate(
         for i in range(n):
             value = weight * float(tasks.jacobian[row, i])
             if value != 0.0:
-                wanted[i] = float(wanted[i]) + value * desired
+                y[i] = float(y[i]) + value * desired
                 for k in range(i, n):
                     factor[i, k] = float(factor[i, k]) + value * float(tasks.jacobian[row, k])
     if not factorise(factor, 0.0):
         return False
-    solve_transposed(factor, wanted)
+    solve_transposed(factor, y)
     for k in range(6):
         for i in range(n):
             base[k, i] = terms.mass_matrix[k, i]
         solve_transposed(factor, base[k])
-    shape, pull, lever = reduction.shape, reduction.pull, reduction.lever
+    R, k_0, K = reduction.R, reduction.k_0, reduction.K
     for k in range(6):
         for j in range(k, 6):
             total = 0.0
             for i in range(n):
                 total += float(base[k, i]) * float(base[j, i])
-            shape[k, j] = total
+            R[k, j] = total
         total = float(terms.nonlinear[k])
         for i in range(n):
-            total += float(base[k, i]) * float(wanted[i])
-        pull[k] = total
+            total += float(base[k, i]) * float(y[i])
+        k_0[k] = total
         for j in range(count):
             for axis in range(3):
-                lever[k, 3 * j + axis] = terms.jacobian[active[j], axis, k]
-    if not factorise(shape, 0.0):
+                K[k, 3 * j + axis] = terms.jacobian[active[j], axis, k]
+    if not factorise(R, 0.0):
         return False
-    solve_transposed(shape, pull)
-    solve_rows_transposed(shape, 3 * count, lever)
-    response, rest = reduction.response, reduction.rest
+    solve_transposed(R, k_0)
+    solve_rows_transposed(R, 3 * count, K)
+    X_t, a_0 = reduction.X_t, reduction.a_0
     for k in range(6):
         for i in range(n):
-            response[k, i] = base[k, i]
-    solve_rows_transposed(shape, n, response)
+            X_t[k, i] = base[k, i]
+    solve_rows_transposed(R, n, X_t)
     for k in range(6):
-        solve_upper(factor, response[k])
+        solve_upper(factor, X_t[k])
     for i in range(n):
-        rest[i] = wanted[i]
-    solve_upper(factor, rest)
+        a_0[i] = y[i]
+    solve_upper(factor, a_0)
     for k in range(6):
-        value = float(pull[k])
+        value = float(k_0[k])
         for i in range(n):
-            rest[i] = float(rest[i]) - value * float(response[k, i])
+            a_0[i] = float(a_0[i]) - value * float(X_t[k, i])
     return True
 
 
@@ -149,7 +148,7 @@ def force_program(
     gradient: Array1D,
 ) -> None:
     """The cost in the first ``size`` elements of force and the first ``extra`` elements of e."""
-    lever, pull = reduction.lever, reduction.pull
+    K, k_0 = reduction.K, reduction.k_0
     for i in range(size + extra):
         gradient[i] = 0.0
         for j in range(size + extra):
@@ -157,10 +156,10 @@ def force_program(
         hessian[i, i] = force_weight if i < size else 1.0
     for k in range(6):
         for i in range(size):
-            value = float(lever[k, i])
-            gradient[i] = gradient[i] - value * float(pull[k])
+            value = float(K[k, i])
+            gradient[i] = gradient[i] - value * float(k_0[k])
             for j in range(size):
-                hessian[i, j] = hessian[i, j] + value * float(lever[k, j])
+                hessian[i, j] = hessian[i, j] + value * float(K[k, j])
 
 
 @kernel
@@ -179,19 +178,19 @@ def force_gradient(
     It has no rounding errors along forces that do not move the base, where only w_f decides and
     K'K + w_f 1 has lost most of its digits.
     """
-    size, price = 3 * count, reduction.price
+    size, multiplier = 3 * count, reduction.multiplier
     for k in range(6):
-        total = -float(reduction.pull[k])
+        total = -float(reduction.k_0[k])
         for i in range(size):
-            total += float(reduction.lever[k, i]) * unknowns[i]
-        price[k] = total
-    solve_upper(reduction.shape, price)
+            total += float(reduction.K[k, i]) * unknowns[i]
+        multiplier[k] = total
+    solve_upper(reduction.R, multiplier)
     for j in range(count):
         for axis in range(3):
             i = 3 * j + axis
             total = force_weight * unknowns[i]
             for k in range(6):
-                total += float(terms.jacobian[active[j], axis, k]) * float(price[k])
+                total += float(terms.jacobian[active[j], axis, k]) * float(multiplier[k])
             out[i] = total
     for k in range(size, size + extra):
         out[k] = unknowns[k]
@@ -229,32 +228,32 @@ def friction_rows(
 @kernel
 def free_motions(reduction: Reduction) -> None:
     """Compute N, the accelerations that do not push the base, by reflections (Householder)."""
-    mirrors, free = reduction.mirrors, reduction.free
-    n = reduction.rest.shape[0]
+    reflections, N_t = reduction.reflections, reduction.N_t
+    n = reduction.a_0.shape[0]
     for k in range(6):
         for i in range(n):
-            mirrors[k, i] = reduction.base[k, i]
+            reflections[k, i] = reduction.base[k, i]
     for k in range(6):
         square = 0.0
         for i in range(k, n):
-            square += float(mirrors[k, i]) * float(mirrors[k, i])
-        head = float(mirrors[k, k])
-        mirrors[k, k] = head + math.copysign(math.sqrt(square), head)
-        square += float(mirrors[k, k]) * float(mirrors[k, k]) - head * head
+            square += float(reflections[k, i]) * float(reflections[k, i])
+        head = float(reflections[k, k])
+        reflections[k, k] = head + math.copysign(math.sqrt(square), head)
+        square += float(reflections[k, k]) * float(reflections[k, k]) - head * head
         scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
         for i in range(k):
-            mirrors[k, i] = 0.0
+            reflections[k, i] = 0.0
         for i in range(k, n):
-            mirrors[k, i] = float(mirrors[k, i]) * scale
+            reflections[k, i] = float(reflections[k, i]) * scale
         for other in range(k + 1, 6):
-            reflect(mirrors[k], mirrors[other])
+            reflect(reflections[k], reflections[other])
     for j in range(n - 6):
         for i in range(n):
-            free[j, i] = 0.0
-        free[j, 6 + j] = 1.0
+            N_t[j, i] = 0.0
+        N_t[j, 6 + j] = 1.0
         for k in range(5, -1, -1):
-            reflect(mirrors[k], free[j])
-        solve_upper(reduction.factor, free[j])
+            reflect(reflections[k], N_t[j])
+        solve_upper(reduction.factor, N_t[j])
 
 
 @kernel
@@ -283,43 +282,43 @@ def torque_rows(
     Args:
         transmission: from joint torques to those that are limited, (n_joints, n_joints).
     """
-    response, lever, free = reduction.response, reduction.lever, reduction.free
+    X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
-    joints, n, size = torque_rest.shape[0], reduction.rest.shape[0], 3 * count
+    joints, n, size = torque_rest.shape[0], reduction.a_0.shape[0], 3 * count
     for j in range(joints):
-        rest = float(terms.nonlinear[6 + j])
+        torque = float(terms.nonlinear[6 + j])
         for i in range(n):
-            rest += float(terms.mass_matrix[6 + j, i]) * float(reduction.rest[i])
-        torque_rest[j] = rest
+            torque += float(terms.mass_matrix[6 + j, i]) * float(reduction.a_0[i])
+        torque_rest[j] = torque
         for point in range(count):
             for axis in range(3):
                 torque_map[j, 3 * point + axis] = -terms.jacobian[active[point], axis, 6 + j]
         for k in range(6):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(response[k, i])
+                total += float(terms.mass_matrix[6 + j, i]) * float(X_t[k, i])
             for i in range(size):
-                torque_map[j, i] = float(torque_map[j, i]) + total * float(lever[k, i])
+                torque_map[j, i] = float(torque_map[j, i]) + total * float(K[k, i])
         for k in range(joints):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(free[k, i])
+                total += float(terms.mass_matrix[6 + j, i]) * float(N_t[k, i])
             torque_map[j, size + k] = total
     for motor in range(joints):
         high, low = first + motor, first + joints + motor
         for i in range(size + joints):
             matrix[high, i] = 0.0
-        rest = 0.0
+        torque = 0.0
         for j in range(joints):
             share = transmission[motor, j]
             if share != 0.0:
-                rest += share * float(torque_rest[j])
+                torque += share * float(torque_rest[j])
                 for i in range(size + joints):
                     matrix[high, i] = matrix[high, i] + share * float(torque_map[j, i])
         for i in range(size + joints):
             matrix[low, i] = -matrix[high, i]
-        bound[high] = float(bounds.upper[motor]) - rest
-        bound[low] = rest - float(bounds.lower[motor])
+        bound[high] = float(bounds.upper[motor]) - torque
+        bound[low] = torque - float(bounds.lower[motor])
     return int(first + 2 * joints)
 
 
@@ -342,19 +341,19 @@ def recover_acceleration(
     reduction: Reduction, size: int, extra: int, unknowns: Array1D, out: Array1D
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
-    response, lever, free = reduction.response, reduction.lever, reduction.free
+    X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
     for i in range(out.shape[0]):
-        out[i] = reduction.rest[i]
+        out[i] = reduction.a_0[i]
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += float(lever[k, i]) * unknowns[i]
+            value += float(K[k, i]) * unknowns[i]
         for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(response[k, i])
+            out[i] = out[i] + value * float(X_t[k, i])
     for k in range(extra):
         value = unknowns[size + k]
         for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(free[k, i])
+            out[i] = out[i] + value * float(N_t[k, i])
 
 
 @kernel

@@ -24,7 +24,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from ...planner.library.shipped import shipped_folder
+from ...planner.library.library import shipped_folder
 from ...robots.description import find_robot
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell

@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from ...planner.checking.validity import InvalidPlanError
-from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.library.shipped import shipped_folder
-from ...planner.solving.bounded import cpu_time
-from ...planner.task.errors import PlanError
+from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError
 from ...planner.task.read_task import read_task
 from ...planner.task.task import JumpTask
 from ...robots.description import find_robot

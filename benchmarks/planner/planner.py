@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...planner.checking.validity import check_plan
-from ...planner.solving.bounded import cpu_time
 from ...planner.solving.solve import solve_jump
-from ...planner.task.errors import PlanError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot
 from ..jumps.random_tasks import random_rows

@@ -7,8 +7,8 @@ from typing import Any
 
 from ...planner.checking.validity import InvalidPlanError, check_plan
 from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.solving.bounded import cpu_time
-from ...planner.task.errors import PlanError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError
 from ...planner.task.read_task import read_task
 from ...planner.task.task import make_task
 from ...robots.description import find_robot

@@ -22,7 +22,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import (
-    hasten,
+    apply_lead,
     heading_matrix,
     keep_within,
     landing_place,
@@ -213,7 +213,7 @@ def aim_feet(
                 rate / reach, place, speed,
             )  # fmt: skip
             if law.predicts:
-                hasten(memory.swing[foot], lead * share, lead * rate / reach, place, speed)
+                apply_lead(memory.swing[foot], lead * share, lead * rate / reach, place, speed)
             place[2] = float(place[2]) + lift
             speed[2] = float(speed[2]) + lift_rate
             for k in range(3):

@@ -6,16 +6,39 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...robots.description import RobotDescription
-from ..task.errors import PlanError
+from ..task.files import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
-from .shipped import shipped_folder
+
+
+def shipped_folder() -> Path:
+    """The folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
+    return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
+
+
+def find_task(name: str, *folders: Path) -> Path:
+    """The task's file of that name in the first folder that has it, or among the shipped graphs.
+
+    Raises:
+        LookupError: there is none.
+    """
+    for folder in (*folders, shipped_folder()):
+        if (folder / name).is_file():
+            return folder / name
+    raise LookupError(f"there is no task {name!r} beside the graph or among the shipped ones")
+
+
+def shipped_tasks() -> list[str]:
+    """The shipped tasks by the names that graphs give them, such as ``tasks/in_situ.yaml``."""
+    return sorted(f"tasks/{path.name}" for path in (shipped_folder() / "tasks").glob("*.yaml"))
+
 
 SHIPPED = shipped_folder() / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""
@@ -342,8 +365,8 @@ def solve_and_check(
         TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
     from ..checking.validity import checked, require_valid
-    from ..solving.refinement import ROUNDS, curable
-    from ..task.task_checks import require_consistent
+    from ..solving.solve import ROUNDS, curable
+    from ..task.read_task import require_consistent
 
     require_consistent(task, robot)
     make = solve or solve_task

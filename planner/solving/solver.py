@@ -12,8 +12,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly
-from .bounded import cpu_time
-from .solver_process import call_bounded, call_solver, quiet
+from .solver_process import call_bounded, call_solver, cpu_time, quiet
 
 VIOLATION = 1e-6
 """What a solution may violate a constraint by, in the constraint's unit."""

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
+from .files import write_whole
 from .task import JumpTask, TaskError, make_task
-from .whole_file import write_whole
 
 FILE_FORMAT = "aloft jump plan 1"
 

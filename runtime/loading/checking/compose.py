@@ -22,7 +22,7 @@ from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import Entry, MapNode, text_of
 from ..reading.selection import Selection, runs, select
 from .block_check import Draft
-from .inserted import Piece, gather_block_type, part_signal, read_values
+from .inserted import StageFunction, gather_block_type, part_signal, read_values
 from .wire_check import WireCheck
 
 JOINTS = "n_joints"
@@ -79,7 +79,7 @@ class _Composer:
         self.signal: type[Signal] = self.reader.inputs[self.name].signal
         self.inputs: dict[str, type[Signal]] = {}
         self.wires: dict[str, FlatWire] = {}
-        self.pieces: list[Piece] = []
+        self.pieces: list[StageFunction] = []
         self.fields: dict[str, tuple[tuple[int, ...], str]] = {}
         self.said = said(replace(self.wire, delay=0, truth=False).plain())
 
@@ -166,7 +166,7 @@ class _Composer:
                 values = self._numbers(name, field, item)
                 if values is None:
                     return
-                self.pieces.append(Piece(name, numbers=values, start=start))
+                self.pieces.append(StageFunction(name, numbers=values, start=start))
                 shape, count = (len(values),), len(values)
             else:
                 taken = self._source(item)
@@ -175,7 +175,7 @@ class _Composer:
                 port, source, places = taken
                 types.setdefault(source.dtype_name, item)
                 copies = tuple((a, start + b, n) for a, b, n in runs(places))
-                self.pieces.append(Piece(name, port, source.name, copies))
+                self.pieces.append(StageFunction(name, port, source.name, copies))
                 shape, count = places.shape, int(places.size)
             start += count
         if len(types) > 1:

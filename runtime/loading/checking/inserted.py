@@ -30,7 +30,7 @@ from .block_check import Draft
 
 
 @dataclass(frozen=True)
-class Piece:
+class StageFunction:
     """Some elements of one source, or numbers, and where they go in the field ``target``.
 
     ``copies`` are stretches (first in the source, first in the target, length), both in row order.
@@ -52,7 +52,7 @@ class Gather(Block):
     """
 
     Params = Parameters
-    pieces: ClassVar[tuple[Piece, ...]] = ()
+    pieces: ClassVar[tuple[StageFunction, ...]] = ()
     wanted: ClassVar[Mapping[str, Quantity | None]] = {}
     """What the reader's fields are; ``None`` for one that takes any."""
 
@@ -104,7 +104,7 @@ class Gather(Block):
 
 
 def gather_block_type(
-    pieces: tuple[Piece, ...],
+    pieces: tuple[StageFunction, ...],
     inputs: Mapping[str, type[Signal]],
     output: type[Signal],
     wanted: Mapping[str, Quantity | None],

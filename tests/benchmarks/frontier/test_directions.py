@@ -5,7 +5,7 @@ import math
 import pytest
 
 from aloft.benchmarks.frontier.directions import DIRECTIONS, GOALS, Direction
-from aloft.planner.task.task_checks import require_consistent
+from aloft.planner.task.read_task import require_consistent
 from aloft.robots.description import find_robot
 
 BY_NAME = {direction.name: direction for direction in DIRECTIONS}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.planner.checking.clearance import (
+from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
     ground_height,
