@@ -37,7 +37,7 @@ def plan():
 
 def test_the_same_plan_is_checked_once_and_a_changed_one_again(plan, monkeypatch):
     checked = []
-    monkeypatch.setattr(once, "_valid", once.Kept())
+    monkeypatch.setattr(once, "_valid", once.ResultCache())
     monkeypatch.setattr(once, "require_valid", lambda plan, robot: checked.append(plan))
     once.require_valid_once(plan, ROBOT)
     once.require_valid_once(replace(plan, com=plan.com.copy()), ROBOT)
@@ -63,7 +63,7 @@ def test_tables_are_shared_by_what_they_are_made_from(plan):
 
 
 def test_only_the_results_used_last_are_kept():
-    kept = once.Kept[int]()
+    kept = once.ResultCache[int]()
     for key in range(once.KEPT + 1):
         kept.get(key, lambda key=key: key)
     assert kept.get(0, lambda: -1) == -1
@@ -74,9 +74,9 @@ def test_only_the_results_used_last_are_kept():
 def test_a_later_process_finds_the_very_table(task, monkeypatch):
     plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))
     made = reference_table(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.Kept())
+    monkeypatch.setattr(once, "_tables", once.ResultCache())
     once.reference_table_once(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.Kept())
+    monkeypatch.setattr(once, "_tables", once.ResultCache())
     monkeypatch.setattr(once, "reference_table", None)  # not needed any more
     found = once.reference_table_once(plan, ROBOT, 0.2)
     assert {**vars(found), "time": 0, "columns": 0, "contact": 0} == {
