@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .agreement.agreement import agreement
+from .agreement import agreement
 from .driver import driver
 from .frontier.frontier import frontier
 from .jumps.jumps import jumps
@@ -22,7 +22,7 @@ from .links.links import links
 from .planner.planner import planner
 from .recorder import recorder
 from .rows import Row
-from .scheduler.scheduler import scheduler
+from .scheduler import scheduler
 from .startup import startup
 from .tick.tick import tick
 

@@ -35,8 +35,7 @@ from ..hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from ..mathematics.compiling.compile_calls import compile_calls
 from ..mathematics.compiling.kernel_call import collect_calls
 from ..robots.description import find_robot
-from .other_process import other_process
-from .rows import Row, compare, take_turns
+from .rows import Row, compare, other_process, take_turns
 
 GOAL = 300.0
 """The most processor time that a good driver takes for a cycle [us]: at 1 kHz less than a third of a

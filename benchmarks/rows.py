@@ -1,11 +1,16 @@
-"""The rows that benchmarks return, and the measurement of cases that take turns."""
+"""The rows that benchmarks return, the measurement of cases in turns, and processes that take part."""
 
 from __future__ import annotations
 
+import json
+import signal
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,3 +81,36 @@ def compare(
     p10, p50, p90 = (float(value) for value in np.percentile(ratios, (10, 50, 90)))
     value = float(np.median(times[name]))
     return Row(name, value, "us/tick", peer, p50, goal, p10, p90, note, floor)
+
+
+class OtherProcess:
+    """The near end of such a process, which reads lines and answers each by one line of JSON."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdin is not None and process.stdout is not None
+        self._process = process
+        self._said: IO[str] = process.stdin
+        self._heard: IO[str] = process.stdout
+
+    def ask(self, line: str) -> Any:
+        """Say a line, and wait for what is answered."""
+        self._said.write(f"{line}\n")
+        self._said.flush()
+        return json.loads(self._heard.readline())
+
+    def freeze(self) -> None:
+        """Stop the process where it is, as if its machine were gone."""
+        self._process.send_signal(signal.SIGSTOP)
+
+
+@contextmanager
+def other_process(code: str) -> Iterator[OtherProcess]:
+    """A process that runs Python code, and is killed in the end."""
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield OtherProcess(process)
+        finally:
+            process.kill()

@@ -30,6 +30,6 @@ def main() -> None:
 def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     """The command line with those verbs, or with all; the files of others are not imported."""
     from .app import VERBS
-    from .app import make_app as put_together
+    from .app import make_app as resolve_composite_wires
 
-    return put_together(VERBS if verbs is None else verbs)
+    return resolve_composite_wires(VERBS if verbs is None else verbs)

@@ -164,12 +164,12 @@ def serve_running(
     Raises:
         AloftError: it does not run.
     """
-    from .shared.live import Elsewhere, open_live_run, serve_live
+    from .shared.live import RemoteRunAddress, open_live_run, serve_live
 
     if graph is not None and graph.suffix not in (".yaml", ".yml"):
         raise AloftError(f"--live is for a graph that is running; {graph} is none")
-    elsewhere = None if graph is None else Elsewhere(graph, overrides, keys, name, local)
-    serve_live(open_live_run(running, elsewhere))
+    remote = None if graph is None else RemoteRunAddress(graph, overrides, keys, name, local)
+    serve_live(open_live_run(running, remote))
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:

@@ -118,14 +118,14 @@ def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> d
             contradict each other.
     """
     found: dict[str, float] = {}
-    said: dict[str, str] = {}
+    option_of: dict[str, str] = {}
     for name, text in lengths.items():
         if not text:
             continue
         field, sign = FIELDS[name]
-        if field in said:
-            raise AloftError(f"--{said[field]} and --{name} contradict each other: give one")
-        said[field] = name
+        if field in option_of:
+            raise AloftError(f"--{option_of[field]} and --{name} contradict each other: give one")
+        option_of[field] = name
         found[field] = sign * quantity(name, text, "m", "20cm")
         check_limits(name, text, field, found[field], "m")
     if turn:
@@ -167,12 +167,12 @@ def check_limits(name: str, text: str, field: str, value: float, unit: str) -> N
     from ..planner.task.task import JumpTask
 
     for limit in JumpTask.model_fields[field].metadata:
-        most, least = getattr(limit, "le", None), getattr(limit, "ge", None)
-        if (most is not None and value > most) or (least is not None and value < least):
-            edge = abs(most if most is not None and value > most else least)
+        most, least = getattr(limit, "le", math.inf), getattr(limit, "ge", -math.inf)
+        if not least <= value <= most:
+            edge = abs(most if value > most else least)
             shown = f"{math.degrees(edge):.0f} deg" if unit == "rad" else f"{edge:g} {unit}"
             raise AloftError(f"--{name} {text}: no jump is planned beyond {shown}")
-        if getattr(limit, "gt", None) is not None and value <= limit.gt:
+        if value <= getattr(limit, "gt", -math.inf):
             raise AloftError(f"--{name} {text}: it must be more than {limit.gt:g} {unit}")
 
 

@@ -16,7 +16,7 @@ from .shared.output import (
     errors_reported,
     print_warning,
 )
-from .shared.run_graph import Runs, run_many, run_once
+from .shared.run_graph import RunnableGraph, run_many, run_once
 
 if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
@@ -119,38 +119,38 @@ def run(
             raise AloftError("choose one of --machine, --local and --seeds")
         if keys is not None and not (machine or local):
             raise AloftError("--keys is for links between machines: --machine NAME, or --local")
-        wishes_of_thread = RealTimeOptions(cpu, priority, lock_memory)
-        if wishes_of_thread != NO_REAL_TIME and (seeds or local):
+        thread_options = RealTimeOptions(cpu, priority, lock_memory)
+        if thread_options != NO_REAL_TIME and (seeds or local):
             raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
         if local:
-            from .shared.run_machines import Wishes, run_local
+            from .shared.run_machines import RunOptions, run_local
 
             place = None if no_record else record
-            wishes = Wishes(
+            options = RunOptions(
                 settings, place, not no_record, params, as_json, traceback, plain, keys, fuse
             )
-            code = run_local(graph, wishes, out)
+            code = run_local(graph, options, out)
         elif seeds:
             code = run_many(
                 graph, settings, parse_seeds(seeds), out, as_json, plain=plain, fuse=fuse
             )
         else:
-            loaded: Runs = load(graph, settings)
+            loaded: RunnableGraph = load(graph, settings)
             name = loaded.checked.name
             if machine:
-                from .shared.run_machines import Part
+                from .shared.run_machines import MachineRun
 
-                loaded, name = Part(loaded.checked, machine, keys), f"{name}-{machine}"
+                loaded, name = MachineRun(loaded.checked, machine, keys), f"{name}-{machine}"
             default = Path("recordings") / f"{name}.rrd"
             endpoint = open_endpoint(loaded, params, name)
             sinks = [endpoint] if endpoint is not None else []
             place = None if no_record else record or default
-            said: list[str] = []
-            viewer = open_viewer(rerun, said)
+            messages: list[str] = []
+            viewer = open_viewer(rerun, messages)
             code = run_once(
                 loaded, place, out, as_json, sinks, viewer,
-                keep=keep, split=split_time(split), said=said, traceback=traceback, plain=plain,
-                fuse=fuse, real_time=wishes_of_thread,
+                keep=keep, split=split_time(split), messages=messages, traceback=traceback, plain=plain,
+                fuse=fuse, real_time=thread_options,
             )  # fmt: skip
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
@@ -173,8 +173,8 @@ def split_time(text: str) -> float:
     return found
 
 
-def open_viewer(live: Live, said: list[str]) -> Viewer | None:
-    """Open the viewer that shows the run. Without a viewer the run is not shown, and ``said`` gets
+def open_viewer(live: Live, messages: list[str]) -> Viewer | None:
+    """Open the viewer that shows the run. Without a viewer the run is not shown, and ``messages`` gets
     the reason."""
     from ..logs.viewing.viewer import ViewerError, start_viewer
     from .shared.viewing import open_page
@@ -184,8 +184,8 @@ def open_viewer(live: Live, said: list[str]) -> Viewer | None:
     try:
         viewer = start_viewer("web" if live is Live.WEB else "window")
     except ViewerError as error:
-        said.append(f"the run is not shown: {error}")
-        print_warning(said[-1])
+        messages.append(f"the run is not shown: {error}")
+        print_warning(messages[-1])
         return None
     if live is Live.WEB:
         typer.echo(f"live view: {viewer.page}", err=True)
@@ -199,13 +199,13 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
     if viewer.kind != "web":
         return
-    if wait and viewer.lives():
+    if wait and viewer.is_alive():
         keep_open(viewer)
     else:
         viewer.stop()
 
 
-def open_endpoint(graph: Runs, name: str, default: str) -> ParameterEndpoint | None:
+def open_endpoint(graph: RunnableGraph, name: str, default: str) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
     from .shared import running_graphs
 

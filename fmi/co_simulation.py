@@ -2,15 +2,182 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Input, Output
-from ..runtime.language.parameters import Parameters
-from .description import Description, Variable, describe, signals
-from .unit_block import FmuParameters, UnitBlock
+from ..runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ..runtime.language.errors import BlockError
+from ..runtime.language.parameters import Parameters, parameter
+from ..runtime.language.signals import Field, Signal
+from .description import Description, Variable, describe, nearest, signals
+from .instance import Instance
+
+_ROOM = 4096
+"""Bytes by which an FMU's state may grow, beside a half of what it is at first."""
+
+
+class Remembered(Signal):
+    """The state of an FMU."""
+
+    length = Field(dtype="int64", text="bytes of the state; zero where the FMU cannot give it")
+    steps = Field(dtype="int64", text="steps since the FMU was initialised")
+    data = Field(
+        "fmu_state", dtype="int64", text="the state as the FMU writes it, eight bytes each"
+    )
+
+
+class FmuParameters(Parameters):
+    """Which FMU to run, and how."""
+
+    file: str = parameter(text="the FMU, relative to the graph's folder")
+    start: dict[str, float | int | bool | str | list[float]] = parameter(
+        {}, text="values of parameters, and of inputs that are not wired, by the FMU's names"
+    )
+    outputs: list[str] = parameter(
+        [], text="the variables to read, by the FMU's names; none: all of its outputs"
+    )
+    feedthrough: bool | None = parameter(
+        None,
+        text="whether outputs may depend on inputs at the same instant; by default as the FMU says",
+    )
+
+
+class UnitBlock(Block):
+    """A block whose ports are those of an FMU."""
+
+    Params = FmuParameters
+    params: FmuParameters
+    memory = State(Remembered, text="what the FMU remembers")
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Report start values that the FMU does not have."""
+        assert isinstance(params, FmuParameters)
+        try:
+            found = describe(params.file, context.folder, params.outputs)
+        except BlockError as error:
+            yield Misfit(str(error), "file")
+            return
+        for name in params.start:
+            if name not in found.settable:
+                yield Misfit(
+                    f"{params.file} has no variable {name!r} that can be given a start value"
+                    + nearest(name, found.settable),
+                    f"start.{name}",
+                )
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """A mass on a spring, made for this process."""
+        from .example import example_fmu
+
+        return {"file": str(example_fmu())}
+
+    @classmethod
+    def state_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """The numbers that hold the FMU's state; an instance has to say how large that is."""
+        assert isinstance(params, FmuParameters)
+        if not cls.described.kept:
+            return {"fmu_state": 1}
+        instance = Instance(cls.described, params.start, 0.0)
+        try:
+            size = len(instance.state())
+        finally:
+            instance.close()
+        return {"fmu_state": (size + size // 2 + _ROOM) // 8}
+
+    described: ClassVar[Description]
+
+    def setup(self) -> None:
+        """Load the FMU, and bind its variables to the ports."""
+        self._instance: Instance | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Load the FMU anew, as it is before its first step."""
+        if self._instance is not None:
+            self._instance.close()
+        made = Instance(
+            self.described,
+            self.params.start,
+            self.context.offset_ticks * self.context.clock.base_period,
+        )
+        self._instance = made
+        ports = {name: getattr(self, name) for name in (*self.inputs, *self.outputs)}
+        wired = [each for each in self.described.inputs if each.port in self.context.wired]
+        self._write = made.writer(wired, ports)
+        self._read = made.reader(self.described.outputs, ports)
+
+    def _go_on(self) -> None:
+        """Let the FMU step over one period, from now on."""
+        assert self._instance is not None
+        if self._instance.step(self.time, self.period):
+            self.request_stop(f"the FMU {self.params.file} asks for the end of the simulation")
+        self.memory.steps[()] += 1
+
+    def freeze(self) -> None:
+        """Write the FMU's state into the block's own, where the FMU can give it."""
+        if not self.described.kept or self._instance is None:
+            return
+        state = self._instance.state()
+        room = self.memory.data.nbytes
+        if len(state) > room:
+            raise BlockError(
+                f"the state of {self.params.file} has grown to {len(state)} bytes, and the block "
+                f"keeps at most {room}: this run has no snapshot"
+            )
+        self.memory.length[()] = len(state)
+        self.memory.data[...] = 0
+        self.memory.data.view(np.uint8)[: len(state)] = np.frombuffer(state, np.uint8)
+
+    def thaw(self) -> None:
+        """Give the FMU its state back.
+
+        Raises:
+            BlockError: the FMU cannot take it; only its beginning can be gone back to.
+        """
+        assert self._instance is not None
+        if self.described.kept and self.memory.length[()]:
+            length = int(self.memory.length[()])
+            self._instance.restore(self.memory.data.view(np.uint8)[:length].tobytes())
+            return
+        if int(self.memory.steps[()]) == 0:
+            self._begin()
+            return
+        raise BlockError(
+            f"{self.params.file} cannot be restored to what it was after "
+            f"{int(self.memory.steps[()])} steps: its model description says that it cannot save "
+            "its state (canSerializeFMUState); only the start of a run can be gone back to"
+        )
+
+    def cautions(self) -> Sequence[str]:
+        """Say if snapshots lack the FMU, and what it has warned of."""
+        said = []
+        if not self.described.kept:
+            said.append(
+                f"the FMU {self.params.file} cannot save its state: a snapshot does not have it, "
+                "and a replay has to begin at the start"
+            )
+        said += [
+            f"the model description of the FMU {self.params.file} is not as FMI demands: {problem}"
+            for problem in self.described.problems[:3]
+        ]
+        if self._instance is not None:
+            said += [f"the FMU {self.params.file} warns: {w}" for w in self._instance.warnings]
+        return said
+
+    def close(self) -> None:
+        """Terminate the FMU."""
+        if self._instance is not None:
+            self._instance.close()
+            self._instance = None
 
 
 class CoSimulation(UnitBlock):
@@ -40,7 +207,11 @@ class CoSimulation(UnitBlock):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class with the ports of the FMU."""
         assert isinstance(params, FmuParameters)

@@ -189,23 +189,23 @@ def make_goals(
     """The goals of all drives for the command in a row of ``targets``: see the module."""
     stiffness, damping = targets.stiffness[row], targets.damping[row]
     for k in range(errors.torque.shape[0]):
-        position = float(targets.position[row, k]) - float(measured.joint_position[k])
-        velocity = float(targets.velocity[row, k]) - float(measured.joint_velocity[k])
+        position = targets.position[row, k] - measured.joint_position[k]
+        velocity = targets.velocity[row, k] - measured.joint_velocity[k]
         errors.position[k], errors.velocity[k] = position, velocity
-        requested = position * float(stiffness[k]) + float(targets.torque[row, k])
-        errors.torque[k] = requested + velocity * float(damping[k])
+        requested = position * stiffness[k] + targets.torque[row, k]
+        errors.torque[k] = requested + velocity * damping[k]
     multiply_vector(gears.torque_to_motor, errors.torque, goals.torque)
     multiply_vector(gears.to_motor, errors.position, goals.position)
     multiply_vector(gears.to_motor, errors.velocity, goals.velocity)
     for k in range(errors.torque.shape[0]):
-        angle, speed = float(measured.position[k]), float(measured.velocity[k])
+        angle, speed = measured.position[k], measured.velocity[k]
         share = smallest_share(gears, k, stiffness, gears.stiffness)
-        error = float(goals.position[k]) * share
+        error = goals.position[k] * share
         # Where the drive follows the target by itself, its goal needs no lead.
         goals.position[k] = error + angle + (1.0 - share) * speed * gears.lead
-        torque = float(goals.torque[k]) - error * float(gears.motor_stiffness[k])
-        error = float(goals.velocity[k]) * smallest_share(gears, k, damping, gears.damping)
-        goals.torque[k] = torque - error * float(gears.motor_damping[k])
+        torque = goals.torque[k] - error * gears.motor_stiffness[k]
+        error = goals.velocity[k] * smallest_share(gears, k, damping, gears.damping)
+        goals.torque[k] = torque - error * gears.motor_damping[k]
         goals.velocity[k] = error + speed
 
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 from ..blocks.signals import (
     ContactSwitches,
@@ -18,10 +18,6 @@ from ..blocks.signals import (
 )
 from ..blocks.signals.drive_conditions import HEALTHY
 from ..mathematics.arrays import (
-    Array0D,
-    Array1D,
-    Flags0D,
-    Indices0D,
     Indices1D,
 )
 from ..mathematics.compiling.kernel_call import KernelCall
@@ -31,31 +27,14 @@ from ..runtime.language.block import Block, Context, Input, Output, Port
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters
 from ..runtime.language.signals import Signal
+from ..runtime.language.steps import as_record
 from .sensors.sensor import MountedSensor, mounted_sensors
 
 _DRIVING = int(DrivePhase.DRIVING)
 
 
-class HealthFields(NamedTuple):
-    """The fields of ``RobotHealth``, for kernels."""
-
-    state: Indices0D
-    voltage: Array1D
-    temperature: Array1D
-    current: Array1D
-    condition: Indices1D
-    age: Array1D
-    imu_age: Array0D
-    stamp: Array0D
-    joints_valid: Flags0D
-    imu_valid: Flags0D
-    contacts_valid: Flags0D
-    late_cycles: Indices0D
-    lost_answers: Indices0D
-
-
 @kernel
-def report_healthy(tick: Indices1D, base_period: float, health: HealthFields) -> None:
+def report_healthy(tick: Indices1D, base_period: float, health: RobotHealth) -> None:
     """Report healthy drives and sensors in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
     health.state[()] = _DRIVING
     for k in range(health.condition.shape[0]):
@@ -122,7 +101,11 @@ class Robot(Block, ABC):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class with an output for every sensor that the robot's description mounts."""
         sensors = mounted_sensors(robot, folder)
@@ -222,8 +205,7 @@ class Robot(Block, ABC):
     def reporting(self) -> KernelCall:
         """Writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
-        health = HealthFields(*(getattr(self.health, name) for name in HealthFields._fields))
-        return KernelCall(report_healthy, clock.present, clock.base_period, health)
+        return KernelCall(report_healthy, clock.present, clock.base_period, as_record(self.health))
 
     @abstractmethod
     def write(self) -> None:

@@ -89,10 +89,9 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
     for i in range(m):
         square = 0.0
         for k in range(n):
-            square += float(program.matrix[i, k]) * float(program.matrix[i, k])
+            square += program.matrix[i, k] * program.matrix[i, k]
         memory.size[i] = math.sqrt(square)
-    for i in range(memory.is_active.shape[0]):
-        memory.is_active[i] = False
+    memory.is_active[:] = False
     return int(fulfil(n, m, 0, program, memory, x)[0])
 
 
@@ -122,11 +121,11 @@ def fulfil(
             full = dual < 0.0 or 0.0 <= primal <= dual
             length = primal if full else dual
             for j in range(count):
-                memory.multipliers[j] -= length * float(memory.exchange[j])
+                memory.multipliers[j] -= length * memory.exchange[j]
             price += length
             if primal >= 0.0:
                 for i in range(n):
-                    x[i] += length * float(memory.step[i])
+                    x[i] += length * memory.step[i]
             if full:
                 memory.multipliers[count] = price
                 add_constraint(n, count, new, memory)
@@ -147,36 +146,36 @@ def start_unconstrained(n: int, program: Program, memory: ActiveSetMemory, x: Ar
     """
     lower, inverse = memory.triangle, memory.inverse
     for j in range(n):
-        pivot = float(program.hessian[j, j])
+        pivot = program.hessian[j, j]
         for k in range(j):
-            pivot -= float(lower[j, k]) * float(lower[j, k])
+            pivot -= lower[j, k] * lower[j, k]
         if not 0.0 < pivot < math.inf:
             return False
         root = math.sqrt(pivot)
         lower[j, j] = root
         for i in range(j + 1, n):
-            total = float(program.hessian[i, j])
+            total = program.hessian[i, j]
             for k in range(j):
-                total -= float(lower[i, k]) * float(lower[j, k])
+                total -= lower[i, k] * lower[j, k]
             lower[i, j] = total / root
     for j in range(n):  # column j of L^-1 is row j of J's transpose
         for i in range(n):
             inverse[j, i] = 0.0
-        inverse[j, j] = 1.0 / float(lower[j, j])
+        inverse[j, j] = 1.0 / lower[j, j]
         for i in range(j + 1, n):
             total = 0.0
             for k in range(j, i):
-                total -= float(lower[i, k]) * float(inverse[j, k])
-            inverse[j, i] = total / float(lower[i, i])
+                total -= lower[i, k] * inverse[j, k]
+            inverse[j, i] = total / lower[i, i]
     for i in range(n):
         total = 0.0
         for k in range(n):
-            total += float(inverse[k, i]) * float(program.gradient[k])
+            total += inverse[k, i] * program.gradient[k]
         memory.along[i] = total
     for i in range(n):
         total = 0.0
         for k in range(n):
-            total -= float(inverse[i, k]) * float(memory.along[k])
+            total -= inverse[i, k] * memory.along[k]
         x[i] = total
         if not abs(total) < math.inf:
             return False
@@ -200,12 +199,12 @@ def polish(n: int, gradient: Array1D, memory: ActiveSetMemory, x: Array1D) -> No
     for j in range(count, n):
         value = 0.0
         for k in range(n):
-            value += float(memory.inverse[k, j]) * gradient[k]
+            value += memory.inverse[k, j] * gradient[k]
         memory.along[j] = value
     for i in range(n):
         value = 0.0
         for j in range(count, n):
-            value += float(memory.inverse[i, j]) * float(memory.along[j])
+            value += memory.inverse[i, j] * memory.along[j]
         x[i] = x[i] - value
 
 
@@ -222,18 +221,18 @@ def recompute_multipliers(n: int, count: int, gradient: Array1D, memory: ActiveS
     for j in range(count - 1, -1, -1):
         value = 0.0
         for k in range(n):
-            value += float(memory.inverse[k, j]) * gradient[k]
+            value += memory.inverse[k, j] * gradient[k]
         for k in range(j + 1, count):
-            value -= float(memory.triangle[j, k]) * float(memory.multipliers[k])
-        memory.multipliers[j] = value / float(memory.triangle[j, j])
+            value -= memory.triangle[j, k] * memory.multipliers[k]
+        memory.multipliers[j] = value / memory.triangle[j, j]
 
 
 @kernel
 def violation(n: int, program: Program, row: int, x: Array1D) -> float:
     """By how much x violates a constraint; negative where it does not."""
-    total = -float(program.bound[row])
+    total = -program.bound[row]
     for k in range(n):
-        total += float(program.matrix[row, k]) * x[k]
+        total += program.matrix[row, k] * x[k]
     return total
 
 
@@ -244,9 +243,9 @@ def most_violated(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
     for i in range(m):
         if memory.is_active[i]:
             continue
-        size = float(memory.size[i])
+        size = memory.size[i]
         excess = violation(n, program, i, x)
-        if excess <= _FEASIBLE * (size + abs(float(program.bound[i]))):
+        if excess <= _FEASIBLE * (size + abs(program.bound[i])):
             continue
         distance = excess / size if size > 0.0 else math.inf
         if distance > largest:
@@ -274,7 +273,7 @@ def find_step(
     for j in range(n):
         value = 0.0
         for k in range(n):
-            value -= float(inverse[k, j]) * float(program.matrix[new, k])
+            value -= inverse[k, j] * program.matrix[new, k]
         along[j] = value
         total += value * value
         if j >= count:
@@ -282,18 +281,18 @@ def find_step(
     for i in range(n):
         value = 0.0
         for j in range(count, n):
-            value += float(inverse[i, j]) * float(along[j])
+            value += inverse[i, j] * along[j]
         memory.step[i] = value
     for j in range(count - 1, -1, -1):
-        value = float(along[j])
+        value = along[j]
         for k in range(j + 1, count):
-            value -= float(memory.triangle[j, k]) * float(memory.exchange[k])
-        memory.exchange[j] = value / float(memory.triangle[j, j])
+            value -= memory.triangle[j, k] * memory.exchange[k]
+        memory.exchange[j] = value / memory.triangle[j, j]
     blocking, dual = -1, -1.0
     for j in range(count):
-        rate = float(memory.exchange[j])
+        rate = memory.exchange[j]
         if rate > 0.0:
-            length = max(float(memory.multipliers[j]), 0.0) / rate
+            length = max(memory.multipliers[j], 0.0) / rate
             if blocking < 0 or length < dual:
                 blocking, dual = j, length
     primal = excess / free if free > _DEPENDENT * _DEPENDENT * total else -1.0
@@ -305,14 +304,14 @@ def add_constraint(n: int, count: int, new: int, memory: ActiveSetMemory) -> Non
     """Make a constraint active: rotate J so that its normal's image ends at element ``count``."""
     along, inverse = memory.along, memory.inverse
     for j in range(n - 1, count, -1):
-        a, b = float(along[j - 1]), float(along[j])
+        a, b = along[j - 1], along[j]
         if b == 0.0:
             continue
         size = math.sqrt(a * a + b * b)
         cosine, sine = a / size, b / size
         along[j - 1], along[j] = size, 0.0
         for i in range(n):
-            a, b = float(inverse[i, j - 1]), float(inverse[i, j])
+            a, b = inverse[i, j - 1], inverse[i, j]
             inverse[i, j - 1] = cosine * a + sine * b
             inverse[i, j] = cosine * b - sine * a
     for j in range(count + 1):
@@ -333,18 +332,18 @@ def drop_constraint(n: int, count: int, place: int, memory: ActiveSetMemory) -> 
             triangle[i, j - 1] = triangle[i, j]
     count -= 1
     for j in range(place, count):  # each column has one element too many below the diagonal
-        a, b = float(triangle[j, j]), float(triangle[j + 1, j])
+        a, b = triangle[j, j], triangle[j + 1, j]
         if b == 0.0:
             continue
         size = math.sqrt(a * a + b * b)
         cosine, sine = a / size, b / size
         triangle[j, j], triangle[j + 1, j] = size, 0.0
         for k in range(j + 1, count):
-            a, b = float(triangle[j, k]), float(triangle[j + 1, k])
+            a, b = triangle[j, k], triangle[j + 1, k]
             triangle[j, k] = cosine * a + sine * b
             triangle[j + 1, k] = cosine * b - sine * a
         for i in range(n):
-            a, b = float(inverse[i, j]), float(inverse[i, j + 1])
+            a, b = inverse[i, j], inverse[i, j + 1]
             inverse[i, j] = cosine * a + sine * b
             inverse[i, j + 1] = cosine * b - sine * a
     return count

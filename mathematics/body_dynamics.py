@@ -96,13 +96,13 @@ def turn_about(base: Matrix3, axis: Vector3, angle: float, out: Matrix3) -> None
 def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
     """Where all bodies are at the joints' positions [rad, or m for a slide], (n_joints,)."""
     for k in range(position.shape[0]):
-        carrier = int(tree.parent[k])
+        carrier = tree.parent[k]
         rotation, place, joint = motion.rotation[carrier], motion.place[k + 1], motion.joint[k]
-        x, y, z = float(tree.origin[k, 0]), float(tree.origin[k, 1]), float(tree.origin[k, 2])
-        u, v, w = float(tree.axis[k, 0]), float(tree.axis[k, 1]), float(tree.axis[k, 2])
+        x, y, z = tree.origin[k, 0], tree.origin[k, 1], tree.origin[k, 2]
+        u, v, w = tree.axis[k, 0], tree.axis[k, 1], tree.axis[k, 2]
         for row in range(3):
-            a, b, c = float(rotation[row, 0]), float(rotation[row, 1]), float(rotation[row, 2])
-            place[row] = float(motion.place[carrier, row]) + (a * x + b * y + c * z)
+            a, b, c = rotation[row, 0], rotation[row, 1], rotation[row, 2]
+            place[row] = motion.place[carrier, row] + (a * x + b * y + c * z)
             joint[3 + row] = a * u + b * v + c * w
         angle = position[k]
         if tree.slides[k]:
@@ -110,12 +110,12 @@ def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
                 for column in range(3):
                     motion.rotation[k + 1, row, column] = rotation[row, column]
                 joint[row] = joint[3 + row]
-                place[row] = float(place[row]) + float(joint[row]) * angle
+                place[row] = place[row] + joint[row] * angle
                 joint[3 + row] = 0.0
             continue
         turn_about(rotation, tree.axis[k], angle, motion.rotation[k + 1])
-        x, y, z = float(place[0]), float(place[1]), float(place[2])
-        u, v, w = float(joint[3]), float(joint[4]), float(joint[5])
+        x, y, z = place[0], place[1], place[2]
+        u, v, w = joint[3], joint[4], joint[5]
         joint[0], joint[1], joint[2] = y * w - z * v, z * u - x * w, x * v - y * u
 
 
@@ -127,22 +127,22 @@ def move_bodies(tree: BodyTree, speed: Array1D, motion: BodyMotion) -> None:
     V = V_parent + S q', and as S moves with the parent, A = A_parent + V_parent x S q'.
     """
     for k in range(speed.shape[0]):
-        carrier, rate = int(tree.parent[k]), speed[k]
+        carrier, rate = tree.parent[k], speed[k]
         before, joint = motion.velocity[carrier], motion.joint[k]
-        x, y, z = float(joint[0]) * rate, float(joint[1]) * rate, float(joint[2]) * rate
-        u, v, w = float(joint[3]) * rate, float(joint[4]) * rate, float(joint[5]) * rate
-        a, b, c = float(before[0]), float(before[1]), float(before[2])
-        p, q, r = float(before[3]), float(before[4]), float(before[5])
+        x, y, z = joint[0] * rate, joint[1] * rate, joint[2] * rate
+        u, v, w = joint[3] * rate, joint[4] * rate, joint[5] * rate
+        a, b, c = before[0], before[1], before[2]
+        p, q, r = before[3], before[4], before[5]
         after = motion.velocity[k + 1]
         after[0], after[1], after[2] = a + x, b + y, c + z
         after[3], after[4], after[5] = p + u, q + v, r + w
         before, after = motion.acceleration[carrier], motion.acceleration[k + 1]
-        after[0] = float(before[0]) + ((q * z - r * y) + (b * w - c * v))
-        after[1] = float(before[1]) + ((r * x - p * z) + (c * u - a * w))
-        after[2] = float(before[2]) + ((p * y - q * x) + (a * v - b * u))
-        after[3] = float(before[3]) + (q * w - r * v)
-        after[4] = float(before[4]) + (r * u - p * w)
-        after[5] = float(before[5]) + (p * v - q * u)
+        after[0] = before[0] + ((q * z - r * y) + (b * w - c * v))
+        after[1] = before[1] + ((r * x - p * z) + (c * u - a * w))
+        after[2] = before[2] + ((p * y - q * x) + (a * v - b * u))
+        after[3] = before[3] + (q * w - r * v)
+        after[4] = before[4] + (r * u - p * w)
+        after[5] = before[5] + (p * v - q * u)
 
 
 @kernel
@@ -151,11 +151,11 @@ def place_of(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> Non
     x, y, z = local[0], local[1], local[2]
     for row in range(3):
         turned = (
-            float(motion.rotation[body, row, 0]) * x
-            + float(motion.rotation[body, row, 1]) * y
-            + float(motion.rotation[body, row, 2]) * z
+            motion.rotation[body, row, 0] * x
+            + motion.rotation[body, row, 1] * y
+            + motion.rotation[body, row, 2] * z
         )
-        out[row] = float(motion.place[body, row]) + turned
+        out[row] = motion.place[body, row] + turned
 
 
 @kernel
@@ -163,10 +163,10 @@ def velocity_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> 
     """The velocity (3,) of a body's point at ``place`` (3,) [m/s]: v + w x r."""
     x, y, z = place[0], place[1], place[2]
     spatial = motion.velocity[body]
-    p, q, r = float(spatial[3]), float(spatial[4]), float(spatial[5])
-    out[0] = float(spatial[0]) + (q * z - r * y)
-    out[1] = float(spatial[1]) + (r * x - p * z)
-    out[2] = float(spatial[2]) + (p * y - q * x)
+    p, q, r = spatial[3], spatial[4], spatial[5]
+    out[0] = spatial[0] + (q * z - r * y)
+    out[1] = spatial[1] + (r * x - p * z)
+    out[2] = spatial[2] + (p * y - q * x)
 
 
 @kernel
@@ -176,15 +176,15 @@ def acceleration_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D)
     u, v, w = out[0], out[1], out[2]
     x, y, z = place[0], place[1], place[2]
     p, q, r = (
-        float(motion.velocity[body, 3]),
-        float(motion.velocity[body, 4]),
-        float(motion.velocity[body, 5]),
+        motion.velocity[body, 3],
+        motion.velocity[body, 4],
+        motion.velocity[body, 5],
     )
     spatial = motion.acceleration[body]
-    a, b, c = float(spatial[3]), float(spatial[4]), float(spatial[5])
-    out[0] = float(spatial[0]) + (b * z - c * y) + (q * w - r * v)
-    out[1] = float(spatial[1]) + (c * x - a * z) + (r * u - p * w)
-    out[2] = float(spatial[2]) + (a * y - b * x) + (p * v - q * u)
+    a, b, c = spatial[3], spatial[4], spatial[5]
+    out[0] = spatial[0] + (b * z - c * y) + (q * w - r * v)
+    out[1] = spatial[1] + (c * x - a * z) + (r * u - p * w)
+    out[2] = spatial[2] + (a * y - b * x) + (p * v - q * u)
 
 
 class Inertias(NamedTuple):
@@ -256,15 +256,15 @@ def _product(a: Array2D, b: Array2D, row: int, other: int) -> float:
 def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -> None:
     """The spatial momentum (6,) of a body, with all that it carries, at a spatial velocity (6,)."""
     mass, moment, inertia = (
-        float(inertias.mass[body]),
+        inertias.mass[body],
         inertias.moment[body],
         inertias.inertia[body],
     )
     a, b, c = spatial[0], spatial[1], spatial[2]
     p, q, r = spatial[3], spatial[4], spatial[5]
-    x, y, z = float(moment[0]), float(moment[1]), float(moment[2])
-    xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
-    xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+    x, y, z = moment[0], moment[1], moment[2]
+    xx, yy, zz = inertia[0], inertia[1], inertia[2]
+    xy, xz, yz = inertia[3], inertia[4], inertia[5]
     out[0] = mass * a + (q * z - r * y)
     out[1] = mass * b + (r * x - p * z)
     out[2] = mass * c + (p * y - q * x)
@@ -276,33 +276,33 @@ def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -
 @kernel
 def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
     """A body's own inertia, and the force that gives it its acceleration: f = I a + v x* I v."""
-    mass = float(tree.mass[body])
+    mass = tree.mass[body]
     place_of(motion, body, tree.com[body], own.centre)
-    x, y, z = float(own.centre[0]), float(own.centre[1]), float(own.centre[2])
+    x, y, z = own.centre[0], own.centre[1], own.centre[2]
     own.mass[body] = mass
     own.moment[body, 0], own.moment[body, 1], own.moment[body, 2] = mass * x, mass * y, mass * z
     inertia = own.inertia[body]
     turn_inertia(tree.inertia[body], motion.rotation[body], own.turned, inertia)
-    inertia[0] = float(inertia[0]) + mass * (y * y + z * z)
-    inertia[1] = float(inertia[1]) + mass * (x * x + z * z)
-    inertia[2] = float(inertia[2]) + mass * (x * x + y * y)
-    inertia[3] = float(inertia[3]) - mass * x * y
-    inertia[4] = float(inertia[4]) - mass * x * z
-    inertia[5] = float(inertia[5]) - mass * y * z
+    inertia[0] = inertia[0] + mass * (y * y + z * z)
+    inertia[1] = inertia[1] + mass * (x * x + z * z)
+    inertia[2] = inertia[2] + mass * (x * x + y * y)
+    inertia[3] = inertia[3] - mass * x * y
+    inertia[4] = inertia[4] - mass * x * z
+    inertia[5] = inertia[5] - mass * y * z
     force, spatial = own.force[body], own.spatial
     momentum_of(own, body, motion.acceleration[body], force)
     momentum_of(own, body, motion.velocity[body], spatial)
     velocity = motion.velocity[body]
-    a, b, c = float(velocity[0]), float(velocity[1]), float(velocity[2])
-    p, q, r = float(velocity[3]), float(velocity[4]), float(velocity[5])
-    x, y, z = float(spatial[0]), float(spatial[1]), float(spatial[2])
-    u, v, w = float(spatial[3]), float(spatial[4]), float(spatial[5])
-    force[0] = float(force[0]) + (q * z - r * y)
-    force[1] = float(force[1]) + (r * x - p * z)
-    force[2] = float(force[2]) + (p * y - q * x)
-    force[3] = float(force[3]) + ((q * w - r * v) + (b * z - c * y))
-    force[4] = float(force[4]) + ((r * u - p * w) + (c * x - a * z))
-    force[5] = float(force[5]) + ((p * v - q * u) + (a * y - b * x))
+    a, b, c = velocity[0], velocity[1], velocity[2]
+    p, q, r = velocity[3], velocity[4], velocity[5]
+    x, y, z = spatial[0], spatial[1], spatial[2]
+    u, v, w = spatial[3], spatial[4], spatial[5]
+    force[0] = force[0] + (q * z - r * y)
+    force[1] = force[1] + (r * x - p * z)
+    force[2] = force[2] + (p * y - q * x)
+    force[3] = force[3] + ((q * w - r * v) + (b * z - c * y))
+    force[4] = force[4] + ((r * u - p * w) + (c * x - a * z))
+    force[5] = force[5] + ((p * v - q * u) + (a * y - b * x))
 
 
 @kernel
@@ -312,19 +312,14 @@ def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> Non
     for body in range(n_joints + 1):
         body_inertia_and_wrench(tree, motion, body, composite)
     for joint in range(n_joints - 1, -1, -1):
-        carrier, carried = int(tree.parent[joint]), joint + 1
-        composite.mass[carrier] = float(composite.mass[carrier]) + float(composite.mass[carried])
-        for k in range(3):
-            composite.moment[carrier, k] = float(composite.moment[carrier, k]) + float(
-                composite.moment[carried, k]
-            )
+        carrier, carried = tree.parent[joint], joint + 1
+        composite.mass[carrier] = composite.mass[carrier] + composite.mass[carried]
+        composite.moment[carrier, :] = composite.moment[carrier] + composite.moment[carried]
         for k in range(6):
-            composite.inertia[carrier, k] = float(composite.inertia[carrier, k]) + float(
-                composite.inertia[carried, k]
+            composite.inertia[carrier, k] = (
+                composite.inertia[carrier, k] + composite.inertia[carried, k]
             )
-            composite.force[carrier, k] = float(composite.force[carrier, k]) + float(
-                composite.force[carried, k]
-            )
+            composite.force[carrier, k] = composite.force[carrier, k] + composite.force[carried, k]
 
 
 @kernel
@@ -379,16 +374,16 @@ def write_matrices(
     for k in range(3):
         for row in range(3):
             base[row] = rotation[row, k]
-        a, b, c = float(base[0]), float(base[1]), float(base[2])
+        a, b, c = base[0], base[1], base[2]
         moment, inertia = composite.moment[0], composite.inertia[0]
-        x, y, z = float(moment[0]), float(moment[1]), float(moment[2])
-        mass = float(composite.mass[0])
+        x, y, z = moment[0], moment[1], moment[2]
+        mass = composite.mass[0]
         spatial[0], spatial[1], spatial[2] = mass * a, mass * b, mass * c
         spatial[3], spatial[4], spatial[5] = y * c - z * b, z * a - x * c, x * b - y * a
         write_column(k, spatial, terms.com, rotation, scale, terms)
         spatial[0], spatial[1], spatial[2] = b * z - c * y, c * x - a * z, a * y - b * x
-        xx, yy, zz = float(inertia[0]), float(inertia[1]), float(inertia[2])
-        xy, xz, yz = float(inertia[3]), float(inertia[4]), float(inertia[5])
+        xx, yy, zz = inertia[0], inertia[1], inertia[2]
+        xy, xz, yz = inertia[3], inertia[4], inertia[5]
         spatial[3] = xx * a + xy * b + xz * c
         spatial[4] = xy * a + yy * b + yz * c
         spatial[5] = xz * a + yz * b + zz * c
@@ -404,35 +399,35 @@ def write_matrices(
             shared = scale * inner(motion.joint[i], spatial)
             terms.mass_matrix[first + i, first + j] = rotors[i, j] + shared
             terms.mass_matrix[first + j, first + i] = rotors[j, i] + shared
-            i = int(tree.parent[i]) - 1
+            i = tree.parent[i] - 1
 
 
 @kernel
 def write_forces(motion: BodyMotion, composite: Inertias, scale: float, terms: MotionTerms) -> None:
     """Bias forces, gravity included, the drift of the momentum, and the momentum itself."""
     rotation, spatial, force = motion.rotation[0], composite.spatial, composite.force[0]
-    x, y, z = float(terms.com[0]), float(terms.com[1]), float(terms.com[2])
-    a, b, c = float(force[0]), float(force[1]), float(force[2])
+    x, y, z = terms.com[0], terms.com[1], terms.com[2]
+    a, b, c = force[0], force[1], force[2]
     drift = terms.centroidal_drift
     drift[0], drift[1], drift[2] = scale * a, scale * b, scale * c
-    drift[3] = scale * (float(force[3]) - (y * c - z * b))
-    drift[4] = scale * (float(force[4]) - (z * a - x * c))
-    drift[5] = scale * (float(force[5]) - (x * b - y * a))
+    drift[3] = scale * (force[3] - (y * c - z * b))
+    drift[4] = scale * (force[4] - (z * a - x * c))
+    drift[5] = scale * (force[5] - (x * b - y * a))
     for body in range(motion.joint.shape[0] + 1):
         # Weight pulls down, so what carries it pushes up, at the centre of mass.
         moment, carried = composite.moment[body], composite.force[body]
         for k in range(6):
             spatial[k] = carried[k]
-        spatial[2] = float(spatial[2]) + GRAVITY * float(composite.mass[body])
-        spatial[3] = float(spatial[3]) + GRAVITY * float(moment[1])
-        spatial[4] = float(spatial[4]) - GRAVITY * float(moment[0])
+        spatial[2] = spatial[2] + GRAVITY * composite.mass[body]
+        spatial[3] = spatial[3] + GRAVITY * moment[1]
+        spatial[4] = spatial[4] - GRAVITY * moment[0]
         if body > 0:
             terms.nonlinear_effects[5 + body] = scale * inner(motion.joint[body - 1], spatial)
             continue
         for k in range(3):
-            u, v, w = float(rotation[0, k]), float(rotation[1, k]), float(rotation[2, k])
-            linear = u * float(spatial[0]) + v * float(spatial[1]) + w * float(spatial[2])
-            angular = u * float(spatial[3]) + v * float(spatial[4]) + w * float(spatial[5])
+            u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
+            linear = u * spatial[0] + v * spatial[1] + w * spatial[2]
+            angular = u * spatial[3] + v * spatial[4] + w * spatial[5]
             terms.nonlinear_effects[k] = scale * linear
             terms.nonlinear_effects[3 + k] = scale * angular
 
@@ -448,8 +443,8 @@ def write_momentum(velocity: Array1D, scale: float, mass: float, terms: MotionTe
     for k in range(3):
         linear, angular = 0.0, 0.0
         for j in range(velocity.shape[0]):
-            linear += float(terms.centroidal_matrix[k, j]) * velocity[j]
-            angular += float(terms.centroidal_matrix[3 + k, j]) * velocity[j]
+            linear += terms.centroidal_matrix[k, j] * velocity[j]
+            angular += terms.centroidal_matrix[3 + k, j] * velocity[j]
         terms.linear_momentum[k], terms.angular_momentum[k] = linear, angular
         terms.com_velocity[k] = linear / (scale * mass)
 
@@ -473,8 +468,7 @@ def equations_of_motion(
             the joints', (6 + n_joints,).
     """
     weigh_bodies(tree, motion, composite)
-    for k in range(3):
-        terms.com[k] = float(composite.moment[0, k]) / float(composite.mass[0])
+    terms.com[:] = composite.moment[0] / composite.mass[0]
     write_matrices(tree, motion, composite, rotors, scale, terms)
     write_forces(motion, composite, scale, terms)
-    write_momentum(velocity, scale, float(composite.mass[0]), terms)
+    write_momentum(velocity, scale, composite.mass[0], terms)

@@ -41,8 +41,7 @@ def propagate(
         middle, acceleration: scratch, (4,) and (3,); ``acceleration`` holds the acceleration
             [m/s^2, world] afterwards.
     """
-    for i in range(3):
-        last_rate[i] = 0.5 * (last_rate[i] + rate[i])
+    last_rate[:] = 0.5 * (last_rate + rate)
     integrate(orientation, last_rate, 0.5 * period, middle)
     integrate(orientation, last_rate, period, orientation)
     rotate(middle, specific_force, acceleration)
@@ -205,21 +204,21 @@ def stand_on(
     anchors, anchored = points.anchors, points.anchored
     total = 0.0
     for i in range(weights.shape[0]):
-        total += float(weights[i])
+        total += weights[i]
     share = 1.0 / max(total, 1.0)
     for k in range(3):
         still, back = 0.0, 0.0
         for i in range(weights.shape[0]):
             if not active[i]:
                 continue
-            weight = float(weights[i])
-            place = position[k] + float(points.places[i, k])
+            weight = weights[i]
+            place = position[k] + points.places[i, k]
             if anchored[i]:
-                anchors[i, k] += (1.0 - weight) * (place - float(anchors[i, k]))
+                anchors[i, k] += (1.0 - weight) * (place - anchors[i, k])
             else:
                 anchors[i, k] = place
-            still -= weight * (velocity[k] + float(points.rates[i, k]))
-            back += weight * (float(anchors[i, k]) - place)
+            still -= weight * (velocity[k] + points.rates[i, k])
+            back += weight * (anchors[i, k] - place)
         velocity[k] += velocity_gain * share * still
         position[k] += position_gain * share * back
     for i in range(weights.shape[0]):

@@ -89,24 +89,22 @@ def blend_gain(
 @kernel
 def add_soft_stops(measured: Array1D, stops: SoftStops, out: Feedback) -> None:
     """Add soft stops to a feedback where a measured angle (n,) is near its joint's limit."""
-    margin, gain = float(stops.margin[0]), float(stops.gain[0])
+    margin, gain = stops.margin[0], stops.gain[0]
     for i in range(measured.shape[0]):
         angle = measured[i]
-        edge = min(
-            max(angle, float(stops.limits[i, 0]) + margin), float(stops.limits[i, 1]) - margin
-        )
+        edge = min(max(angle, stops.limits[i, 0] + margin), stops.limits[i, 1] - margin)
         depth = abs(angle - edge) / margin
         if depth > 0.0:
-            spring = gain * float(stops.stiffness[i])
-            total = spring + float(out.stiffness[i])
+            spring = gain * stops.stiffness[i]
+            total = spring + out.stiffness[i]
             if total > 0.0:
-                pulled = spring * edge + float(out.stiffness[i]) * float(out.position[i])
+                pulled = spring * edge + out.stiffness[i] * out.position[i]
                 out.position[i] = pulled / total
             out.stiffness[i] = total
-            damper = gain * min(depth, 1.0) * float(stops.damping[i])
-            total = damper + float(out.damping[i])
+            damper = gain * min(depth, 1.0) * stops.damping[i]
+            total = damper + out.damping[i]
             if total > 0.0:
-                out.velocity[i] = float(out.damping[i]) * float(out.velocity[i]) / total
+                out.velocity[i] = out.damping[i] * out.velocity[i] / total
             out.damping[i] = total
 
 
@@ -136,9 +134,9 @@ def integrate_accelerations(
     """
     share = min(period / leak, 1.0)
     for i in range(acceleration.shape[0]):
-        speed = float(targets.velocity[i])
-        x = float(targets.position[i]) + period * speed
+        speed = targets.velocity[i]
+        x = targets.position[i] + period * speed
         targets.velocity[i] = (
-            speed + period * acceleration[i] + share * (float(measured.velocity[i]) - speed)
+            speed + period * acceleration[i] + share * (measured.velocity[i] - speed)
         )
-        targets.position[i] = x + share * (float(measured.position[i]) - x)
+        targets.position[i] = x + share * (measured.position[i] - x)

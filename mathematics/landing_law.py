@@ -234,16 +234,14 @@ def map_flight(
     multiply_matrices(rotation, out.inverse, out.drift)
     for i in range(jacobian.shape[0]):
         for j in range(3):
-            for k in range(3):
-                lever = momentum[j, 3 + k] / mass
-                out.lever[j, k] = jacobian[i, j, 3 + k] - lever
+            out.lever[j, :] = jacobian[i, j, 3:6] - momentum[j, 3:6] / mass
         rows = out.jacobian[3 * i : 3 * i + 3]
         multiply_matrices(out.lever, out.inverse, out.carried[3 * i : 3 * i + 3])
         multiply_matrices(out.lever, out.reaction, rows)
         for j in range(3):
             for k in range(n):
                 along = jacobian[i, j, 6 + k] - momentum[j, 6 + k] / mass
-                rows[j, k] = along - float(rows[j, k])
+                rows[j, k] = along - rows[j, k]
     multiply_matrices(out.jacobian.T, out.jacobian, out.normal)
     for k in range(n):
         out.normal[k, k] += damping * damping
@@ -251,8 +249,7 @@ def map_flight(
     solve_rows(out.normal, out.answers)
     multiply_matrices(out.answers, out.jacobian.T, out.turn)
     for i in range(2):
-        for k in range(out.turn.shape[1]):
-            out.turn[i, k] = -float(out.turn[i, k])
+        out.turn[i, :] = -out.turn[i]
 
 
 @kernel
@@ -284,13 +281,13 @@ def predict_tilt(
     for j in range(2):
         value, rate = tilt[j], 0.0
         for k in range(3):
-            rate += float(flight.drift[j, k]) * momentum[k]
+            rate += flight.drift[j, k] * momentum[k]
         turn[j, :] = 0.0
         for i in range(way.shape[0]):
             carried = 0.0
             for k in range(3):
-                carried += float(flight.carried[i, k]) * momentum[k]
-            per_way = float(flight.turn[j, i])
+                carried += flight.carried[i, k] * momentum[k]
+            per_way = flight.turn[j, i]
             value += per_way * way[i]
             rate -= per_way * carried
             if i % 3 == 2:
@@ -340,9 +337,9 @@ def choose_shift(
     for attempt in range(2):
         matrix[:, :] = 0.0
         for i in range(4):
-            weight, goal = float(cost.weight[i]), bound
+            weight, goal = cost.weight[i], bound
             if i < 3:
-                goal = float(cost.goal[i])
+                goal = cost.goal[i]
             elif attempt == 1:
                 weight = _HELD
             matrix[i, i] = weight
@@ -350,16 +347,16 @@ def choose_shift(
         for j in range(2):
             aimed = tilt[j]
             for i in range(3):
-                aimed += turn[j, i] * float(cost.goal[i])
-            free = min(max(aimed, float(cost.free[j, 0])), float(cost.free[j, 1]))
-            weight = float(cost.weight[4 + j]) if aimed != free else 0.0
+                aimed += turn[j, i] * cost.goal[i]
+            free = min(max(aimed, cost.free[j, 0]), cost.free[j, 1])
+            weight = cost.weight[4 + j] if aimed != free else 0.0
             for i in range(4):
                 part = weight * turn[j, i]
                 shift[i] -= part * (tilt[j] - free)
                 for k in range(4):
                     matrix[i, k] += part * turn[j, k]
         solve_positive(matrix, shift)
-        bound = min(max(shift[3], float(cost.bounds[0])), float(cost.bounds[1]))
+        bound = min(max(shift[3], cost.bounds[0]), cost.bounds[1])
         if bound == shift[3]:
             return
 

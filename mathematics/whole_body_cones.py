@@ -117,14 +117,14 @@ def add_plane(
 ) -> None:
     """A plane along the cone's ``direction``. Where all are in use, it takes the place of the one that
     is not active and farthest from it."""
-    x, y = float(cones.direction[point, 0]), float(cones.direction[point, 1])
-    place = int(cones.used[point])
+    x, y = cones.direction[point, 0], cones.direction[point, 1]
+    place = cones.used[point]
     if place < PLANES:
         cones.used[point] = place + 1
     else:
         place, nearest = 0, 2.0
         for k in range(PLANES):
-            near = x * float(cones.planes[point, k, 0]) + y * float(cones.planes[point, k, 1])
+            near = x * cones.planes[point, k, 0] + y * cones.planes[point, k, 1]
             if near < nearest and not memory.is_active[first + PLANES * point + k]:
                 place, nearest = k, near
     row = first + PLANES * point + place
@@ -177,10 +177,10 @@ def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array1
         outside = size - friction * x[3 * point + 2] > tolerance * size
         if size == 0.0 or not (cones.curvature[point] > 0.0 or outside):
             continue
-        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+        a, b = cones.direction[point, 0], cones.direction[point, 1]
         kept, farthest, least = 0, 0, 2.0
-        for k in range(int(cones.used[point])):
-            c, d = float(cones.planes[point, k, 0]), float(cones.planes[point, k, 1])
+        for k in range(cones.used[point]):
+            c, d = cones.planes[point, k, 0], cones.planes[point, k, 1]
             near = a * c + b * d
             if near > 0.0 and abs(a * d - b * c) < NEAR:
                 continue
@@ -204,17 +204,17 @@ def multiplier_curvature(
     for point in range(count):
         cones.curvature[point] = 0.0
     for j in range(active):
-        row = int(memory.active[j])
+        row = memory.active[j]
         if row >= first:
             point = (row - first) // PLANES
         elif row < PYRAMID_ROWS * count and row % PYRAMID_ROWS < 4:
             point = row // PYRAMID_ROWS
         else:
             continue
-        cones.curvature[point] = float(cones.curvature[point]) + float(memory.multipliers[j])
+        cones.curvature[point] = cones.curvature[point] + memory.multipliers[j]
     for point in range(count):
         size = look_along(point, x, cones)
-        pressure = max(float(cones.curvature[point]), 0.0)
+        pressure = max(cones.curvature[point], 0.0)
         cones.curvature[point] = pressure / size if size > 0.0 else 0.0
 
 
@@ -222,8 +222,8 @@ def multiplier_curvature(
 def add_curvature(count: int, cones: Cones, hessian: Array2D) -> None:
     """Add p / r (1 - u u') of every cone to the Hessian."""
     for point in range(count):
-        value, i = float(cones.curvature[point]), 3 * point
-        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
+        value, i = cones.curvature[point], 3 * point
+        a, b = cones.direction[point, 0], cones.direction[point, 1]
         hessian[i, i] = hessian[i, i] + value * b * b
         hessian[i + 1, i + 1] = hessian[i + 1, i + 1] + value * a * a
         hessian[i, i + 1] = hessian[i, i + 1] - value * a * b
@@ -235,8 +235,8 @@ def add_bending(count: int, cones: Cones, x: Array1D, gradient: Array1D) -> None
     """Add p / r (1 - u u') f_t of every cone to the gradient."""
     for point in range(count):
         i = 3 * point
-        a, b = float(cones.direction[point, 0]), float(cones.direction[point, 1])
-        across = float(cones.curvature[point]) * (a * x[i + 1] - b * x[i])
+        a, b = cones.direction[point, 0], cones.direction[point, 1]
+        across = cones.curvature[point] * (a * x[i + 1] - b * x[i])
         gradient[i] = gradient[i] - across * b
         gradient[i + 1] = gradient[i + 1] + across * a
 
@@ -253,8 +253,8 @@ def turned(count: int, friction: float, cones: Cones, x: Array1D) -> float:
             continue
         worst = max(worst, (size - friction * x[3 * point + 2]) / size)
         if cones.curvature[point] > 0.0:
-            across = float(cones.direction[point, 0]) * b - float(cones.direction[point, 1]) * a
-            along = float(cones.direction[point, 0]) * a + float(cones.direction[point, 1]) * b
+            across = cones.direction[point, 0] * b - cones.direction[point, 1] * a
+            along = cones.direction[point, 0] * a + cones.direction[point, 1] * b
             worst = max(worst, abs(across) / size if along > 0.0 else 2.0)
     return worst
 
@@ -343,7 +343,7 @@ def solve_cone_forces(
     active, program, reduction, cones = (
         memory.active, memory.program, memory.reduction, memory.cones,
     )  # fmt: skip
-    friction, force_weight = float(weights.friction[0]), float(weights.force[0])
+    friction, force_weight = weights.friction[0], weights.force[0]
     n, x = 3 * count + extra, memory.unknowns
     first = limit_rows(terms, weights, motors, count, extra, reduction, active, program)
     tolerance, code, solved = FIRST, TOO_LONG, False

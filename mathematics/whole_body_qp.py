@@ -202,8 +202,8 @@ def motor_limits(speed: Array1D, curves: TorqueSpeedCurves, bounds: Bounds) -> N
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
     """
     for i in range(speed.shape[0]):
-        value, peak = speed[i], float(curves.peak[i])
-        corner, no_load = float(curves.corner[i]), float(curves.no_load[i])
+        value, peak = speed[i], curves.peak[i]
+        corner, no_load = curves.corner[i], curves.no_load[i]
         share = (no_load - abs(value)) / max(no_load - corner, 1e-9)
         driving = peak * min(max(share, 0.0), 1.0)
         bounds.upper[i] = driving if value > 0.0 else peak

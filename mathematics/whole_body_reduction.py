@@ -86,16 +86,16 @@ def eliminate(
             factor[i, k] = 0.0
         factor[i, i] = acceleration_weight
     for row in range(tasks.jacobian.shape[0]):
-        weight = float(tasks.weights[row])
+        weight = tasks.weights[row]
         if weight == 0.0:
             continue
-        desired = float(tasks.desired[row])
+        desired = tasks.desired[row]
         for i in range(n):
-            value = weight * float(tasks.jacobian[row, i])
+            value = weight * tasks.jacobian[row, i]
             if value != 0.0:
-                y[i] = float(y[i]) + value * desired
+                y[i] = y[i] + value * desired
                 for k in range(i, n):
-                    factor[i, k] = float(factor[i, k]) + value * float(tasks.jacobian[row, k])
+                    factor[i, k] = factor[i, k] + value * tasks.jacobian[row, k]
     if not factorise(factor, 0.0):
         return False
     solve_transposed(factor, y)
@@ -108,11 +108,11 @@ def eliminate(
         for j in range(k, 6):
             total = 0.0
             for i in range(n):
-                total += float(base[k, i]) * float(base[j, i])
+                total += base[k, i] * base[j, i]
             R[k, j] = total
-        total = float(terms.nonlinear[k])
+        total = terms.nonlinear[k]
         for i in range(n):
-            total += float(base[k, i]) * float(y[i])
+            total += base[k, i] * y[i]
         k_0[k] = total
         for j in range(count):
             for axis in range(3):
@@ -132,9 +132,9 @@ def eliminate(
         a_0[i] = y[i]
     solve_upper(factor, a_0)
     for k in range(6):
-        value = float(k_0[k])
+        value = k_0[k]
         for i in range(n):
-            a_0[i] = float(a_0[i]) - value * float(X_t[k, i])
+            a_0[i] = a_0[i] - value * X_t[k, i]
     return True
 
 
@@ -156,10 +156,10 @@ def force_program(
         hessian[i, i] = force_weight if i < size else 1.0
     for k in range(6):
         for i in range(size):
-            value = float(K[k, i])
-            gradient[i] = gradient[i] - value * float(k_0[k])
+            value = K[k, i]
+            gradient[i] = gradient[i] - value * k_0[k]
             for j in range(size):
-                hessian[i, j] = hessian[i, j] + value * float(K[k, j])
+                hessian[i, j] = hessian[i, j] + value * K[k, j]
 
 
 @kernel
@@ -180,9 +180,9 @@ def force_gradient(
     """
     size, multiplier = 3 * count, reduction.multiplier
     for k in range(6):
-        total = -float(reduction.k_0[k])
+        total = -reduction.k_0[k]
         for i in range(size):
-            total += float(reduction.K[k, i]) * unknowns[i]
+            total += reduction.K[k, i] * unknowns[i]
         multiplier[k] = total
     solve_upper(reduction.R, multiplier)
     for j in range(count):
@@ -190,7 +190,7 @@ def force_gradient(
             i = 3 * j + axis
             total = force_weight * unknowns[i]
             for k in range(6):
-                total += float(terms.jacobian[active[j], axis, k]) * float(multiplier[k])
+                total += terms.jacobian[active[j], axis, k] * multiplier[k]
             out[i] = total
     for k in range(size, size + extra):
         out[k] = unknowns[k]
@@ -236,15 +236,15 @@ def free_motions(reduction: Reduction) -> None:
     for k in range(6):
         square = 0.0
         for i in range(k, n):
-            square += float(reflections[k, i]) * float(reflections[k, i])
-        head = float(reflections[k, k])
+            square += reflections[k, i] * reflections[k, i]
+        head = reflections[k, k]
         reflections[k, k] = head + math.copysign(math.sqrt(square), head)
-        square += float(reflections[k, k]) * float(reflections[k, k]) - head * head
+        square += reflections[k, k] * reflections[k, k] - head * head
         scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
         for i in range(k):
             reflections[k, i] = 0.0
         for i in range(k, n):
-            reflections[k, i] = float(reflections[k, i]) * scale
+            reflections[k, i] = reflections[k, i] * scale
         for other in range(k + 1, 6):
             reflect(reflections[k], reflections[other])
     for j in range(n - 6):
@@ -286,9 +286,9 @@ def torque_rows(
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
     joints, n, size = torque_rest.shape[0], reduction.a_0.shape[0], 3 * count
     for j in range(joints):
-        torque = float(terms.nonlinear[6 + j])
+        torque = terms.nonlinear[6 + j]
         for i in range(n):
-            torque += float(terms.mass_matrix[6 + j, i]) * float(reduction.a_0[i])
+            torque += terms.mass_matrix[6 + j, i] * reduction.a_0[i]
         torque_rest[j] = torque
         for point in range(count):
             for axis in range(3):
@@ -296,13 +296,13 @@ def torque_rows(
         for k in range(6):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(X_t[k, i])
+                total += terms.mass_matrix[6 + j, i] * X_t[k, i]
             for i in range(size):
-                torque_map[j, i] = float(torque_map[j, i]) + total * float(K[k, i])
+                torque_map[j, i] = torque_map[j, i] + total * K[k, i]
         for k in range(joints):
             total = 0.0
             for i in range(n):
-                total += float(terms.mass_matrix[6 + j, i]) * float(N_t[k, i])
+                total += terms.mass_matrix[6 + j, i] * N_t[k, i]
             torque_map[j, size + k] = total
     for motor in range(joints):
         high, low = first + motor, first + joints + motor
@@ -312,13 +312,13 @@ def torque_rows(
         for j in range(joints):
             share = transmission[motor, j]
             if share != 0.0:
-                torque += share * float(torque_rest[j])
+                torque += share * torque_rest[j]
                 for i in range(size + joints):
-                    matrix[high, i] = matrix[high, i] + share * float(torque_map[j, i])
+                    matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
         for i in range(size + joints):
             matrix[low, i] = -matrix[high, i]
-        bound[high] = float(bounds.upper[motor]) - torque
-        bound[low] = torque - float(bounds.lower[motor])
+        bound[high] = bounds.upper[motor] - torque
+        bound[low] = torque - bounds.lower[motor]
     return int(first + 2 * joints)
 
 
@@ -329,9 +329,9 @@ def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> boo
         total = 0.0
         for j in range(torque.shape[0]):
             total += transmission[motor, j] * torque[j]
-        if total > float(bounds.upper[motor]) + 1e-10:
+        if total > bounds.upper[motor] + 1e-10:
             return False
-        if total < float(bounds.lower[motor]) - 1e-10:
+        if total < bounds.lower[motor] - 1e-10:
             return False
     return True
 
@@ -342,18 +342,15 @@ def recover_acceleration(
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
     X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
-    for i in range(out.shape[0]):
-        out[i] = reduction.a_0[i]
+    out[:] = reduction.a_0
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += float(K[k, i]) * unknowns[i]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(X_t[k, i])
+            value += K[k, i] * unknowns[i]
+        out[:] = out + value * X_t[k]
     for k in range(extra):
         value = unknowns[size + k]
-        for i in range(out.shape[0]):
-            out[i] = out[i] + value * float(N_t[k, i])
+        out[:] = out + value * N_t[k]
 
 
 @kernel
@@ -371,10 +368,10 @@ def recover_torque(
         force: of the first ``count`` points of ``active``, three elements each.
     """
     for j in range(torque.shape[0]):
-        total = float(terms.nonlinear[6 + j])
+        total = terms.nonlinear[6 + j]
         for i in range(acceleration.shape[0]):
-            total += float(terms.mass_matrix[6 + j, i]) * acceleration[i]
+            total += terms.mass_matrix[6 + j, i] * acceleration[i]
         for point in range(count):
             for axis in range(3):
-                total -= float(terms.jacobian[active[point], axis, 6 + j]) * force[3 * point + axis]
+                total -= terms.jacobian[active[point], axis, 6 + j] * force[3 * point + axis]
         torque[j] = total

@@ -172,7 +172,7 @@ def reduce_program(
     if count == 0:
         solution.code[0] = NO_CONTACT
         return 0
-    if not eliminate(tasks, terms, active, count, float(weights.acceleration[0]), reduction):
+    if not eliminate(tasks, terms, active, count, weights.acceleration[0], reduction):
         solution.code[0] = ILL_POSED
         return 0
     if limits != NO_LIMITS:
@@ -198,8 +198,7 @@ def write_forces(
         solution.code[0] = code
         return
     for point in range(solution.force.shape[0]):
-        for axis in range(3):
-            solution.force[point, axis] = 0.0
+        solution.force[point, :] = 0.0
     for j in range(count):
         for axis in range(3):
             solution.force[active[j], axis] = unknowns[3 * j + axis]
@@ -222,7 +221,7 @@ def solve_forces(
     ``solve_program``.
     """
     active, program, reduction = memory.active, memory.program, memory.reduction
-    size, force_weight = 3 * count, float(weights.force[0])
+    size, force_weight = 3 * count, weights.force[0]
     force_program(reduction, size, extra, force_weight, program.hessian, program.gradient)
     rows = limit_rows(
         terms, weights, motors, count, extra, memory.reduction, active, memory.program
@@ -255,8 +254,8 @@ def limit_rows(
     """Write the rows of friction, and with ``extra`` unknowns those of torque; returns their number."""
     matrix, bound = program.matrix, program.bound
     rows = friction_rows(
-        count, extra, float(weights.friction[0]), float(weights.force_min[0]),
-        float(weights.force_max[0]), matrix, bound,
+        count, extra, weights.friction[0], weights.force_min[0],
+        weights.force_max[0], matrix, bound,
     )  # fmt: skip
     if extra > 0:
         rows = torque_rows(
@@ -275,7 +274,7 @@ def limit_motors(joint_velocity: Array1D, limits: int, motors: Motors) -> None:
             continue
         total = 0.0
         for j in range(joint_velocity.shape[0]):
-            total += float(motors.to_speed[i, j]) * joint_velocity[j]
+            total += motors.to_speed[i, j] * joint_velocity[j]
         motors.speed[i] = total
     if limits == MOTOR_LIMITS:
         motor_limits(motors.speed, motors.curves, motors.bounds)

@@ -102,27 +102,24 @@ def contact_motion(
 ) -> None:
     """The contact points as seen from the base, which is held in place but turns."""
     tree, motion, down, arm = rigid.tree, rigid.motion, rigid.scratch[0], rigid.scratch[1]
-    for k in range(3):
-        motion.velocity[0, 3 + k] = measured.angular_velocity[k]
-        down[k] = 0.0
+    motion.velocity[0, 3:6] = measured.angular_velocity
+    down[:] = 0.0
     place_bodies(tree, measured.position, motion)
     move_bodies(tree, measured.velocity, motion)
     down[2] = -1.0
     rotate_back(measured.orientation, down, down)
     for i in range(contacts.foot.shape[0]):
-        body = int(contacts.body[contacts.foot[i]])
+        body = contacts.body[contacts.foot[i]]
         point = seen.points[i]
         place_of(motion, body, contacts.centre[i], point)
-        for k in range(3):
-            point[k] = float(point[k]) + float(contacts.radius[i]) * float(down[k])
+        point[:] = point + contacts.radius[i] * down
         velocity_at(motion, body, point, seen.rates[i])
-    for k in range(3):
-        seen.forward[k] = 0.0
+    seen.forward[:] = 0.0
     for foot in range(contacts.body.shape[0]):
-        body, ball = int(contacts.body[foot]), int(contacts.ball[foot])
+        body, ball = contacts.body[foot], contacts.ball[foot]
         place_of(motion, body, contacts.sole[foot], seen.soles[foot])
         for k in range(3):
-            seen.forward[k] = float(seen.forward[k]) + float(motion.rotation[body, k, 0])
+            seen.forward[k] = seen.forward[k] + motion.rotation[body, k, 0]
             if ball >= 0:
                 seen.soles[foot, k] = seen.points[ball, k]
     if contacts.patterned:
@@ -159,12 +156,11 @@ def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
     total = 0.0
     out[0] = out[1] = out[2] = 0.0
     for body in range(tree.mass.shape[0]):
-        mass = float(tree.mass[body])
+        mass = tree.mass[body]
         place_of(motion, body, tree.com[body], place)
         velocity_at(motion, body, place, velocity)
         total += mass
-        for k in range(3):
-            out[k] = out[k] + mass * float(velocity[k])
+        out[:] = out + mass * velocity
     out[:] = out / total
 
 
@@ -175,7 +171,7 @@ def differentiate_contacts(
     """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
     (n_contacts, 3, n_joints), with the bodies where ``contact_motion`` has left them."""
     for i in range(contacts.foot.shape[0]):
-        body = int(contacts.body[contacts.foot[i]])
+        body = contacts.body[contacts.foot[i]]
         centre, jacobian = centres[i], jacobians[i]
         place_of(rigid.motion, body, contacts.centre[i], centre)
         for k in range(jacobian.shape[1]):
@@ -183,11 +179,11 @@ def differentiate_contacts(
         x, y, z = centre[0], centre[1], centre[2]
         while body > 0:
             joint = rigid.motion.joint[body - 1]
-            u, v, w = float(joint[3]), float(joint[4]), float(joint[5])
-            jacobian[0, body - 1] = float(joint[0]) + (v * z - w * y)
-            jacobian[1, body - 1] = float(joint[1]) + (w * x - u * z)
-            jacobian[2, body - 1] = float(joint[2]) + (u * y - v * x)
-            body = int(rigid.tree.parent[body - 1])
+            u, v, w = joint[3], joint[4], joint[5]
+            jacobian[0, body - 1] = joint[0] + (v * z - w * y)
+            jacobian[1, body - 1] = joint[1] + (w * x - u * z)
+            jacobian[2, body - 1] = joint[2] + (u * y - v * x)
+            body = rigid.tree.parent[body - 1]
 
 
 class ContactKinematics:

@@ -139,8 +139,7 @@ def watch_line(
         period: between two ticks [s].
         known: whether ``direction`` (3,) is that of the last tick, of shape (); it is updated.
     """
-    for i in range(3):
-        scratch.line[i] = rotation[i, 0]
+    scratch.line[:] = rotation[:, 0]
     if pitched:
         pitched_line(rotation, pitch[()], scratch.line)
     line_rate(scratch.line, direction, period, bool(known[()]), scratch.rate)
@@ -167,7 +166,7 @@ def follow_foot(
         target: out; only the leg's joints are written.
     """
     angles, speeds, turn, velocity = scratch.angles, scratch.speeds, scratch.turn, scratch.velocity
-    softness, level = float(settings.softness[0]), float(settings.level[0])
+    softness, level = settings.softness[0], settings.level[0]
     yaw, yaw_rate = kept[leg.joints[0]], kept_rates[leg.joints[0]]
     inside, share = inverse(
         leg.hip,
@@ -182,8 +181,7 @@ def follow_foot(
         angles,
     )
     target.reachable[number] = inside
-    for i in range(3):
-        velocity[i] = min(max(float(foot.velocity[i]), -_FASTEST), _FASTEST)
+    velocity[:] = min(max(foot.velocity, -_FASTEST), _FASTEST)
     if settings.slides[0] and not inside:
         slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,
@@ -195,14 +193,14 @@ def follow_foot(
     forward(leg.hip, leg.plane, leg.signs, angles, scratch.sole, turn)
     jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
     slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
-    yaw_held = 1.0 - yaw_share(math.cos(float(angles[1])), level)
+    yaw_held = 1.0 - yaw_share(math.cos(angles[1]), level)
     inverse_velocity(
-        scratch.jacobian, turn, velocity, scratch.rate, float(settings.turn_length[0]),
-        float(settings.damping[0]), yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
+        scratch.jacobian, turn, velocity, scratch.rate, settings.turn_length[0],
+        settings.damping[0], yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
     )  # fmt: skip
-    limit = float(settings.speed_limit[0])
+    limit = settings.speed_limit[0]
     for i in range(5):
-        joint, angle, speed = int(leg.joints[i]), float(angles[i]), float(speeds[i])
-        held = angle <= float(leg.limits[i, 0]) or angle >= float(leg.limits[i, 1])
+        joint, angle, speed = leg.joints[i], angles[i], speeds[i]
+        held = angle <= leg.limits[i, 0] or angle >= leg.limits[i, 1]
         target.position[joint] = angle
         target.velocity[joint] = 0.0 if held else min(max(speed, -limit), limit)

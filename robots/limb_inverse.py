@@ -376,24 +376,19 @@ def watch_foot(
     """
     rotation, twist = scratch.rotation, scratch.twist
     for i in range(3):
-        for k in range(3):
-            rotation[i, k] = foot.rotation[i, k]
+        rotation[i, :] = foot.rotation[i]
     if pitched:
         pitched_line(rotation, pitch[()], scratch.line)
-        for i in range(3):
-            rotation[i, 0] = scratch.line[i]
+        rotation[:, 0] = scratch.line
     # A ball's centre is its radius above the ground, whichever way the leg comes.
-    for k in range(3):
-        above = float(foot.rotation[k, 2]) * limb.radius
-        scratch.place[k] = above + float(foot.position[k])
+    scratch.place[:] = foot.rotation[:, 2] * limb.radius + foot.position
     aim(scratch.place, rotation, scratch.target)
     for k in range(3, 6):
         twist[k] = 0.0
     if known[()]:
         turning(limb.tip, last, scratch.target, period, _JUMP, twist[3:])
     for i in range(4):
-        for k in range(3):
-            last[i, k] = scratch.target[i, k]
+        last[i, :] = scratch.target[i]
 
 
 @kernel
@@ -420,12 +415,12 @@ def follow_limb(
     weights, starts, angles, twist = scratch.weights, scratch.starts, scratch.angles, scratch.twist
     n, slides = limb.joints.shape[0], bool(settings.slides[0])
     for i in range(n):
-        joint = int(limb.joints[i])
+        joint = limb.joints[i]
         felt = min(max(measured[joint], -_FASTEST), _FASTEST)
         starts[0, i] = found[joint] if known[()] else felt
         starts[1, i] = felt
         starts[2, i] = limb.standing[i]
-    weights[0], weights[1], weights[2] = 1.0, 1.0, float(settings.turn_length[0])
+    weights[0], weights[1], weights[2] = 1.0, 1.0, settings.turn_length[0]
     square = reach(
         limb.links, limb.tip, limb.limits, scratch.target, weights, starts, 3, _STEPS,
         scratch.work, angles,
@@ -433,19 +428,19 @@ def follow_limb(
     target.reachable[number] = square <= REACHED
     if square > REACHED and (slides or int(limb.tip[6]) != _POINT):
         loose = 0 if slides else 2
-        weights[loose] = float(weights[loose]) * _LOOSE
+        weights[loose] = weights[loose] * _LOOSE
         approach(
             limb.links, limb.tip, limb.limits, scratch.target, weights, _STEPS, scratch.work,
             angles,
         )  # fmt: skip
     for k in range(3):
-        twist[k] = min(max(float(foot.velocity[k]), -_FASTEST), _FASTEST)
+        twist[k] = min(max(foot.velocity[k], -_FASTEST), _FASTEST)
     limb_velocity(
         limb.links, limb.tip, limb.limits, scratch.target, weights, angles, twist,
-        float(settings.damping[0]), scratch.work, scratch.speeds,
+        settings.damping[0], scratch.work, scratch.speeds,
     )  # fmt: skip
-    limit = float(settings.speed_limit[0])
+    limit = settings.speed_limit[0]
     for i in range(n):
-        joint, speed = int(limb.joints[i]), float(scratch.speeds[i])
+        joint, speed = limb.joints[i], scratch.speeds[i]
         target.position[joint] = angles[i]
         target.velocity[joint] = min(max(speed, -limit), limit)

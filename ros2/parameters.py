@@ -12,10 +12,8 @@ from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Context, Misfit
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters, parameter
-from .codec import Codec
-from .message_types import MessageType
-from .names import Quality, is_topic
-from .node import Place
+from .codec import Codec, MessageType
+from .node import Place, Quality, is_topic
 
 FRAMES = {"body": "base_link", "world": "world"}
 """The frames of ROS 2 that aloft's are called by default."""

@@ -14,8 +14,7 @@ from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Input, Metric
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Signal
-from .names import attachment
-from .node import Endpoint, Node, join, leave
+from .node import Endpoint, Node, attachment, join, leave
 from .parameters import Ros2Block, Ros2Parameters, message_type, place, quality
 
 SLOTS = 32
@@ -57,7 +56,11 @@ class Publish(Ros2Block):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)

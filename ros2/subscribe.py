@@ -14,8 +14,7 @@ from ..runtime.language.block import Block, Metric, Output
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Field, Signal
 from .codec import WrongMessageError
-from .names import sequence_in
-from .node import Endpoint, Node, join, leave
+from .node import Endpoint, Node, join, leave, sequence_in
 from .parameters import Ros2Block, Ros2Parameters, message_type, place, quality
 
 
@@ -63,7 +62,11 @@ class Subscribe(Ros2Block):
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)

@@ -42,7 +42,10 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "aloft"
 MOST_TESTS = 6
 """At most so many test files are run for one change, the nearest first."""
-ROOM_TESTS = {"runtime/loading/": "tests/graphs/test_wrong_graphs.py"}
+ROOM_TESTS = {
+    "runtime/loading/": "tests/graphs/test_wrong_graphs.py",
+    "blocks/general/": "tests/blocks/general/test_units.py",
+}
 """What tests a folder as a whole, without importing its files."""
 
 OPERATORS: dict[type[ast.AST], tuple[str, tuple[str, ...]]] = {

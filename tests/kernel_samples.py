@@ -5,7 +5,8 @@ import numpy as np
 from aloft.blocks.control import balance_law, followed_plan
 from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
-from aloft.hal.simulated import base, plant
+from aloft.blocks.signals import RobotTruth
+from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
@@ -15,6 +16,7 @@ from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
+from aloft.runtime.language.steps import as_record
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -125,7 +127,7 @@ SERIES = jump_series.Series(
     np.array(1), np.array(0.02), np.array(1), np.array(0.01), np.array(0.02), np.array(1),
     np.array(0.05), np.array(0.03), np.array(1),
 )  # fmt: skip
-BASE = base.BaseTruth(np.ones(3), np.ones(4), np.ones(3), np.ones(3))
+BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
 FOLLOWED = (
     followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),

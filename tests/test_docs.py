@@ -102,7 +102,11 @@ def test_a_task_of_the_users_own_is_used_by_the_whole_body_controller(tmp_path: 
             "first: right_knee",
             "symmetric:SymmetricJoints: bruce has no joint left",
         ),
-        ("{mass: 3}", "{weight: 3}", "gain 'mass'.*its gains are first, second, weight"),
+        (
+            "{mass: 3}",
+            "{weight: 3}",
+            "gain 'mass'.*its gains are weight, stiffness, damping, first, second",
+        ),
         ("- Torso\n", "- TorsoOrientation\n", "no task called 'Torso'; did you mean TorsoOrien"),
     ):
         assert right in entry

@@ -43,9 +43,7 @@ def test_the_criteria_come_before_the_table() -> None:
 
 
 def test_the_page_says_what_the_search_does() -> None:
-    from aloft.benchmarks.frontier.directions import LOOSEST
-    from aloft.benchmarks.frontier.jobs import LEAST_RUNS, RATE
-    from aloft.benchmarks.frontier.search import MOST_CPU
+    from aloft.benchmarks.frontier.search import LEAST_RUNS, LOOSEST, MOST_CPU, RATE
 
     assert LOOSEST == {"effort": 1.0, "margins": None, "foot_clearance": 0.02}
     assert "`effort: 1`" in PAGE and "`margins: null`" in PAGE and "`foot_clearance: 2 cm`" in PAGE

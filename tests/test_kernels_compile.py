@@ -51,7 +51,7 @@ NOT_HOT = {
     "mathematics.landing_law.flight_map": "memory, when a block is set up",
     "mathematics.whole_body_reduction.reduction_memory": "memory, when a block is set up",
     "mathematics.whole_body_solution.solution_memory": "memory, when a block is set up",
-    "blocks.control.round_program.rows_without_pyramids": "of the program that Clarabel gets",
+    "blocks.control.whole_body_program.rows_without_pyramids": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
     "mathematics.whole_body_cones.cone_solution_memory": "memory, when a block is set up",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",

@@ -2,11 +2,20 @@
 
 All cases run the same recorded jump of ``graphs/jump.yaml`` in turns of ``CHUNK`` ticks, so whatever
 else the machine does hits them alike. A ratio is the median over the ratios of single ticks.
+The process of a jump as a whole and a loop that waits busily are measured in real time. ``--since``
+measures the controller as it was at an earlier commit, in the same run.
 """
 
 from __future__ import annotations
 
 import gc
+import io
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,8 +29,18 @@ from ...blocks.control.dynamics import Dynamics
 from ...blocks.control.whole_body_controller import WholeBodyController
 from ...blocks.control.whole_body_program import WholeBodyProgram
 from ...mathematics.whole_body_qp import joint_torque
+from ...runtime.language.errors import AloftError
 from ..rows import Row
-from .comparisons import (
+from ..startup import time_process
+from .controller import (
+    GRAPH,
+    OUTSIDE,
+    HandWrittenLoop,
+    RecordedController,
+    RecordedJump,
+    record_jump,
+)
+from .programs import (
     BARE,
     COMPILED,
     FUSED,
@@ -32,6 +51,10 @@ from .comparisons import (
     QP_DAQP,
     QP_OSQP,
     TSID,
+    DaqpProgram,
+    OsqpController,
+    OsqpProgram,
+    PeerProgram,
     Times,
     block_rows,
     controller_rows,
@@ -40,12 +63,124 @@ from .comparisons import (
     state_to_torque_rows,
     tsid_rows,
 )  # fmt: skip
-from .controller import HandWrittenLoop, RecordedController, RecordedJump, record_jump
-from .process import busy_wait_row, process_row
-from .programs import DaqpProgram, OsqpController, OsqpProgram, PeerProgram
-from .since import EarlierController
-from .tsid import TsidController, TsidProgram, import_tsid
-from .tsid_check import TsidCheck
+from .tsid import TsidCheck, TsidController, TsidProgram, import_tsid
+
+RATES = (500, 1000, 2000, 4000, 5000, 8000, 10_000, 15_000, 20_000)
+"""The rates that the loop tries [Hz]."""
+LATE = 0.005
+"""The share of ticks that may be late."""
+SECONDS = 1.0
+
+
+def process_row(jump: RecordedJump, repeats: int = 3) -> Row:
+    """The shortest whole process of ``aloft run graphs/jump.yaml`` of a few, with its recording, as
+    a share of the time that the jump takes in the world."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = time_process(["run", str(GRAPH), "--json"], Path(folder), repeats)
+    lasted = json.loads(found.output)["ticks"] * jump.graph.base_period
+    wall = found.wall
+    return Row(
+        "aloft run graphs/jump.yaml, whole process", wall, "s", "real time", wall / lasted,
+        goal=1 / 5, floor=1 / 2, note=f"with its recording; the jump takes {lasted:.2f} s, "
+        f"the processors {found.user:.2f} s",
+    )  # fmt: skip
+
+
+def busy_wait_row(jump: RecordedJump, seconds: float = SECONDS) -> Row:
+    """The shortest period at which fewer than ``LATE`` of the ticks begin late."""
+    controller = RecordedController(jump)
+    controller.run(min(jump.ticks, 200))
+    best, shares = 0, []
+    for rate in RATES:
+        share = late_share(controller, jump, rate, seconds)
+        shares.append(f"{rate / 1000:g} kHz {100 * share:.1f} %")
+        if share < LATE:
+            best = rate
+    if not best:
+        return Row("busy-wait loop, period", None, "us", note=f"late: {', '.join(shares)}")
+    return Row(
+        "busy-wait loop, period", 1e6 / best, "us", goal=50.0, floor=250.0,
+        note=f"{best / 1000:g} kHz; late: {', '.join(shares)}",
+    )  # fmt: skip
+
+
+def late_share(
+    controller: RecordedController, jump: RecordedJump, rate: float, seconds: float
+) -> float:
+    """The share of ticks whose deadline had passed before they could begin. A tick that is late
+    begins at once, and the deadlines after it are counted from there."""
+    advance, now = controller.ticker.advance, time.perf_counter_ns
+    period, count = round(1e9 / rate), max(1, round(seconds * rate))
+    late = 0
+    deadline = now() + period
+    for _ in range(count):
+        if controller.tick == jump.ticks:
+            controller.again()  # where the jump begins anew, the time for that is given
+            deadline = now() + period
+        if now() > deadline:
+            late += 1
+            deadline = now()
+        while now() < deadline:
+            pass
+        controller.show(controller.tick)
+        advance(1)
+        controller.bound.clock.stop_reason = None
+        deadline += period
+    return late / count
+
+
+ROOT = Path(__file__).parents[2]
+
+
+class EarlierController:
+    """The sources of a commit, in a temporary folder, and runs of their ``jump.yaml``.
+
+    Args:
+        commit: any name that git knows.
+
+    Raises:
+        AloftError: these sources are no git repository, or it has no such commit.
+    """
+
+    def __init__(self, commit: str) -> None:
+        found = subprocess.run(
+            ["git", "-C", str(ROOT), "archive", "--format=tar", commit],
+            check=False, capture_output=True,
+        )  # fmt: skip
+        if found.returncode:
+            reason = found.stderr.decode(errors="replace").strip().splitlines() or ["git failed"]
+            raise AloftError(
+                f"the sources of {commit} are not at hand: {reason[-1]}; "
+                "--since needs a clone with its history"
+            )
+        self.commit = commit
+        self._folder = tempfile.TemporaryDirectory(prefix="aloft_")
+        with tarfile.open(fileobj=io.BytesIO(found.stdout)) as archive:
+            archive.extractall(Path(self._folder.name) / "aloft", filter="data")
+
+    def run(self) -> dict[str, float]:
+        """Run its jump once, in a process of its own; returns the median time of every block of the
+        controller [us], which contains neither the scheduler nor the recording.
+
+        Raises:
+            AssertionError: the run failed.
+        """
+        folder = Path(self._folder.name)
+        done = subprocess.run(
+            [sys.executable, "-m", "aloft", "run", "aloft/graphs/jump.yaml", "--json"],
+            check=False, cwd=folder, capture_output=True, text=True, timeout=600,
+            env={**os.environ, "PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1",
+                 "OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+        if done.returncode:
+            raise AssertionError(f"the jump of {self.commit} failed: {done.stderr[-500:]}")
+        blocks = json.loads(done.stdout)["blocks"]
+        return {path: b["p50_us"] for path, b in blocks.items() if path not in OUTSIDE}
+
+    def close(self) -> None:
+        """Remove the sources."""
+        self._folder.cleanup()
+
 
 CHUNK = 50
 PLAIN_TICKS = 200

@@ -135,7 +135,7 @@ def aim(
     scratch: Scratch,
 ) -> None:  # fmt: skip
     """One tick of ``BalanceTarget``."""
-    phase = int(present.phase[()])
+    phase = present.phase[()]
     middle_point(present.foot_position, scratch.middle)
     middle_point(plan.foot_position, scratch.planned_middle)
     planned = planned_heading(plan.foot_yaw, stand.counted)
@@ -143,10 +143,10 @@ def aim(
     if not memory.started[()]:
         memory.standing_height[()] = plan.com[2]
         memory.heading[()] = heading - planned
-        turn_about_vertical(scratch.planned_middle, float(memory.heading[()]), scratch.vector)
+        turn_about_vertical(scratch.planned_middle, memory.heading[()], scratch.vector)
         np.subtract(scratch.middle, scratch.vector, memory.origin)
         memory.started[()] = True
-    goes_on = float(plan.lift_off_time[()]) > float(plan.time[()])
+    goes_on = plan.lift_off_time[()] > plan.time[()]
     if phase < _LANDING or (phase == _LANDING and goes_on):
         turn = heading - planned
         follow(plan, present, stand, turn, out, scratch)
@@ -211,12 +211,11 @@ def follow(
     turn_about_vertical(plan.com_acceleration, turn, out.com_acceleration)
     turn_about_vertical(plan.angular_momentum, turn, out.angular_momentum)
     turn_about_vertical(plan.angular_momentum_rate, turn, out.angular_momentum_rate)
-    mass = float(present.mass_matrix[0, 0])
+    mass = present.mass_matrix[0, 0]
     heavier = (mass if mass != 0.0 else stand.mass) / stand.mass
-    for k in range(3):
-        out.angular_momentum[k] = float(out.angular_momentum[k]) * heavier
-        out.angular_momentum_rate[k] = float(out.angular_momentum_rate[k]) * heavier
-        out.angular_velocity[k] = plan.angular_velocity[k]
+    out.angular_momentum[:] = out.angular_momentum * heavier
+    out.angular_momentum_rate[:] = out.angular_momentum_rate * heavier
+    out.angular_velocity[:] = plan.angular_velocity
     set_heading(turn, scratch.turn)
     multiply(scratch.turn, plan.orientation, out.orientation)
 
@@ -224,16 +223,16 @@ def follow(
 @kernel
 def correct_place(plan: Plan, gains: Gains, memory: Memory, out: Aim, scratch: Scratch) -> None:
     """Change the length of the next jump to correct the feet's position error."""
-    lift_off, duration = float(plan.lift_off_time[()]), float(gains.place_time[0])
-    flight = float(plan.touchdown_time[()]) - lift_off
-    share = 1.0 - (lift_off - float(plan.time[()])) / duration
+    lift_off, duration = plan.lift_off_time[()], gains.place_time[0]
+    flight = plan.touchdown_time[()] - lift_off
+    share = 1.0 - (lift_off - plan.time[()]) / duration
     if share <= 0.0:
-        turn_about_vertical(scratch.planned_middle, float(memory.heading[()]), scratch.vector)
+        turn_about_vertical(scratch.planned_middle, memory.heading[()], scratch.vector)
         np.add(memory.origin, scratch.vector, scratch.vector)
         np.subtract(scratch.middle, scratch.vector, memory.off_place)
         return
     lengthen(
-        memory.off_place, float(gains.place_gain[0]), float(gains.place_limit[0]), flight,
+        memory.off_place, gains.place_gain[0], gains.place_limit[0], flight,
         duration, share, out.com, out.com_velocity, out.com_acceleration,
     )  # fmt: skip
 
@@ -246,20 +245,18 @@ def correct_lift_off(
     largest = 0.0
     for i in range(2):
         for k in range(3):
-            largest = max(largest, abs(float(gains.corrections[i, k])))
+            largest = max(largest, abs(gains.corrections[i, k]))
     if largest == 0.0:
         return
-    elapsed = float(present.time_in_phase[()])
-    left = float(plan.lift_off_time[()]) - float(plan.time[()])
+    elapsed = present.time_in_phase[()]
+    left = plan.lift_off_time[()] - plan.time[()]
     duration = max(elapsed + left, stand.period)
     share = min(elapsed / duration, 1.0)
     turn_about_vertical(gains.corrections[1], turn, vector)
     add_quadratic_growth(vector, share, duration, out.angular_momentum, out.angular_momentum_rate)
     turn_about_vertical(gains.corrections[0], turn, vector)
     add_quadratic_growth(vector, share, duration, out.com_velocity, out.com_acceleration)
-    for k in range(3):
-        way = duration * share * share * share / 3.0
-        out.com[k] = float(out.com[k]) + vector[k] * way
+    out.com[:] = out.com + vector * (duration * share * share * share / 3.0)
 
 
 @kernel
@@ -268,17 +265,17 @@ def balance(
     scratch: Scratch,
 ) -> None:  # fmt: skip
     """Aim at the middle of the feet and a level base, and rise when the phase is RECOVER."""
-    depth, duration = float(gains.landing_depth[0]), float(gains.rise_time[0])
+    depth, duration = gains.landing_depth[0], gains.rise_time[0]
     share, rate, bend = 0.0, 0.0, 0.0
-    if int(present.phase[()]) == _RECOVER:
-        share, rate, bend = minimum_jerk(float(present.time_in_phase[()]) / duration)
+    if present.phase[()] == _RECOVER:
+        share, rate, bend = minimum_jerk(present.time_in_phase[()] / duration)
     for k in range(3):
         out.com[k] = scratch.middle[k]
         out.com_velocity[k], out.com_acceleration[k] = 0.0, 0.0
         out.angular_velocity[k], out.angular_momentum[k] = 0.0, 0.0
         out.angular_momentum_rate[k] = 0.0
-    low = float(memory.standing_height[()]) - depth
-    out.com[2] = float(out.com[2]) + (low + share * depth)
+    low = memory.standing_height[()] - depth
+    out.com[2] = out.com[2] + (low + share * depth)
     out.com_velocity[2] = rate * depth / duration
     out.com_acceleration[2] = bend * depth / (duration * duration)
     set_heading(heading, scratch.turn)
@@ -287,8 +284,8 @@ def balance(
     conjugate(quaternion, quaternion)
     multiply(quaternion, scratch.turn, quaternion)
     logarithm(quaternion, scratch.vector)
-    gain = float(gains.trim_rate[0]) * stand.period
-    integrate_trim(scratch.vector, gain, float(gains.trim_limit[0]), trim)
+    gain = gains.trim_rate[0] * stand.period
+    integrate_trim(scratch.vector, gain, gains.trim_limit[0], trim)
     exponential(trim, quaternion)
     multiply(scratch.turn, quaternion, out.orientation)
 

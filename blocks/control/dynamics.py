@@ -184,11 +184,10 @@ def weigh_torso(weighing: Weighing, tree: BodyTree) -> float:
     In small steps, so that the model is a function of the input and rarely changes. All masses scale
     alike, so the terms do; rotors do not.
     """
-    offset, mass = weighing.offset, float(weighing.mass[()])
+    offset, mass = weighing.offset, weighing.mass[()]
     np.divide(weighing.com_offset, LEAST_OFFSET, offset)
     np.rint(offset, offset)
-    for k in range(3):
-        tree.com[0, k] = float(weighing.described[k]) + float(offset[k]) * LEAST_OFFSET
+    tree.com[0, :] = weighing.described + offset * LEAST_OFFSET
     if mass > 0.0:
         return round(mass / weighing.nominal / LEAST_SCALE) * LEAST_SCALE
     return 1.0
@@ -206,9 +205,9 @@ def set_state(state: BaseAndJoints, scratch: Scratch, terms: FootTerms) -> None:
         motion.velocity[0, row] = state.linear_velocity[row]
         spin = 0.0
         for column in range(3):
-            turn = float(terms.base_rotation[row, column])
+            turn = terms.base_rotation[row, column]
             motion.rotation[0, row, column] = turn
-            spin += turn * float(state.angular_velocity[column])
+            spin += turn * state.angular_velocity[column]
         motion.velocity[0, 3 + row] = spin
         terms.base_position[row] = state.position[row]
     for k in range(state.joint_velocity.shape[0]):
@@ -225,19 +224,19 @@ def write_jacobian(
     x, y, z = place[0], place[1], place[2]
     for k in range(3):
         a, b, c = (
-            float(motion.rotation[0, 0, k]),
-            float(motion.rotation[0, 1, k]),
-            float(motion.rotation[0, 2, k]),
+            motion.rotation[0, 0, k],
+            motion.rotation[0, 1, k],
+            motion.rotation[0, 2, k],
         )
         out[0, k], out[1, k], out[2, k] = a, b, c
         out[0, 3 + k], out[1, 3 + k], out[2, 3 + k] = b * z - c * y, c * x - a * z, a * y - b * x
     while body > 0:
         joint = motion.joint[body - 1]
-        a, b, c = float(joint[3]), float(joint[4]), float(joint[5])
-        out[0, 5 + body] = float(joint[0]) + (b * z - c * y)
-        out[1, 5 + body] = float(joint[1]) + (c * x - a * z)
-        out[2, 5 + body] = float(joint[2]) + (a * y - b * x)
-        body = int(tree.parent[body - 1])
+        a, b, c = joint[3], joint[4], joint[5]
+        out[0, 5 + body] = joint[0] + (b * z - c * y)
+        out[1, 5 + body] = joint[1] + (c * x - a * z)
+        out[2, 5 + body] = joint[2] + (a * y - b * x)
+        body = tree.parent[body - 1]
 
 
 @kernel
@@ -270,7 +269,7 @@ def rolling_drift(
     y = lowest[1] - centre[1]
     z = lowest[2] - centre[2]
     spatial = motion.acceleration[body]
-    a, b, c = float(spatial[3]), float(spatial[4]), float(spatial[5])
+    a, b, c = spatial[3], spatial[4], spatial[5]
     out[0] = out[0] + (b * z - c * y)
     out[1] = out[1] + (c * x - a * z)
     out[2] = out[2] + (a * y - b * x)
@@ -281,15 +280,14 @@ def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerm
     """Where the contact points are, how they move, and their Jacobians and drifts."""
     motion, place, centre = scratch.motion, scratch.places[0], scratch.places[1]
     for point in range(feet.foot.shape[0]):
-        foot = int(feet.foot[point])
-        body = int(feet.body[foot])
+        foot = feet.foot[point]
+        body = feet.body[foot]
         if feet.radius[point] >= 0.0:
             lowest_point(
-                feet.centre[point], float(feet.radius[point]), motion.rotation[body],
+                feet.centre[point], feet.radius[point], motion.rotation[body],
                 feet.point[point],
             )  # fmt: skip
-            for k in range(3):
-                feet.sole[foot, k] = feet.point[point, k]
+            feet.sole[foot, :] = feet.point[point]
         place_of(motion, body, feet.point[point], place)
         velocity_at(motion, body, place, terms.contact_velocity[point])
         acceleration_at(motion, body, place, terms.contact_drift[point])
@@ -297,8 +295,7 @@ def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerm
             place_of(motion, body, feet.centre[point], centre)
             rolling_drift(motion, body, centre, place, terms.contact_drift[point])
         write_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
-        for k in range(3):
-            terms.contact_position[point, k] = float(terms.base_position[k]) + float(place[k])
+        terms.contact_position[point, :] = terms.base_position + place
 
 
 @kernel
@@ -321,12 +318,11 @@ def evaluate(
     equations_of_motion(tree, motion, scratch.inertias, rotors, scale, foot_terms.velocity, terms)
     write_contacts(tree, scratch, feet, foot_terms)
     for foot in range(feet.body.shape[0]):
-        body = int(feet.body[foot])
+        body = feet.body[foot]
         place_of(motion, body, feet.sole[foot], place)
         for row in range(3):
-            foot_terms.foot_position[foot, row] = float(state.position[row]) + float(place[row])
+            foot_terms.foot_position[foot, row] = state.position[row] + place[row]
             for column in range(3):
-                turn = float(motion.rotation[body, row, column])
+                turn = motion.rotation[body, row, column]
                 foot_terms.foot_rotation[foot, row, column] = turn
-    for k in range(3):
-        terms.com[k] = float(terms.com[k]) + float(state.position[k])
+    terms.com[:] = terms.com + state.position

@@ -75,20 +75,19 @@ def follow_plan(
 ) -> None:
     """The plan's joints as the targets: of a later or earlier instant, and with level soles. They are
     remembered in ``flown``."""
-    ahead = float(following.plan_lead[0]) * share_of_lead(plan)
+    ahead = following.plan_lead[0] * share_of_lead(plan)
     pitch = planned_pitch(plan)
     if not keeps_acceleration(following, plan, flown):
-        for joint in range(flown.acceleration.shape[0]):
-            flown.acceleration[joint] = plan.joint_acceleration[joint]
+        flown.acceleration[:] = plan.joint_acceleration
     for joint in range(plan.joint_position.shape[0]):
-        speed = float(plan.joint_velocity[joint])
-        change = float(flown.acceleration[joint]) * ahead
+        speed = plan.joint_velocity[joint]
+        change = flown.acceleration[joint] * ahead
         way = ahead * (speed + 0.5 * change)
-        target.position[joint] = float(plan.joint_position[joint]) + way
+        target.position[joint] = plan.joint_position[joint] + way
         target.velocity[joint] = speed + change
     for foot in range(target.reachable.shape[0]):
         target.reachable[foot] = True
-        level_sole(foot, float(following.level_time[0]), soles, plan, pitch, target)
+        level_sole(foot, following.level_time[0], soles, plan, pitch, target)
     flown.known[()] = True
     flown.time[()] = plan.time[()]
     for joint in range(plan.joint_position.shape[0]):
@@ -113,13 +112,13 @@ def go_on(following: Following, plan: PlannedJoints, flown: Flown, target: LegTa
 
     So the feet of a robot that lands late keep slowing down. After that the ``target`` stays as it is.
     """
-    since = float(plan.time[()]) - float(flown.time[()])
-    if not flown.known[()] or since >= float(following.late_time[0]):
+    since = plan.time[()] - flown.time[()]
+    if not flown.known[()] or since >= following.late_time[0]:
         return
     for joint in range(flown.position.shape[0]):
-        change = float(flown.acceleration[joint]) * since
-        speed = float(flown.velocity[joint])
-        target.position[joint] = float(flown.position[joint]) + since * (speed + 0.5 * change)
+        change = flown.acceleration[joint] * since
+        speed = flown.velocity[joint]
+        target.position[joint] = flown.position[joint] + since * (speed + 0.5 * change)
         target.velocity[joint] = speed + change
 
 
@@ -129,8 +128,8 @@ def share_of_lead(plan: PlannedJoints) -> float:
 
     From its middle on the plan may name the times of the next flight already.
     """
-    since = float(plan.time[()]) - float(plan.lift_off_time[()])
-    lasts = float(plan.touchdown_time[()]) - float(plan.lift_off_time[()])
+    since = plan.time[()] - plan.lift_off_time[()]
+    lasts = plan.touchdown_time[()] - plan.lift_off_time[()]
     if since < 0.0 or lasts <= 0.0:
         return 1.0
     return min(2.0 * since / lasts, 1.0)
@@ -139,8 +138,8 @@ def share_of_lead(plan: PlannedJoints) -> float:
 @kernel
 def planned_pitch(plan: PlannedJoints) -> float:
     """The angle [rad] by which the plan has turned the base about its y axis."""
-    x, y = float(plan.orientation[0]), float(plan.orientation[1])
-    z, w = float(plan.orientation[2]), float(plan.orientation[3])
+    x, y = plan.orientation[0], plan.orientation[1]
+    z, w = plan.orientation[2], plan.orientation[3]
     return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 
 
@@ -150,7 +149,7 @@ def turned_too_far(foot: int, soles: Soles, pitch: float) -> float:
 
     It is the angle between a level sole in the base's axes as measured and as planned.
     """
-    measured = math.atan2(float(soles.wanted[foot, 2, 0]), float(soles.wanted[foot, 0, 0]))
+    measured = math.atan2(soles.wanted[foot, 2, 0], soles.wanted[foot, 0, 0])
     error = measured - pitch
     return math.atan2(math.sin(error), math.cos(error))
 
@@ -167,8 +166,8 @@ def level_sole(
     """Turn a sole by its last joint against what the base has turned further than the plan's ``pitch``."""
     if level_time <= 0.0 or soles.axis[foot] == 0.0:
         return
-    since = float(plan.time[()]) - float(plan.touchdown_time[()]) + level_time
+    since = plan.time[()] - plan.touchdown_time[()] + level_time
     share, _, _ = minimum_jerk(2.0 * since / level_time)
-    joint, error = int(soles.joint[foot]), turned_too_far(foot, soles, pitch)
-    angle = float(target.position[joint]) - share * float(soles.axis[foot]) * error
-    target.position[joint] = min(max(angle, float(soles.lowest[foot])), float(soles.highest[foot]))
+    joint, error = soles.joint[foot], turned_too_far(foot, soles, pitch)
+    angle = target.position[joint] - share * soles.axis[foot] * error
+    target.position[joint] = min(max(angle, soles.lowest[foot]), soles.highest[foot])

@@ -229,16 +229,16 @@ def judge_health(drives: Drives, sensors: Sensors, limits: Limits, verdict: Indi
 @kernel
 def judge_drive(drives: Drives, limits: Limits, k: int) -> int:
     """The gravest fault of drive ``k``; its counts are updated."""
-    condition, voltage = int(drives.condition[k]), float(drives.voltage[k])
+    condition, voltage = drives.condition[k], drives.voltage[k]
     low = 0.0 < voltage < limits.lowest_voltage
-    hot = not float(drives.temperature[k]) <= limits.highest_temperature
-    strong = not abs(float(drives.current[k])) <= limits.largest_current
-    drives.low[k] = int(drives.low[k]) + 1 if low else 0
-    drives.hot[k] = int(drives.hot[k]) + 1 if hot else 0
-    drives.strong[k] = int(drives.strong[k]) + 1 if strong else 0
+    hot = not drives.temperature[k] <= limits.highest_temperature
+    strong = not abs(drives.current[k]) <= limits.largest_current
+    drives.low[k] = drives.low[k] + 1 if low else 0
+    drives.hot[k] = drives.hot[k] + 1 if hot else 0
+    drives.strong[k] = drives.strong[k] + 1 if strong else 0
     if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
         return _DRIVE
-    if not float(drives.age[k]) <= limits.answer_age:
+    if not drives.age[k] <= limits.answer_age:
         return _SILENT_DRIVE
     if drives.low[k] > limits.hold:
         return _VOLTAGE
@@ -252,18 +252,18 @@ def judge_drive(drives: Drives, limits: Limits, k: int) -> int:
 @kernel
 def judge_sensors(sensors: Sensors, limits: Limits) -> int:
     """The gravest fault of what is measured; all counts are updated."""
-    invalid, stamps, stamp = sensors.invalid, sensors.stamps, float(sensors.stamp[()])
-    invalid[0] = 0 if sensors.joints_valid[()] else int(invalid[0]) + 1
-    invalid[1] = 0 if sensors.imu_valid[()] else int(invalid[1]) + 1
-    invalid[2] = 0 if sensors.contacts_valid[()] else int(invalid[2]) + 1
-    same = stamp >= 0.0 and stamp == float(stamps[0])
-    stamps[1] = float(stamps[1]) + 1.0 if same else 0.0
+    invalid, stamps, stamp = sensors.invalid, sensors.stamps, sensors.stamp[()]
+    invalid[0] = 0 if sensors.joints_valid[()] else invalid[0] + 1
+    invalid[1] = 0 if sensors.imu_valid[()] else invalid[1] + 1
+    invalid[2] = 0 if sensors.contacts_valid[()] else invalid[2] + 1
+    same = stamp >= 0.0 and stamp == stamps[0]
+    stamps[1] = stamps[1] + 1.0 if same else 0.0
     stamps[0] = stamp
-    if not float(sensors.imu_age[()]) <= limits.imu_age:
+    if not sensors.imu_age[()] <= limits.imu_age:
         return _SILENT_IMU
     for k in range(3):
         if invalid[k] > limits.invalid_hold:
             return _INVALID_JOINTS + k
-    if float(stamps[1]) > limits.stamp_hold:
+    if stamps[1] > limits.stamp_hold:
         return _STALE_HEALTH
     return 0

@@ -121,16 +121,16 @@ def command_joints(
     find_stance_targets(period, kind, legs, inputs, numbers, following, joints.stance)
     find_flight_targets(legs, inputs, joints.flight)
     mode[()] = _ACTIVE
-    flies = int(inputs.phase[()]) == _FLIGHT and int(inputs.planned_phase[()]) == _FLIGHT
+    flies = inputs.phase[()] == _FLIGHT and inputs.planned_phase[()] == _FLIGHT
     for i in range(torque.shape[0]):
-        airborne = float(joints.airborne[i])
-        torque[i] = (1.0 - airborne) * float(inputs.torque[i])
+        airborne = joints.airborne[i]
+        torque[i] = (1.0 - airborne) * inputs.torque[i]
         if flies:
-            planned = airborne * float(inputs.planned_torque[i]) * float(numbers.feedforward[0])
+            planned = airborne * inputs.planned_torque[i] * numbers.feedforward[0]
             torque[i] = torque[i] + planned
     if numbers.compensates[0]:
         add_friction(
-            inputs.measured.velocity, numbers.friction, numbers.damping, float(numbers.speed[0]),
+            inputs.measured.velocity, numbers.friction, numbers.damping, numbers.speed[0],
             torque,
         )  # fmt: skip
     blend_feedback(joints.airborne, joints.flight, joints.stance, inputs.measured, out)
@@ -146,7 +146,7 @@ def blend_legs(
 
     A joint of no leg, or one that is held, has the least weight of all legs.
     """
-    phase, rate = int(inputs.phase[()]), float(numbers.rate[0])
+    phase, rate = inputs.phase[()], numbers.rate[0]
     least = 1.0 if following.airborne.shape[0] > 0 else 0.0
     for foot in range(following.airborne.shape[0]):
         swings = phase in (_FLIGHT, _LANDING)
@@ -154,12 +154,12 @@ def blend_legs(
             held = inputs.stance[point] or inputs.stepping[point]
             if legs.foot_of_point[point] == foot and held:
                 swings = False
-        weight = float(following.airborne[foot]) + (rate if swings else -rate)
+        weight = following.airborne[foot] + (rate if swings else -rate)
         weight = min(max(weight, 0.0), 1.0)
         following.airborne[foot] = weight
         least = min(least, weight)
     for joint in range(airborne.shape[0]):
-        foot = int(legs.foot_of_joint[joint])
+        foot = legs.foot_of_joint[joint]
         airborne[joint] = least if foot < 0 else following.airborne[foot]
 
 
@@ -181,9 +181,7 @@ def find_stance_targets(
                 targets.position[i] = measured.position[i]
                 targets.velocity[i] = measured.velocity[i]
             following.started[()] = True
-        integrate_accelerations(
-            period, float(numbers.leak[0]), inputs.acceleration, measured, targets
-        )
+        integrate_accelerations(period, numbers.leak[0], inputs.acceleration, measured, targets)
     for i in range(legs.held.shape[0]):
         if legs.held[i]:
             stance.position[i], stance.velocity[i] = legs.angle[i], 0.0

@@ -9,6 +9,7 @@ import numpy as np
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.joint_feedback import Feedback, Motion, SoftStops
 from ...robots.description import RobotDescription
+from ...robots.limb import chain_to
 from ...runtime.language.block import Input, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -34,7 +35,6 @@ from .joint_command import (
     command_joints,
 )
 from .joint_gains import default_gains
-from .tasks.foot_joints import leg_joints
 
 _KINDS = {"measured": MEASURED, "acceleration": ACCELERATION, "legs": LEGS}
 
@@ -209,7 +209,7 @@ def _legs(robot: RobotDescription) -> Legs:
         if joint.name in robot.held:
             held[k], angle[k] = True, robot.held[joint.name]
     for foot in range(len(robot.feet)):
-        for k in leg_joints(robot, foot):
+        for k in chain_to(robot, robot.feet[foot].link):
             in_leg[k] = True
             foot_of_joint[k] = -1 if held[k] else foot
     foot_of_point = np.array(robot.foot_of_contact(), np.int64)

@@ -47,10 +47,9 @@ def end_targets(
 ) -> None:
     """Take the plan's joints instead where it flies, or has just landed, and is followed; remember what
     was ``found``."""
-    if follows and int(plan.phase[()]) == _FLIGHT:
+    if follows and plan.phase[()] == _FLIGHT:
         follow_plan(following, soles, plan, flown, target)
     elif follows:
         go_on(following, plan, flown, target)
-    for joint in range(found.shape[0]):
-        found[joint] = target.position[joint]
+    found[:] = target.position
     known[()] = True

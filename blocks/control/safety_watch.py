@@ -123,7 +123,7 @@ def note_change(robot: RobotState, timers: Timers) -> None:
         timers.last_position[joint] = position
         timers.last_velocity[joint] = velocity
     timers.started[()] = True
-    timers.stale[()] = 0 if changed else int(timers.stale[()]) + 1
+    timers.stale[()] = 0 if changed else timers.stale[()] + 1
 
 
 @kernel
@@ -134,20 +134,20 @@ def judge(desired: Command, robot: RobotState, bounds: Bounds, timers: Timers) -
     if not is_possible(robot):
         return _ABSURD_STATE
     leans = tilt(robot.orientation) > bounds.tilt
-    timers.tilted[()] = int(timers.tilted[()]) + 1 if leans else 0
+    timers.tilted[()] = timers.tilted[()] + 1 if leans else 0
     beyond = count_beyond(robot.joint_position, bounds.lower, bounds.upper, timers.beyond)
     fast = count_faster(robot.joint_velocity, bounds.speed, timers.fast)
     note_change(robot, timers)
-    timers.unsolved[()] = 0 if robot.solved[()] else int(timers.unsolved[()]) + 1
+    timers.unsolved[()] = 0 if robot.solved[()] else timers.unsolved[()] + 1
     if timers.tilted[()] > bounds.tilt_ticks:
         return _TILT
     if beyond > bounds.joint_ticks:
         return _JOINT_LIMIT
     if fast > bounds.joint_ticks:
         return _JOINT_SPEED
-    if 0 < bounds.stale_ticks <= int(timers.stale[()]):
+    if 0 < bounds.stale_ticks <= timers.stale[()]:
         return _STALE_SENSORS
-    if 0 < bounds.unsolved_ticks <= int(timers.unsolved[()]):
+    if 0 < bounds.unsolved_ticks <= timers.unsolved[()]:
         return _SOLVER
     return 0
 
@@ -197,7 +197,7 @@ def watch(
     fault, place, value = judge(desired, robot, bounds, timers), 0, 0.0
     if _OFF < health.state[()] < _DAMPED:
         judge_health(health.drives, health.sensors, health.limits, health.verdict)
-        found, place = int(health.verdict[0]), int(health.verdict[1])
+        found, place = health.verdict[0], health.verdict[1]
         value = measured(health, found, place)
         if fault == 0:
             fault = found

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ...mathematics.arrays import Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
+from ...mathematics.kernel import kernel
 from ...mathematics.quadratic_program import QuadraticProgramSolver
 from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ...mathematics.whole_body_qp import (
@@ -24,6 +28,7 @@ from ...mathematics.whole_body_solution import (
     MOTOR_LIMITS,
     NO_CONTACT,
     NO_LIMITS,
+    SOLVED,
     Motors,
     Solution,
     Weights,
@@ -32,26 +37,42 @@ from ...mathematics.whole_body_solution import (
     solve_whole_body,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
+from ...runtime.language.steps import PythonCall, signal_call
 from ..signals import (
     DynamicsTerms,
     JointState,
+    Phase,
     PhaseState,
     WholeBodyCommand,
     WholeBodyTarget,
 )
-from .round_program import RoundProgram
-from .task_gains import TaskGains
-from .tasks.choose import OWN_TASKS, PHASE_KINDS, ChosenTask, TaskChoiceError, choose_tasks
-from .tasks.task import KernelTask, Situation, Task, TaskChoice
-from .whole_body_program import FullProgram
-from .whole_body_step import Kept, Told, Turns, keep_solution, take_turns
+from .frames import FrameModel
+from .tasks.task import (
+    PHASE_KINDS,
+    ChosenTask,
+    Task,
+    TaskChoice,
+    TaskChoiceError,
+    choose_tasks,
+    own_tasks,
+)
+from .whole_body_program import FullProgram, RoundProgram
 
+PAPER_TASKS = (
+    "ContactPoints", "LinearMomentum", "TorsoOrientation", "AngularMomentum", "Posture",
+)  # fmt: skip
+"""The tasks of a controller whose graph names none; the controller has their gains in common."""
 OWN_SOLVER = "active_set"
 """The name of the method that needs no library."""
+
+
+class TaskGains(*(own_tasks()[name].Gains for name in reversed(PAPER_TASKS))):  # type: ignore[misc]
+    """Weights and gains of the paper's tasks in one kind of phase. Vectors are x, y, z: the world's for
+    momentum, the body's for the torso."""
 
 
 class SolverMemory(Signal):
@@ -80,7 +101,8 @@ class WholeBodyController(KernelBlock):
     ``TorsoOrientation``, ``AngularMomentum`` (the paper's tasks 1 to 4) and ``Posture``, which
     keeps joints that belong to no leg at their angles. A graph chooses others with ``tasks``; an
     entry is the name of a task, or ``{task: module:Class, gains: {...}}`` for a class of the user's
-    own and for gains of one entry alone. See ``docs/whole_body.md``.
+    own and for gains of one entry alone. A task with a target of its own, such as
+    ``FramePosition``, adds an input. See ``docs/whole_body.md``.
 
     ``stand`` gains hold in STAND and SQUAT, ``thrust`` in THRUST, ``landing`` after. The default
     thrust gains give lateral motion priority over roll and yaw momentum: where a thigh is level the
@@ -120,7 +142,9 @@ class WholeBodyController(KernelBlock):
 
     class Params(Parameters):
         tasks: list[str | TaskChoice] = parameter(
-            list(OWN_TASKS), min_length=1, text="the tasks, each an objective for the acceleration"
+            list(PAPER_TASKS),
+            min_length=1,
+            text="the tasks, each an objective for the acceleration",
         )
         solver: str = parameter(
             OWN_SOLVER, text="active_set, or any dense solver that qpsolvers finds installed"
@@ -212,13 +236,30 @@ class WholeBodyController(KernelBlock):
             for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
                 found: dict[str, None] = {}
                 for kind in PHASE_KINDS:
-                    gains = chosen.gains(kind, getattr(params, kind))
+                    gains = chosen.params(kind, getattr(params, kind))
                     if context.robot is not None:
-                        found.update(dict.fromkeys(chosen.kind.misfits(context.robot, gains)))
+                        found.update(dict.fromkeys(chosen.kind.misfits(gains, context.robot)))
                 for reason in found:
                     yield Misfit(f"task {chosen.entry.task}: {reason}", parameter="tasks")
         except TaskChoiceError as error:
             yield Misfit(str(error), parameter="tasks")
+
+    @classmethod
+    def fitted(
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
+    ) -> type[Block]:
+        """The class with the inputs of the tasks; a list that cannot be used is reported later."""
+        assert isinstance(params, cls.Params)
+        try:
+            chosen = choose_tasks(params.tasks, (graph_folder or folder, folder))
+        except TaskChoiceError:
+            return cls
+        inputs = [(each.kind, own, name) for each in chosen for own, name in each.inputs.items()]
+        return _class_with(tuple(inputs)) if inputs else cls
 
     def setup(self) -> None:
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
@@ -236,11 +277,14 @@ class WholeBodyController(KernelBlock):
             np.zeros(n_joints),
             Bounds(np.zeros(n_joints), np.zeros(n_joints)),
         )
-        self._product, self._still = np.zeros(n_joints), np.zeros(n)
+        self._product, self._zero_acceleration = np.zeros(n_joints), np.zeros(n)
         self._model = RigidBodyTerms(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
         )
-        self._build_tasks(robot, n)
+        self._chosen: tuple[ChosenTask, ...] = choose_tasks(
+            p.tasks, (self.context.graph_folder, self.context.folder)
+        )
+        self._make_tasks(n)
         self._code = np.zeros(1, dtype=np.int64)
         is_round = p.cones == "round"
         self._solve = KernelCall(
@@ -250,68 +294,73 @@ class WholeBodyController(KernelBlock):
             Solution(command.torque, command.acceleration, command.force, self._code),
         )  # fmt: skip
         self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
-        self._turns = Turns(*(np.zeros(1, np.int64) for _ in Turns._fields))
+        self._active_calls = ActiveCalls(*(np.zeros(1, np.int64) for _ in ActiveCalls._fields))
         self._unsolved = np.zeros(1, np.int64)
-        self._take_turns = KernelCall(take_turns, self.phase.phase, self.phase.stance, self._turns)
-        self._keep = KernelCall(
-            keep_solution, self._turns.loaded, self._code,
-            Told(*(getattr(command, name) for name in Told._fields)),
-            Kept(*(getattr(self.memory, name) for name in Kept._fields)), self._unsolved,
+        self._activate = signal_call(activate_calls, self.phase, self._active_calls)
+        self._keep = signal_call(
+            keep_solution, self._active_calls.loaded, self._code, command, self.memory,
+            self._unsolved,
         )  # fmt: skip
         self._own = p.solver == OWN_SOLVER
         self._other = (RoundProgram if is_round else FullProgram)(
             "daqp" if self._own else p.solver, self._rows, self._model, self._motors,
             self._weights, limited=limited, n_contacts=n_contacts,
         )  # fmt: skip
-        self.on_parameters()
+        self._arrange()
 
-    def _build_tasks(self, robot: RobotDescription, n: int) -> None:
-        """The chosen tasks, each with its part of the rows."""
-        situation = Situation(robot, self.terms, self.target, self.phase, self.joints)
-        self._chosen: tuple[ChosenTask, ...] = choose_tasks(
-            self.params.tasks, (self.context.graph_folder, self.context.folder)
-        )
+    def _make_tasks(self, n: int) -> None:
+        """The tasks for each kind of phase; those of one entry share their part of the rows."""
+        params = {kind: self._task_params(kind) for kind in PHASE_KINDS}
         counts = [
-            chosen.kind.row_count(robot, chosen.gains("stand", self.params.stand))
-            for chosen in self._chosen
+            chosen.kind.row_count(each, self.robot)
+            for chosen, each in zip(self._chosen, params["stand"], strict=True)
         ]
         total = sum(counts)
         self._rows = TaskRows(np.zeros((total, n)), np.zeros(total), np.zeros(total))
-        self._tasks: list[Task[Any]] = []
-        first = 0
-        for chosen, count in zip(self._chosen, counts, strict=True):
-            own = TaskRows(*(array[first : first + count] for array in self._rows))
-            self._tasks.append(chosen.kind(situation, own))
-            first += count
+        self._frames = FrameModel(self.robot, self.terms, self.joints)
+        self._tasks: dict[str, list[Task]] = {}
+        for kind in PHASE_KINDS:
+            first, tasks = 0, []
+            for chosen, count, each in zip(self._chosen, counts, params[kind], strict=True):
+                rows = TaskRows(*(array[first : first + count] for array in self._rows))
+                ports = {name: getattr(self, name) for name in Task.inputs}
+                ports |= {own: getattr(self, name) for own, name in chosen.inputs.items()}
+                tasks.append(chosen.kind(each, rows, ports, self._frames, self.context))
+                first += count
+            self._tasks[kind] = tasks
 
-    def on_parameters(self) -> None:
+    def _task_params(self, kind: str) -> list[Parameters]:
+        """The parameters of all tasks in a kind of phase."""
+        return [chosen.params(kind, getattr(self.params, kind)) for chosen in self._chosen]
+
+    def prepare(self) -> None:
         p, weights = self.params, self._weights
         weights.acceleration[0], weights.force[0] = p.acceleration_weight, p.force_weight
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
         peak = self.robot.motors.peak_torque
         np.multiply(p.torque_margin, peak, out=self._motors.curves.peak)
-        self._gains = {
-            kind: [
-                task.prepare(chosen.gains(kind, getattr(p, kind)))
-                for chosen, task in zip(self._chosen, self._tasks, strict=True)
-            ]
-            for kind in PHASE_KINDS
-        }
-        self._arrange()
+        changed = {kind: self._task_params(kind) for kind in PHASE_KINDS}
+        for kind, params in changed.items():
+            for task, each in zip(self._tasks[kind], params, strict=True):
+                task.change(each)
 
     def _arrange(self) -> None:
         """Let the step be kernels alone if the tasks and the solver are; else leave it to ``on_event``."""
-        calls = [call for kind in PHASE_KINDS for call in self._gains[kind]]
-        own = all(type(task).update is KernelTask.update for task in self._tasks)
-        if not self._own or not own or len(set(map(id, calls))) < len(calls):
+        self._task_calls = {
+            kind: [call for task in tasks for call in task.calls()]
+            for kind, tasks in self._tasks.items()
+        }
+        calls = [call for kind in PHASE_KINDS for call in self._task_calls[kind]]
+        if not self._own or any(isinstance(call, PythonCall) for call in calls):
             self.kernel_calls, self.event = (), np.ones(1, np.int64)
             return
         for kind in PHASE_KINDS:
-            for call in self._gains[kind]:
-                call.when = getattr(self._turns, kind)
-        self._solve.when = self._turns.loaded
-        self.kernel_calls = (self._take_turns, *calls, self._solve, self._keep)
+            for call in self._task_calls[kind]:
+                call.when = getattr(self._active_calls, kind)
+        for call in (*self._frames.calls, self._solve):
+            call.when = self._active_calls.loaded
+        self.kernel_calls = (self._activate, *self._frames.calls, *calls, self._solve, self._keep)
         self.event = self._unsolved
 
     def on_event(self) -> None:
@@ -330,14 +379,17 @@ class WholeBodyController(KernelBlock):
 
     def _step_in_python(self) -> bool:
         """The same step where a task or the solver is no kernel; returns whether all is done."""
-        turns = self._turns
-        self._take_turns.run()
+        active = self._active_calls
+        self._activate.run()
+        if active.loaded[0]:
+            for frame in self._frames.calls:
+                frame.run()
         for kind in PHASE_KINDS:
-            if getattr(turns, kind)[0]:
-                for task, gains in zip(self._tasks, self._gains[kind], strict=True):
-                    task.update(gains)
+            if getattr(active, kind)[0]:
+                for call in self._task_calls[kind]:
+                    call.run()
         self._code[0] = NO_CONTACT
-        if self._own and turns.loaded[0]:
+        if self._own and active.loaded[0]:
             self._solve.run()
         self._keep.run()
         return not self._unsolved[0]
@@ -345,7 +397,7 @@ class WholeBodyController(KernelBlock):
     def _solve_otherwise(self) -> bool:
         """Solve the program in accelerations and forces by the chosen solver, or where the own
         method has failed by DAQP. Returns whether it was solved."""
-        command, n = self.command, self._still.shape[0]
+        command, n = self.command, self._zero_acceleration.shape[0]
         command.force.fill(0.0)
         command.acceleration.fill(0.0)
         active = np.flatnonzero(self.phase.stance)
@@ -369,4 +421,73 @@ class WholeBodyController(KernelBlock):
             np.multiply(memory.torque, p.fallback_decay**failed, out=command.torque)
             return
         share_weight(self.phase.stance, self._weight, command.force)
-        joint_torque(self._model, self._still, command.force, self._product, command.torque)
+        joint_torque(
+            self._model, self._zero_acceleration, command.force, self._product, command.torque
+        )
+
+
+@cache
+def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBodyController]:
+    """The controller with inputs for tasks, each given by the task, its name there and here."""
+    body: dict[str, Any] = {
+        "__doc__": WholeBodyController.__doc__,
+        "__module__": WholeBodyController.__module__,
+    }
+    for kind, own, name in inputs:
+        port = kind.inputs[own]
+        body[name] = Input(port.signal, text=port.text, default=port.default)
+    return type(WholeBodyController.__name__, (WholeBodyController,), body)
+
+
+class ActiveCalls(NamedTuple):
+    """Which calls a step makes, each (1,) and not zero where it makes them: the tasks with the gains
+    of ``stand``, ``thrust`` or ``landing``, and what solves the program if a point is ``loaded``."""
+
+    stand: Indices1D
+    thrust: Indices1D
+    landing: Indices1D
+    loaded: Indices1D
+
+
+@kernel
+def activate_calls(phase: PhaseState, active: ActiveCalls) -> None:
+    """Find which gains hold in the phase, and whether a point is in stance."""
+    loaded = 0
+    for i in range(phase.stance.shape[0]):
+        if phase.stance[i]:
+            loaded = 1
+    active.stand[0] = loaded if phase.phase < Phase.THRUST else 0
+    active.thrust[0] = loaded if phase.phase == Phase.THRUST else 0
+    active.landing[0] = loaded if phase.phase > Phase.THRUST else 0
+    active.loaded[0] = loaded
+
+
+@kernel
+def keep_solution(
+    loaded: Indices1D,
+    code: Indices1D,
+    command: WholeBodyCommand,
+    memory: SolverMemory,
+    unsolved: Indices1D,
+) -> None:
+    """Remember a solution, or without a point in stance make everything zero.
+
+    Args:
+        loaded: whether a point is in stance, (1,).
+        code: SOLVED where the program has been solved, (1,).
+        unsolved: becomes 1 where it has not, else 0, (1,); then nothing else is written.
+    """
+    unsolved[0] = 0
+    if loaded[0] == 0:
+        command.force[:, :] = 0.0
+        command.acceleration[:] = 0.0
+        command.torque[:] = 0.0
+        memory.torque[:] = 0.0
+    elif code[0] == SOLVED:
+        memory.torque[:] = command.torque
+    else:
+        unsolved[0] = 1
+        return
+    memory.failed = 0
+    command.solved = True
+    command.failures = memory.failures

@@ -161,13 +161,13 @@ def watch_motion(estimator: Estimator) -> float:
     estimate, sample = estimator.filter, estimator.sample
     share, fastest = estimator.fixed.watch_share, 0.0
     for i in range(3):
-        mean = float(estimate.mean_rate[i])
-        mean += share * (float(sample.gyro[i]) - mean)
+        mean = estimate.mean_rate[i]
+        mean += share * (sample.gyro[i] - mean)
         estimate.mean_rate[i] = mean
         fastest = max(fastest, abs(mean))
     for i in range(sample.joint_rates.shape[0]):
-        mean = float(estimate.mean_joint_rate[i])
-        mean += share * (float(sample.joint_rates[i]) - mean)
+        mean = estimate.mean_joint_rate[i]
+        mean += share * (sample.joint_rates[i] - mean)
         estimate.mean_joint_rate[i] = mean
         fastest = max(fastest, abs(mean))
     active = estimator.legs.points.active
@@ -186,14 +186,13 @@ def start(estimator: Estimator) -> None:
         limit(error, 0.2, error)
         if not estimator.fixed.starts_level:
             error[0] = error[1] = 0.0
-        turn(estimate.orientation, float(error[0]), float(error[1]), float(error[2]))
+        turn(estimate.orientation, error[0], error[1], error[2])
     for foot in range(seen.soles.shape[0]):
         rotate(estimate.orientation, seen.soles[foot], spare)
-        for axis in range(2):
-            estimate.position[axis] -= float(spare[axis]) / seen.soles.shape[0]
+        estimate.position[:2] -= spare[:2] / seen.soles.shape[0]
     for point in range(seen.points.shape[0]):
         rotate(estimate.orientation, seen.points[point], spare)
-        estimate.position[2] -= float(spare[2]) / seen.points.shape[0]
+        estimate.position[2] -= spare[2] / seen.points.shape[0]
     for joint in range(estimate.mean_joint_rate.shape[0]):
         estimate.mean_joint_rate[joint] = 1.0  # it counts as moving until it is seen at rest
     estimate.started[()] = True
@@ -213,11 +212,9 @@ def predict(estimator: Estimator) -> float:
     started = bool(estimate.started[()])
     if started:
         fastest = watch_motion(estimator)
-    for axis in range(3):
-        sample.force[axis] -= float(estimate.accelerometer_bias[axis])
-        scratch.last_rate[axis] = estimate.angular_velocity[axis]
-        rate = float(sample.gyro[axis]) - float(estimate.gyro_bias[axis])
-        estimate.angular_velocity[axis] = rate
+    sample.force[:] -= estimate.accelerometer_bias
+    scratch.last_rate[:] = estimate.angular_velocity
+    estimate.angular_velocity[:] = sample.gyro - estimate.gyro_bias
     if started:
         propagate(
             estimate.orientation, estimate.position, estimate.velocity, scratch.last_rate,
@@ -251,8 +248,7 @@ def is_unaccelerated(force: Array1D) -> bool:
 def forget_samples(learning: Learning) -> None:
     """Begin a new block of samples, since the robot moves."""
     learning.filled[()] = learning.held[()] = 0
-    for axis in range(3):
-        learning.filling_sum[axis] = 0.0
+    learning.filling_sum[:] = 0.0
 
 
 @kernel
@@ -264,19 +260,16 @@ def learn_bias(learning: Learning, block: int, bias: Vector3, prior: float) -> N
     zero with the weight of ``prior`` samples: the usual ratio of the variances of noise and
     bias.
     """
-    filled = int(learning.filled[()]) + 1
+    filled = learning.filled[()] + 1
     learning.filled[()] = filled
     if filled < block:
         return
     if learning.held[()] > 0:
-        samples = min(int(learning.samples[()]) + filled, 1000)
+        samples = min(learning.samples[()] + filled, 1000)
         learning.samples[()] = samples
-        for i in range(3):
-            excess = float(learning.held_sum[i]) - filled * bias[i]
-            bias[i] += excess / (samples + prior)
-    for axis in range(3):
-        learning.held_sum[axis] = learning.filling_sum[axis]
-        learning.filling_sum[axis] = 0.0
+        bias[:] += (learning.held_sum - filled * bias) / (samples + prior)
+    learning.held_sum[:] = learning.filling_sum
+    learning.filling_sum[:] = 0.0
     learning.held[()], learning.filled[()] = filled, 0
 
 
@@ -284,24 +277,24 @@ def learn_bias(learning: Learning, block: int, bias: Vector3, prior: float) -> N
 def fall_freely(estimator: Estimator) -> None:
     """In flight, let the centre of mass fall freely and the base follow from the joints."""
     estimate, scratch, period = estimator.filter, estimator.scratch, estimator.fixed.period
-    ticks, fall, change = int(estimate.flight_ticks[()]), scratch.spare, scratch.acceleration
+    ticks, fall, change = estimate.flight_ticks[()], scratch.spare, scratch.acceleration
     if ticks == 0:
         return
     average = max(round(0.02 / period), 1)
     rotate(estimate.orientation, estimator.legs.seen.com_velocity, fall)
     largest = 0.0
     for axis in range(3):
-        fall[axis] += float(estimate.velocity[axis])
+        fall[axis] += estimate.velocity[axis]
         if axis == 2:
             fall[axis] += GRAVITY * period * ticks
-        change[axis] = float(fall[axis]) - float(estimate.ballistic_velocity[axis])
-        largest = max(largest, abs(float(change[axis])))
+        change[axis] = fall[axis] - estimate.ballistic_velocity[axis]
+        largest = max(largest, abs(change[axis]))
     if ticks <= average:
         for axis in range(3):
-            estimate.ballistic_velocity[axis] += float(change[axis]) / ticks
+            estimate.ballistic_velocity[axis] += change[axis] / ticks
     elif largest < _IMPACT:
         for axis in range(3):
-            estimate.velocity[axis] -= float(change[axis])
+            estimate.velocity[axis] -= change[axis]
     else:
         estimate.flight_ticks[()] = 0  # an impact: keep the velocity by the IMU
 
@@ -317,16 +310,14 @@ def use_contacts(estimator: Estimator, trusted: float, support: float) -> None:
     estimate, settings, base = estimator.filter, estimator.settings, estimator.base
     points = estimator.legs.points
     airborne = trusted * support < 0.25 or count_standing(points.active) == 0
-    estimate.flight_ticks[()] = int(estimate.flight_ticks[()]) + 1 if airborne else 0
+    estimate.flight_ticks[()] = estimate.flight_ticks[()] + 1 if airborne else 0
     stand_on(
-        points, support * float(settings.velocity_gain[0]),
-        support * float(settings.position_gain[0]), estimate.position, estimate.velocity,
+        points, support * settings.velocity_gain[0],
+        support * settings.position_gain[0], estimate.position, estimate.velocity,
     )  # fmt: skip
     if estimator.fixed.ballistic:
         fall_freely(estimator)
-    for axis in range(3):
-        base.position[axis] = estimate.position[axis]
-        base.linear_velocity[axis] = estimate.velocity[axis]
-        base.angular_velocity[axis] = estimate.angular_velocity[axis]
-    for k in range(4):
-        base.orientation[k] = estimate.orientation[k]
+    base.position[:] = estimate.position
+    base.linear_velocity[:] = estimate.velocity
+    base.angular_velocity[:] = estimate.angular_velocity
+    base.orientation[:] = estimate.orientation

@@ -25,19 +25,17 @@ def filter_tick(estimator: Estimator) -> None:
     points = estimator.legs.points
     fastest = predict(estimator)
     if fastest < estimator.settings.still_rate[0]:
-        for axis in range(3):
-            learning.filling_sum[axis] += float(sample.gyro[axis])
+        learning.filling_sum[:] += sample.gyro
         learn_bias(learning, estimator.fixed.block, estimate.gyro_bias, 10.0)
     else:
         forget_samples(learning)
     if is_unaccelerated(sample.force) and count_standing(points.active) > 0:
         correct_tilt_from_gravity(
-            estimate.orientation, sample.force, float(estimator.settings.tilt_gain[0]),
+            estimate.orientation, sample.force, estimator.settings.tilt_gain[0],
             estimator.scratch.spare,
         )  # fmt: skip
     place_points(estimator)
-    for point in range(points.weights.shape[0]):
-        points.weights[point] = 1.0 if points.active[point] else 0.0
+    points.weights[:] = 1.0 if points.active else 0.0
     use_contacts(estimator, 1.0, 1.0)
 
 

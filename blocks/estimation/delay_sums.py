@@ -44,7 +44,7 @@ def give_delay(
 ) -> None:
     """Write the fields of ``DelayEstimate``: what was measured, whether it counts, the delay, and how
     much of it is more than ``tolerated`` [s]."""
-    found = float(memory.delay[()])
+    found = memory.delay[()]
     measured[()] = max(found, 0.0)
     known[()] = found >= 0.0
     delay[()] = max(found - usual, 0.0) if found >= 0.0 and follows else told
@@ -69,7 +69,7 @@ def follow_delay(
         least_match: the share of the changes that it must explain.
         period: of a tick [s].
     """
-    ticks, changes = int(memory.ticks[()]), memory.changes
+    ticks, changes = memory.ticks[()], memory.changes
     if ticks > last:
         return
     if ticks > LAGS + 1:  # before, some changes are those from nothing to the first command
@@ -77,7 +77,7 @@ def follow_delay(
     for joint in range(command.shape[0]):
         for lag in range(LAGS - 1, 0, -1):
             changes[lag, joint] = changes[lag - 1, joint]
-        changes[0, joint] = command[joint] - float(memory.command[joint])
+        changes[0, joint] = command[joint] - memory.command[joint]
         memory.command[joint] = command[joint]
         memory.torque[joint] = torque[joint]
     memory.ticks[()] = ticks + 1
@@ -91,37 +91,37 @@ def add_changes(torque: Array1D, memory: Memory) -> None:
     joints, changes = torque.shape[0], memory.changes
     energy = 0.0
     for joint in range(joints):
-        change = torque[joint] - float(memory.torque[joint])
+        change = torque[joint] - memory.torque[joint]
         energy += change * change
-    memory.energy[()] = float(memory.energy[()]) + energy
+    memory.energy[()] = memory.energy[()] + energy
     for i in range(LAGS):
         total = 0.0
         for joint in range(joints):
-            change = torque[joint] - float(memory.torque[joint])
-            total += float(changes[i, joint]) * change
-        memory.product[i] = float(memory.product[i]) + total
+            change = torque[joint] - memory.torque[joint]
+            total += changes[i, joint] * change
+        memory.product[i] = memory.product[i] + total
         for j in range(LAGS):
             total = 0.0
             for joint in range(joints):
-                total += float(changes[i, joint]) * float(changes[j, joint])
-            memory.square[i, j] = float(memory.square[i, j]) + total
+                total += changes[i, joint] * changes[j, joint]
+            memory.square[i, j] = memory.square[i, j] + total
 
 
 @kernel
 def solve_delay(least_match: float, period: float, memory: Memory) -> None:
     """The number of periods and the share of one that leave the least unexplained."""
     square, product = memory.square, memory.product
-    energy = float(memory.energy[()])
+    energy = memory.energy[()]
     if energy <= 0.0:
         return
     best, delay = energy, -1.0
     for j in range(LAGS - 1):
-        own, cross = float(square[j, j]), float(square[j, j + 1])
-        other = float(square[j + 1, j + 1])
+        own, cross = square[j, j], square[j, j + 1]
+        other = square[j + 1, j + 1]
         length = own - 2.0 * cross + other
         if length <= 0.0:
             continue
-        here, there = float(product[j]), float(product[j + 1])
+        here, there = product[j], product[j + 1]
         share = min(max((there - here - cross + own) / length, 0.0), 1.0)
         rest = 1.0 - share
         error = energy - 2.0 * (rest * here + share * there)

@@ -129,11 +129,11 @@ def publish_mass(
 ) -> None:
     """Write the estimate's ``mass`` and ``deviation`` () [kg], and the torso's offset (3,) [m]."""
     # Rounding may leave a variance that is all but zero just below it.
-    out[()] = mass * float(memory.published[0])
-    deviation[()] = mass * math.sqrt(max(float(memory.covariance[SCALE, SCALE]), 0.0))
+    out[()] = mass * memory.published[0]
+    deviation[()] = mass * math.sqrt(max(memory.covariance[SCALE, SCALE], 0.0))
     for k in range(3):
         offset[k] = memory.published[1 + k]
-        offset_std[k] = math.sqrt(max(float(memory.covariance[COM + k, COM + k]), 0.0))
+        offset_std[k] = math.sqrt(max(memory.covariance[COM + k, COM + k], 0.0))
 
 
 @kernel
@@ -141,32 +141,31 @@ def follow_mass(
     measured: Measured, memory: Memory, model: Model, settings: Settings, scratch: Scratch
 ) -> None:
     """One tick: filter velocity and torque, correct the estimate where it is due, publish it."""
-    joints, ticks = memory.torque.shape[0], int(memory.ticks[()])
+    joints, ticks = memory.torque.shape[0], memory.ticks[()]
     if ticks == 0:
-        for i in range(memory.velocity.shape[0]):
-            memory.velocity[i] = measured.velocity[i]
+        memory.velocity[:] = measured.velocity
         for i in range(joints):
             memory.torque[i] = measured.torque[i]
-    if int(measured.phase[()]) > _SQUAT:
+    if measured.phase[()] > _SQUAT:
         memory.over[()] = True
     if not memory.over[()]:
         ticks += 1
         memory.ticks[()] = ticks
         for i in range(memory.velocity.shape[0]):
-            change = (float(measured.velocity[i]) - float(memory.velocity[i])) * settings.filter
-            memory.velocity[i] = float(memory.velocity[i]) + change
+            change = (measured.velocity[i] - memory.velocity[i]) * settings.filter
+            memory.velocity[i] = memory.velocity[i] + change
             scratch.acceleration[i] = change / settings.period
         for i in range(joints):
-            change = (float(measured.torque[i]) - float(memory.torque[i])) * settings.filter
-            memory.torque[i] = float(memory.torque[i]) + change
+            change = (measured.torque[i] - memory.torque[i]) * settings.filter
+            memory.torque[i] = memory.torque[i] + change
         stands = False
         for point in range(measured.stance.shape[0]):
             stands = stands or bool(measured.stance[point])
         if stands and ticks % settings.every == 0 and ticks >= settings.settled:
             correct_mass(measured, memory, model, settings, scratch)
     for k in range(4):
-        change = (float(memory.unknowns[k]) - float(memory.published[k])) * settings.follow
-        memory.published[k] = float(memory.published[k]) + change
+        change = (memory.unknowns[k] - memory.published[k]) * settings.follow
+        memory.published[k] = memory.published[k] + change
 
 
 @kernel
@@ -180,18 +179,18 @@ def correct_mass(
     for k in range(6):
         expected = 0.0
         for i in range(memory.unknowns.shape[0]):
-            value = float(memory.unknowns[i])
+            value = memory.unknowns[i]
             if i < TILT:
-                value -= float(memory.published[i])
-            expected += value * float(scratch.rows[k, i])
+                value -= memory.published[i]
+            expected += value * scratch.rows[k, i]
         # The gyroscope's noise moves the residual by the inertia times the noise of the acceleration.
-        variance = float(settings.noise[k]) * float(settings.noise[k])
+        variance = settings.noise[k] * settings.noise[k]
         for j in range(3, 6):
-            moved = float(measured.mass_matrix[k, j]) * settings.rotation_noise
+            moved = measured.mass_matrix[k, j] * settings.rotation_noise
             variance += moved * moved
         correct_row(
             memory.unknowns, memory.covariance, scratch.rows[k],
-            -float(scratch.residual[k]) - expected, math.sqrt(variance), settings.gate,
+            -scratch.residual[k] - expected, math.sqrt(variance), settings.gate,
             scratch.seen,
         )  # fmt: skip
 
@@ -215,24 +214,23 @@ def form_rows(
         settings.friction_left, scratch.known, scratch.unknown,
     )  # fmt: skip
     multiply_vector(measured.mass_matrix, scratch.acceleration, force)
-    for i in range(force.shape[0]):
-        force[i] = float(force[i]) + float(measured.nonlinear[i])
+    force[:] = force + measured.nonlinear
     for j in range(joints):
-        left = float(memory.torque[j]) - float(scratch.known[j])
-        scratch.joint[j] = left - float(force[6 + j])
+        left = memory.torque[j] - scratch.known[j]
+        scratch.joint[j] = left - force[6 + j]
     multiply_vector(scratch.map, scratch.joint, scratch.residual)
     multiply_vector(scratch.map, measured.nonlinear[6:], scratch.base)
-    scale = float(memory.published[0])
+    scale = memory.published[0]
     for k in range(6):
-        scratch.residual[k] = float(scratch.residual[k]) + float(force[k])
-        rows[k, SCALE] = (float(measured.nonlinear[k]) - float(scratch.base[k])) / scale
+        scratch.residual[k] = scratch.residual[k] + force[k]
+        rows[k, SCALE] = (measured.nonlinear[k] - scratch.base[k]) / scale
     torso_moment(measured.base_rotation, scale * model.torso * GRAVITY, rows[3:, COM:TILT])
-    lowest = float(measured.foot_position[0, 2])
+    lowest = measured.foot_position[0, 2]
     for foot in range(1, measured.foot_position.shape[0]):
-        lowest = min(lowest, float(measured.foot_position[foot, 2]))
-    moment = scale * model.mass * GRAVITY * (float(measured.com[2]) - lowest)
+        lowest = min(lowest, measured.foot_position[foot, 2])
+    moment = scale * model.mass * GRAVITY * (measured.com[2] - lowest)
     rows[3, TILT], rows[4, TILT + 1] = moment, moment
     for k in range(6):
         for j in range(joints):
-            friction = float(scratch.unknown[j]) * float(model.friction[j])
-            rows[k, FRICTION + j] = -(float(scratch.map[k, j]) * friction)
+            friction = scratch.unknown[j] * model.friction[j]
+            rows[k, FRICTION + j] = -(scratch.map[k, j] * friction)

@@ -64,22 +64,20 @@ def align_with_ground(estimator: Estimator, trust: Trust) -> None:
     estimate, seen, scratch = estimator.filter, estimator.legs.seen, estimator.scratch
     error, spare = scratch.error, scratch.spare
     # Least squares over all ticks so far, then over the last 250: angle and its drift.
-    ticks = min(int(trust.aligned[()]) + 1, 250)
+    ticks = min(trust.aligned[()] + 1, 250)
     trust.aligned[()] = ticks
     n = max(ticks, 30)
     angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
     misalignment(estimate.orientation, seen.points, seen.forward, error, spare)
     if not trust.facing[()]:
-        trust.heading[()] = -float(error[2])
+        trust.heading[()] = -error[2]
         trust.facing[()] = True
-    error[2] = wrap(float(error[2]) + float(trust.heading[()]))
+    error[2] = wrap(error[2] + trust.heading[()])
     limit(error, 0.05, error)
     rotate_back(estimate.orientation, error, spare)
-    for axis in range(3):
-        drift = float(spare[axis]) * (drift_gain / estimator.fixed.period)
-        estimate.gyro_bias[axis] -= drift
-        error[axis] *= angle_gain
-    turn(estimate.orientation, float(error[0]), float(error[1]), float(error[2]))
+    estimate.gyro_bias[:] -= spare * (drift_gain / estimator.fixed.period)
+    error[:] *= angle_gain
+    turn(estimate.orientation, error[0], error[1], error[2])
 
 
 @kernel
@@ -93,9 +91,7 @@ def learn_accelerometer_bias(estimator: Estimator, still: bool) -> None:
     up[0] = up[1] = 0.0
     up[2] = GRAVITY
     rotate_back(estimate.orientation, up, weight)
-    for axis in range(3):
-        total = float(learning.filling_sum[axis]) + float(estimator.sample.force[axis])
-        learning.filling_sum[axis] = total + float(bias[axis]) - float(weight[axis])
+    learning.filling_sum[:] = learning.filling_sum + estimator.sample.force + bias - weight
     learn_bias(learning, estimator.fixed.block, bias, 3.0)
 
 
@@ -122,7 +118,7 @@ def correct_orientation(
     elif still:
         correct_tilt_from_gravity(
             estimator.filter.orientation, estimator.sample.force,
-            float(estimator.settings.tilt_gain[0]), estimator.scratch.spare,
+            estimator.settings.tilt_gain[0], estimator.scratch.spare,
         )  # fmt: skip
 
 
@@ -135,16 +131,16 @@ def trust_points(
     Returns the largest weight, and a factor from 0 to 1 on all corrections by contacts.
     """
     estimate, points, up = estimator.filter, estimator.legs.points, estimator.scratch.spare
-    gate, growth = float(trust.gate[()]), float(settings.gate_growth[0])
+    gate, growth = trust.gate[()], settings.gate_growth[0]
     trusted = weigh(points.rates, points.active, estimate.velocity, gate, points.weights)
     rotate(estimate.orientation, estimator.sample.force, up)
-    support = min(max(float(up[2]) / float(settings.support[0]), 0.0), 1.0)
+    support = min(max(up[2] / settings.support[0], 0.0), 1.0)
     if count_standing(points.active) == 0:
         gate += 0.05 * growth * estimator.fixed.period
     elif trusted < 0.25:
         gate += growth * estimator.fixed.period
     else:
-        gate += 0.1 * (float(settings.gate[0]) - gate)
+        gate += 0.1 * (settings.gate[0] - gate)
     trust.gate[()] = min(gate, 10.0)
     return trusted, support
 

@@ -128,8 +128,7 @@ def remember_command(sent: Sent, acceleration: Array2D, loaded: Flags1D) -> None
     loaded[0] = False
     for point in range(sent.stance.shape[0]):
         loaded[0] = loaded[0] or bool(sent.stance[point])
-    for k in range(acceleration.shape[1]):
-        acceleration[0, k] = sent.acceleration[k]
+    acceleration[0, :] = sent.acceleration
 
 
 @kernel
@@ -141,7 +140,7 @@ def free_fall(body: Body, change: Change) -> None:
     rotate_back(body.orientation, body.linear_velocity, vector)
     cross(body.angular_velocity, vector, spare)
     for k in range(3):
-        fall[k] = float(fall[k]) - float(spare[k])
+        fall[k] = fall[k] - spare[k]
         fall[3 + k] = 0.0
 
 
@@ -172,12 +171,12 @@ def add_commands(
         weight = lasts * (ahead - 0.5 * (begin + end))
         if loaded[i]:
             for k in range(n):
-                change.speed[k] = float(change.speed[k]) + lasts * acceleration[i, k]
-                change.way[k] = float(change.way[k]) + weight * acceleration[i, k]
+                change.speed[k] = change.speed[k] + lasts * acceleration[i, k]
+                change.way[k] = change.way[k] + weight * acceleration[i, k]
         elif flies:
             for k in range(3):
-                change.speed[k] = float(change.speed[k]) + lasts * float(change.fall[k])
-                change.way[k] = float(change.way[k]) + weight * float(change.fall[k])
+                change.speed[k] = change.speed[k] + lasts * change.fall[k]
+                change.way[k] = change.way[k] + weight * change.fall[k]
 
 
 @kernel
@@ -195,7 +194,7 @@ def predict_state(
     """One tick of ``StatePredictor``."""
     remember_command(sent, acceleration, loaded)
     time = ahead[()]
-    flies = int(sent.phase[()]) == _FLIGHT
+    flies = sent.phase[()] == _FLIGHT
     free_fall(measured, change)
     add_commands(flies, delay[()], time, period, acceleration, loaded, change)
     speed, way, vector, spare, turn = (
@@ -203,19 +202,18 @@ def predict_state(
     )  # fmt: skip
     rotate_back(measured.orientation, measured.linear_velocity, vector)
     for k in range(3):
-        speed[k] = float(vector[k]) + float(speed[k])
-        way[k] = float(way[k]) + time * float(vector[k])
-        way[3 + k] = float(way[3 + k]) + time * float(measured.angular_velocity[k])
-        predicted.angular_velocity[k] = float(measured.angular_velocity[k]) + float(speed[3 + k])
+        speed[k] = vector[k] + speed[k]
+        way[k] = way[k] + time * vector[k]
+        way[3 + k] = way[3 + k] + time * measured.angular_velocity[k]
+        predicted.angular_velocity[k] = measured.angular_velocity[k] + speed[3 + k]
     rotate(measured.orientation, way[0:3], spare)
     exponential(way[3:6], turn)
     multiply(measured.orientation, turn, predicted.orientation)
     rotate(predicted.orientation, speed[0:3], predicted.linear_velocity)
-    for k in range(3):
-        predicted.position[k] = float(measured.position[k]) + float(spare[k])
+    predicted.position[:] = measured.position + spare
     for joint in range(predicted.joint_position.shape[0]):
-        rate = float(measured.joint_velocity[joint])
-        predicted.joint_velocity[joint] = rate + float(speed[6 + joint])
-        place = float(measured.joint_position[joint]) + time * rate
-        predicted.joint_position[joint] = place + float(way[6 + joint])
+        rate = measured.joint_velocity[joint]
+        predicted.joint_velocity[joint] = rate + speed[6 + joint]
+        place = measured.joint_position[joint] + time * rate
+        predicted.joint_position[joint] = place + way[6 + joint]
         predicted.torque[joint] = measured.torque[joint]

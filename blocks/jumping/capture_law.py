@@ -137,16 +137,15 @@ def take_steps(
     scratch: Scratch,
 ) -> None:
     """One tick of ``CaptureStep``; ``time`` () and ``lift_off_time`` () are the plan's [s]."""
-    phase = int(before.phase[()])
+    phase = before.phase[()]
     out.phase[()] = phase
-    out.time_in_phase[()] = float(before.time_in_phase[()])
-    out.time_to_touchdown[()] = float(before.time_to_touchdown[()])
-    out.time_since_touchdown[()] = float(before.time_since_touchdown[()])
+    out.time_in_phase[()] = before.time_in_phase[()]
+    out.time_to_touchdown[()] = before.time_to_touchdown[()]
+    out.time_since_touchdown[()] = before.time_since_touchdown[()]
     for i in range(before.stance.shape[0]):
         out.stance[i] = before.stance[i]
         out.stepping[i] = False
-        for k in range(3):
-            out.step_acceleration[i, k] = 0.0
+        out.step_acceleration[i, :] = 0.0
     lands = phase in (_LANDING, _RECOVER)
     goes_on = lift_off_time[()] > time[()]
     if not lands or goes_on or feet.side.shape[0] < 2:
@@ -155,9 +154,9 @@ def take_steps(
         memory.outside[()] = 0.0
         return
     rate = find_capture_point(before, terms, settings, feet, memory, scratch)
-    if int(memory.foot[()]) == 0:
+    if memory.foot[()] == 0:
         judge_support(before, terms, settings, feet, memory, scratch, rate)
-    if int(memory.foot[()]) > 0:
+    if memory.foot[()] > 0:
         swing_foot(before, terms, settings, feet, memory, out, scratch, rate)
     hold_low(before, settings, memory, out, phase)
 
@@ -178,12 +177,12 @@ def find_capture_point(
     ground, count = 0.0, 0
     for i in range(before.stance.shape[0]):
         if before.stance[i] or not any_stance:
-            ground += float(terms.contact_position[i, 2])
+            ground += terms.contact_position[i, 2]
             count += 1
     ground /= count
-    if int(memory.foot[()]) == 0:
+    if memory.foot[()] == 0:
         memory.ground[()] = ground
-    mass = float(terms.mass_matrix[0, 0])
+    mass = terms.mass_matrix[0, 0]
     return capture_point(
         terms.com, terms.com_velocity, terms.angular_momentum,
         mass if mass != 0.0 else feet.mass, float(terms.com[2]) - ground,
@@ -205,18 +204,18 @@ def judge_support(
     n_feet = feet.side.shape[0]
     stands = spread_to_feet(before.stance, feet.foot_of_point, n_feet, scratch.standing)
     margin = support_margin(
-        terms.contact_position, scratch.standing, float(scratch.capture[0]),
-        float(scratch.capture[1]),
+        terms.contact_position, scratch.standing, scratch.capture[0],
+        scratch.capture[1],
     )  # fmt: skip
-    since = float(before.time_since_touchdown[()])
-    if stands < n_feet or since < settings.after[0] or margin > -float(settings.margin[0]):
+    since = before.time_since_touchdown[()]
+    if stands < n_feet or since < settings.after[0] or margin > -settings.margin[0]:
         memory.outside[()] = 0.0
         return
-    memory.outside[()] = float(memory.outside[()]) + feet.period
-    short = float(memory.outside[()]) < settings.confirmation[0]
-    if int(memory.taken[()]) >= settings.steps[0] or short:
+    memory.outside[()] = memory.outside[()] + feet.period
+    short = memory.outside[()] < settings.confirmation[0]
+    if memory.taken[()] >= settings.steps[0] or short:
         return
-    if int(memory.taken[()]) == 0:
+    if memory.taken[()] == 0:
         memory.heading[()] = mean_heading(terms.foot_rotation, scratch.all)
     memory.foot[()] = 1 + best_foot(terms, settings, feet, memory, scratch, rate)
     memory.elapsed[()] = 0.0
@@ -234,7 +233,7 @@ def best_foot(
     )
     for number in range(n_feet):
         foot = (first + number) % n_feet
-        left = float(settings.duration[0])
+        left = settings.duration[0]
         missing = aim_step(terms, settings, feet, memory, scratch, foot, rate, left)
         if missing < least - _NEARER:
             best, least = foot, missing
@@ -256,21 +255,21 @@ def aim_step(
     it should be [m]."""
     place, n_feet, middle = memory.foothold[foot], feet.side.shape[0], scratch.middle
     choose_foothold(
-        scratch.capture, rate, left, float(settings.beyond[0]), terms.contact_position,
+        scratch.capture, rate, left, settings.beyond[0], terms.contact_position,
         feet.foot_of_point, foot, n_feet, scratch.nearest, scratch.other, place,
     )  # fmt: skip
-    wanted_x, wanted_y = float(place[0]), float(place[1])
+    wanted_x, wanted_y = place[0], place[1]
     for k in range(3):
         middle[k] = 0.0
         for other in range(n_feet):
             if other != foot:
-                middle[k] = float(middle[k]) + float(terms.foot_position[other, k]) / (n_feet - 1)
-    apart = float(feet.apart[foot])
+                middle[k] = middle[k] + terms.foot_position[other, k] / (n_feet - 1)
+    apart = feet.apart[foot]
     limit_foothold(
-        middle, float(memory.heading[()]), float(feet.side[foot]), float(settings.reach[0]),
-        float(settings.apart[0]) * apart, float(settings.apart[1]) * apart, place,
+        middle, memory.heading[()], feet.side[foot], settings.reach[0],
+        settings.apart[0] * apart, settings.apart[1] * apart, place,
     )  # fmt: skip
-    x, y = float(place[0]) - wanted_x, float(place[1]) - wanted_y
+    x, y = place[0] - wanted_x, place[1] - wanted_y
     return math.sqrt(x * x + y * y)
 
 
@@ -286,8 +285,8 @@ def swing_foot(
     rate: float,
 ) -> None:
     """Move the foot of the step under way, or end the step."""
-    foot, duration = int(memory.foot[()]) - 1, float(settings.duration[0])
-    elapsed = float(memory.elapsed[()]) + feet.period
+    foot, duration = memory.foot[()] - 1, settings.duration[0]
+    elapsed = memory.elapsed[()] + feet.period
     memory.elapsed[()] = elapsed
     left = duration - elapsed
     touched = False
@@ -296,20 +295,20 @@ def swing_foot(
             touched = True
     if (touched and elapsed > _EARLIEST * duration) or elapsed > _LATEST * duration:
         memory.foot[()] = 0
-        memory.taken[()] = int(memory.taken[()]) + 1
-        memory.last[()] = float(before.time_since_touchdown[()])
+        memory.taken[()] = memory.taken[()] + 1
+        memory.last[()] = before.time_since_touchdown[()]
         return
     if left > _AIMED * duration:
         aim_step(terms, settings, feet, memory, scratch, foot, rate, left)
     place = memory.foothold[foot]
-    place[2] = float(memory.ground[()])
+    place[2] = memory.ground[()]
     swing_points(
-        foot, feet.foot_of_point, feet.offset, place, float(memory.heading[()]), elapsed, duration,
-        float(settings.height[0]), terms.contact_position, terms.contact_velocity, out.stance,
+        foot, feet.foot_of_point, feet.offset, place, memory.heading[()], elapsed, duration,
+        settings.height[0], terms.contact_position, terms.contact_velocity, out.stance,
         out.stepping, out.step_acceleration,
     )  # fmt: skip
     leave_hovering(
-        terms.contact_position, feet.foot_of_point, float(settings.flat[0]), out.stance,
+        terms.contact_position, feet.foot_of_point, settings.flat[0], out.stance,
         scratch.standing,
     )  # fmt: skip
 
@@ -336,13 +335,13 @@ def hold_low(
     before: PhaseFields, settings: Settings, memory: Memory, out: PhaseFields, phase: int
 ) -> None:
     """Stay in LANDING while the robot steps and until it has settled."""
-    stepping = int(memory.foot[()]) > 0
-    if (not stepping and int(memory.taken[()]) == 0) or phase != _RECOVER:
+    stepping = memory.foot[()] > 0
+    if (not stepping and memory.taken[()] == 0) or phase != _RECOVER:
         return
-    since = float(before.time_since_touchdown[()])
-    risen = since - float(memory.last[()]) - float(settings.settle[0])
+    since = before.time_since_touchdown[()]
+    risen = since - memory.last[()] - settings.settle[0]
     if stepping or risen < 0.0:
         out.phase[()] = _LANDING
         out.time_in_phase[()] = since
     else:
-        out.time_in_phase[()] = min(float(before.time_in_phase[()]), risen)
+        out.time_in_phase[()] = min(before.time_in_phase[()], risen)

@@ -233,29 +233,29 @@ def follow_phases(
     out: PhaseFields,
 ) -> None:
     """One tick of ``JumpPhase``; ``active`` are the points with contact, (n_contacts,)."""
-    now, before, times = float(planned.time[()]), int(memory.phase[()]), table.times
+    now, before, times = planned.time[()], memory.phase[()], table.times
     shortest = count_unloaded(active, period, memory.unloaded)
     if before < Phase.FLIGHT:
-        memory.lift_off_time[()] = float(planned.lift_off_time[()])
-        memory.touchdown_time[()] = float(planned.touchdown_time[()])
-    lift_off = float(memory.lift_off_time[()])
-    touchdown = float(memory.touchdown_time[()])
-    another = float(planned.lift_off_time[()]) > touchdown
+        memory.lift_off_time[()] = planned.lift_off_time[()]
+        memory.touchdown_time[()] = planned.touchdown_time[()]
+    lift_off = memory.lift_off_time[()]
+    touchdown = memory.touchdown_time[()]
+    another = planned.lift_off_time[()] > touchdown
     remaining = 0.0
     if before <= Phase.FLIGHT:
         remaining = time_to_height(
-            float(present.com[2]), float(present.com_velocity[2]),
+            present.com[2], present.com_velocity[2],
             planned_touchdown_height(
-                float(planned.com[2]), float(planned.com_velocity[2]),
+                planned.com[2], planned.com_velocity[2],
                 touchdown - max(now, lift_off),
             ),
         )  # fmt: skip
-    times[NOW], times[IN_PHASE] = now, now - float(memory.began[()])
+    times[NOW], times[IN_PHASE] = now, now - memory.began[()]
     times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
     if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
-        shortest = min(shortest, float(times[IN_PHASE]))
+        shortest = min(shortest, times[IN_PHASE])
     times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, ahead[()]
-    find_conditions(times, table.limits, int(planned.phase[()]), another, table.holds)
+    find_conditions(times, table.limits, planned.phase[()], another, table.holds)
     phase = next_phase(table.transitions, before, table.holds)
     if phase != before:
         memory.phase[()] = phase
@@ -263,19 +263,18 @@ def follow_phases(
         if phase == Phase.LANDING:
             memory.touchdown[()] = now
     choose_stance(
-        phase, planned.contact, memory.unloaded, float(table.stance_limits[0]),
-        present.contact_position, foot_of_point, float(table.stance_limits[1]), memory.stance,
+        phase, planned.contact, memory.unloaded, table.stance_limits[0],
+        present.contact_position, foot_of_point, table.stance_limits[1], memory.stance,
     )  # fmt: skip
     out.phase[()] = phase
-    out.time_in_phase[()] = now - float(memory.began[()])
+    out.time_in_phase[()] = now - memory.began[()]
     out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
-    landed = float(memory.touchdown[()])
+    landed = memory.touchdown[()]
     out.time_since_touchdown[()] = now - landed if landed >= 0.0 else 0.0
     for i in range(active.shape[0]):
         out.stance[i] = memory.stance[i]
         out.stepping[i] = False  # steps are for CaptureStep to take
-        for k in range(3):
-            out.step_acceleration[i, k] = 0.0
+        out.step_acceleration[i, :] = 0.0
 
 
 @kernel

@@ -11,7 +11,6 @@ import numpy as np
 from ...mathematics.arrays import (
     Array1D,
     Array2D,
-    Array3D,
     Indices1D,
     Matrix3,
     Rows3,
@@ -29,10 +28,10 @@ from ...mathematics.landing_law import (
     predict_tilt,
     pull_to_place,
 )
-from ...mathematics.linear_algebra import multiply_vector
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
+from ..signals import DynamicsTerms
 
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
@@ -95,23 +94,6 @@ class PredictionGains(Parameters):
     stretch_damping: float = live_parameter(
         0.06, gt=0.0, text="damping where a leg is nearly stretched, in standing heights"
     )
-
-
-class Terms(NamedTuple):
-    """The fields of ``DynamicsTerms`` that the landing law takes."""
-
-    velocity: Array1D
-    mass_matrix: Array2D
-    contact_position: Rows3
-    contact_jacobian: Array3D
-    com: Vector3
-    com_velocity: Vector3
-    linear_momentum: Vector3
-    angular_momentum: Vector3
-    centroidal_matrix: Array2D
-    base_position: Vector3
-    base_rotation: Matrix3
-    foot_position: Rows3
 
 
 class Soles(NamedTuple):
@@ -222,7 +204,7 @@ def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) ->
 
 @kernel
 def choose_shift_of_feet(
-    terms: Terms,
+    terms: DynamicsTerms,
     foot_yaw: Array1D,
     planned: Array2D,
     orientation: Array1D,
@@ -251,7 +233,7 @@ def choose_shift_of_feet(
     cost = gains.cost
     map_flight(
         terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, soles.mass,
-        float(gains.damping[0]), scratch.flight,
+        gains.damping[0], scratch.flight,
     )  # fmt: skip
     find_ways(terms, foot_yaw, planned, soles, scratch)
     from_matrix(terms.base_rotation, scratch.quaternion)
@@ -262,26 +244,30 @@ def choose_shift_of_feet(
         scratch.flight, scratch.vector, angular, scratch.way, left, 1.0 / speed, soles.side,
         scratch.tilt, scratch.turn,
     )  # fmt: skip
-    cost.bounds[0] = max(float(gains.lowest[0]), -float(gains.early[0]) * duration * speed)
-    cost.bounds[1] = max(float(gains.highest[0]) - speed * speed * float(gains.stroke[0]), 0.0)
-    ahead = float(gains.per_linear[0]) * linear[0]
-    cost.goal[0] = ahead + float(gains.per_angular[0]) * angular[1]
-    aside = float(gains.per_linear[1]) * linear[1]
-    cost.goal[1] = aside - float(gains.per_angular[1]) * angular[0]
-    cost.goal[2] = float(gains.clearance[0]) * abs(linear[1])
-    pull_to_place(cost.goal, miss, float(gains.place_gain[0]), float(gains.place_range[0]))
+    cost.bounds[0] = max(gains.lowest[0], -gains.early[0] * duration * speed)
+    cost.bounds[1] = max(gains.highest[0] - speed * speed * gains.stroke[0], 0.0)
+    ahead = gains.per_linear[0] * linear[0]
+    cost.goal[0] = ahead + gains.per_angular[0] * angular[1]
+    aside = gains.per_linear[1] * linear[1]
+    cost.goal[1] = aside - gains.per_angular[1] * angular[0]
+    cost.goal[2] = gains.clearance[0] * abs(linear[1])
+    pull_to_place(cost.goal, miss, gains.place_gain[0], gains.place_range[0])
     choose_shift(scratch.tilt, scratch.turn, cost, scratch.matrix, shift)
 
 
 @kernel
 def find_ways(
-    terms: Terms, foot_yaw: Array1D, planned: Rows3, soles: Soles, scratch: PredictionScratch
+    terms: DynamicsTerms,
+    foot_yaw: Array1D,
+    planned: Rows3,
+    soles: Soles,
+    scratch: PredictionScratch,
 ) -> None:
     """How far every contact point is from its planned place, with flat soles."""
     for point in range(soles.foot_of_point.shape[0]):
-        foot = int(soles.foot_of_point[point])
+        foot = soles.foot_of_point[point]
         heading_matrix(foot_yaw[foot], scratch.heading)
-        multiply_vector(scratch.heading, soles.offset[point], scratch.vector)
-        for k in range(3):
-            place = float(scratch.vector[k]) + planned[foot, k] + float(terms.com[k])
-            scratch.way[3 * point + k] = place - float(terms.contact_position[point, k])
+        scratch.vector[:] = scratch.heading @ soles.offset[point]
+        scratch.way[3 * point : 3 * point + 3] = (
+            scratch.vector + planned[foot] + terms.com - terms.contact_position[point]
+        )

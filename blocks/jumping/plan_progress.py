@@ -154,18 +154,18 @@ def follow_motion(
     Args:
         instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
     """
-    left = float(planned.lift_off_time[()]) - instant[0]
-    if int(planned.phase[()]) != Phase.THRUST or not 0.0 < left <= settings.time:
-        progress.before[()] = float(progress.late[()])
+    left = planned.lift_off_time[()] - instant[0]
+    if planned.phase[()] != Phase.THRUST or not 0.0 < left <= settings.time:
+        progress.before[()] = progress.late[()]
         return
     error = speed_error(
-        float(measured.com[2]) - mean_height(measured.foot_position),
-        float(measured.com_velocity[2]),
-        float(reference.com[2]) - mean_height(reference.foot_position),
-        float(reference.com_velocity[2]),
+        measured.com[2] - mean_height(measured.foot_position),
+        measured.com_velocity[2],
+        reference.com[2] - mean_height(reference.foot_position),
+        reference.com_velocity[2],
     )
-    push, before = float(planned.com_acceleration[2]), float(progress.before[()])
-    late = float(progress.late[()]) - before
+    push, before = planned.com_acceleration[2], progress.before[()]
+    late = progress.late[()] - before
     late += delay_change(error, push, settings.gain, settings.fastest, settings.period)
     late = min(max(late, -settings.limit), settings.limit)
     progress.late[()] = before + late
@@ -185,15 +185,15 @@ def follow_fall(
     Args:
         instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
     """
-    if int(planned.phase[()]) != Phase.FLIGHT or not planned.toes_first[()]:
+    if planned.phase[()] != Phase.FLIGHT or not planned.toes_first[()]:
         return
-    left = float(planned.touchdown_time[()]) - instant[0]
-    sinking = GRAVITY * left - float(reference.com_velocity[2])
-    lowest = float(reference.com[2]) - 0.5 * (sinking - float(reference.com_velocity[2])) * left
-    fall = time_to_fall(float(measured.com[2]) - lowest, float(measured.com_velocity[2]))
+    left = planned.touchdown_time[()] - instant[0]
+    sinking = GRAVITY * left - reference.com_velocity[2]
+    lowest = reference.com[2] - 0.5 * (sinking - reference.com_velocity[2]) * left
+    fall = time_to_fall(measured.com[2] - lowest, measured.com_velocity[2])
     rate = settings.gain * (fall - left)
     rate = min(max(rate, -settings.fastest), settings.fastest)
-    progress.late[()] = float(progress.late[()]) + rate * settings.period
+    progress.late[()] = progress.late[()] + rate * settings.period
 
 
 @kernel

@@ -145,9 +145,9 @@ def watch_switches(
         closed = bool(switches[k])
         changed = bool(watched.started[()]) and closed != bool(watched.last[k])
         watched.last[k] = closed
-        watched.changes[k] = float(watched.changes[k]) * limits.fading + (1.0 if changed else 0.0)
-        watched.closed[k] = int(watched.closed[k]) + 1 if in_the_air and closed else 0
-        watched.opened[k] = int(watched.opened[k]) + 1 if now == _STAND and not closed else 0
+        watched.changes[k] = watched.changes[k] * limits.fading + (1.0 if changed else 0.0)
+        watched.closed[k] = watched.closed[k] + 1 if in_the_air and closed else 0
+        watched.opened[k] = watched.opened[k] + 1 if now == _STAND and not closed else 0
         if watched.fault[k] == 0:
             if watched.changes[k] > limits.changes:
                 watched.fault[k] = _BOUNCING

@@ -156,7 +156,7 @@ def unroll(ball: Ball, joints: Array1D, orientation: Array1D, middle: Array2D) -
         ball.angles[k] = joints[ball.joints[k]]
     place_limb(ball.links, ball.tip, ball.angles, ball.anchors, ball.pose)
     rotate(orientation, ball.pose[1:, 2], ball.axis)
-    x, y, z = float(ball.axis[0]), float(ball.axis[1]), float(ball.axis[2])
+    x, y, z = ball.axis[0], ball.axis[1], ball.axis[2]
     leaning = sqrt(x * x + y * y)
     way = ball.radius
     if leaning > 1e-12:

@@ -101,21 +101,21 @@ def follow_reference(
     now, first = base_period * tick[0], ticks[()] == 0
     feet, turn = planned.foot.shape[0], 0.0
     for foot in range(feet):
-        turn += float(reference.foot_yaw[foot])
+        turn += reference.foot_yaw[foot]
         for axis in range(2):
             planned.foot[foot, axis] = reference.foot_position[foot, axis]
     planned.yaw[()] = turn / feet
-    height = float(reference.com[2])
+    height = reference.com[2]
     if first:
         for foot in range(feet):
             for axis in range(2):
                 planned.start[foot, axis] = planned.foot[foot, axis]
-        planned.yaw_start[()] = float(planned.yaw[()])
+        planned.yaw_start[()] = planned.yaw[()]
         planned.standing[()] = planned.apex[()] = height
         planned.speed_time[()] = NEVER
     keep_largest(planned.apex, height)
-    time, touchdown = float(reference.time[()]), float(reference.touchdown_time[()])
-    lift_off = float(reference.lift_off_time[()])
+    time, touchdown = reference.time[()], reference.touchdown_time[()]
+    lift_off = reference.lift_off_time[()]
     taken_off = lift_off - 1e-9 <= time < touchdown
     fresh = planned.speed_time[()] == NEVER
     if fresh or taken_off:  # from the middle of a flight on the reference names the next
@@ -127,7 +127,7 @@ def follow_reference(
             planned.apex[()] = height
         planned.speed_time[()] = now
         # The plan's own ballistic flight takes it back to the planned instant.
-        planned.speed[()] = float(reference.com_velocity[2]) + GRAVITY * (time - lift_off)
+        planned.speed[()] = reference.com_velocity[2] + GRAVITY * (time - lift_off)
 
 
 @kernel
@@ -157,24 +157,22 @@ def follow_jump(
     stand.now[()] = now
     if stand.ticks[()] == 0:
         begin(stand, truth)
-        begin_jump(jump, planned, stand.foot, float(truth.com[2]))
-    stand.ticks[()] = int(stand.ticks[()]) + 1
+        begin_jump(jump, planned, stand.foot, truth.com[2])
+    stand.ticks[()] = stand.ticks[()] + 1
     note_machine(stand, truth)
     stand.failures[()] = failures[()]
     verdict.ending[0] = _FELL if note_fall(stand, truth, limits) else 0
-    touched, made = any_touched(truth.contact_touched), int(series.made[()])
-    early = float(reference.time[()]) < float(reference.lift_off_time[()]) - EARLY_LIFT_OFF
+    touched, made = any_touched(truth.contact_touched), series.made[()]
+    early = reference.time[()] < reference.lift_off_time[()] - EARLY_LIFT_OFF
     bounces = times.planned and made > 0 and early
     follow_flight(
         now, touched, bounces, truth, momentum, stand, jump, planned, series, limits, times
     )
     if jump.touchdown_time[()] != NEVER:
-        follow_landing(
-            now - float(jump.touchdown_time[()]), truth, stand, jump, limits, times, verdict
-        )
+        follow_landing(now - jump.touchdown_time[()], truth, stand, jump, limits, times, verdict)
     elif series.made[()] != 0:
         follow_row(now, touched, stand.foot, jump, planned, series, times, verdict)
-    jump.vertical_speed[()] = float(truth.com_velocity[2])
+    jump.vertical_speed[()] = truth.com_velocity[2]
 
 
 @kernel
@@ -207,7 +205,7 @@ def follow_flight(
 
     ``bounces`` says that a foot off the ground would be no lift-off: it is between two jumps.
     """
-    height = float(truth.com[2])
+    height = truth.com[2]
     if jump.lift_off_time[()] == NEVER:
         keep_least(jump.squat_height, height)
         if touched or bounces:
@@ -216,23 +214,23 @@ def follow_flight(
         if jump.unloaded_time[()] == NEVER:
             # Nothing touched during the whole of the tick before.
             jump.unloaded_time[()] = max(0.0, now - limits.period)
-            speed = float(jump.vertical_speed[()]) if now > 0.0 else float(truth.com_velocity[2])
+            speed = jump.vertical_speed[()] if now > 0.0 else truth.com_velocity[2]
             jump.unloaded_speed[()] = speed
             for axis in range(3):
                 jump.unloaded_momentum[axis] = momentum[axis]
             jump.apex_height[()] = height
-        if now - float(jump.unloaded_time[()]) >= times.flight_confirmation - 1e-9:
-            jump.lift_off_time[()] = float(jump.unloaded_time[()])
-            jump.lift_off_speed[()] = float(jump.unloaded_speed[()])
+        if now - jump.unloaded_time[()] >= times.flight_confirmation - 1e-9:
+            jump.lift_off_time[()] = jump.unloaded_time[()]
+            jump.lift_off_speed[()] = jump.unloaded_speed[()]
             for axis in range(3):
                 jump.lift_off_momentum[axis] = jump.unloaded_momentum[axis]
             if series.made[()] != 0:
                 keep_place(series)
     elif jump.touchdown_time[()] == NEVER and touched:
         jump.touchdown_time[()] = now - limits.period
-        jump.touchdown_speed[()] = -float(jump.vertical_speed[()])
+        jump.touchdown_speed[()] = -jump.vertical_speed[()]
         if series.made[()] + 1 < times.jumps:  # more jumps must follow
-            note_landing(float(stand.standing_height[()]), jump, planned, series, times.planned)
+            note_landing(stand.standing_height[()], jump, planned, series, times.planned)
             stand.peak_tilt[()] = 0.0
             return
     if jump.touchdown_time[()] == NEVER:
@@ -253,7 +251,7 @@ def follow_row(
     """Between two jumps: where the feet stand, and whether another comes."""
     if times.planned and touched:
         note_place(foot, jump, planned, series)
-    landed = now - float(series.landed_time[()])
+    landed = now - series.landed_time[()]
     if jump.lift_off_time[()] == NEVER and landed >= times.rest_time - 1e-9:
         ask(verdict, _ALONE, landed)
 
@@ -276,13 +274,13 @@ def follow_landing(
     keep_largest(stand.peak_tilt, tilt(truth.base_orientation))
     note_feet(stand, truth.contact_touched, limits, landed >= times.slip_delay - 1e-9)
     if stand.steps[()] != 0:
-        landed = min(landed, float(stand.now[()]) - largest_of(stand.step_end))
+        landed = min(landed, stand.now[()] - largest_of(stand.step_end))
     if stand.judged_time[()] == NEVER and landed >= times.rest_time - 1e-9:
         note_rest(stand, truth, limits)
-        jump.ground_low[()] = jump.ground_high[()] = float(truth.ground_height[0])
+        jump.ground_low[()] = jump.ground_high[()] = truth.ground_height[0]
         for point in range(1, truth.ground_height.shape[0]):
-            keep_least(jump.ground_low, float(truth.ground_height[point]))
-            keep_largest(jump.ground_high, float(truth.ground_height[point]))
+            keep_least(jump.ground_low, truth.ground_height[point])
+            keep_largest(jump.ground_high, truth.ground_height[point])
     if landed >= times.rest_time + times.settle_time - 1e-9:
         ask(verdict, _RESTED, landed)
 

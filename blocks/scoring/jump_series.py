@@ -111,22 +111,22 @@ def note_landing(
         standing: the height of the com at the start [m].
         compared: whether there is a reference to compare the jump with.
     """
-    made = int(series.made[()]) + 1
+    made = series.made[()] + 1
     series.made[()] = made
-    series.landed_time[()] = float(jump.touchdown_time[()])
+    series.landed_time[()] = jump.touchdown_time[()]
     if made == 1:
         series.flight_share[()] = 1e9
     if compared:
-        flight = float(jump.touchdown_time[()]) - float(jump.lift_off_time[()])
-        share = flight / max(float(planned.flight[()]), 1e-9)
+        flight = jump.touchdown_time[()] - jump.lift_off_time[()]
+        share = flight / max(planned.flight[()], 1e-9)
         if share < series.flight_share[()]:
             series.flight_share[()] = share
             series.flight_jump[()] = made
-        speed = float(planned.speed[()])
-        error = abs(float(jump.lift_off_speed[()]) - speed) / max(abs(speed), 1e-9)
+        speed = planned.speed[()]
+        error = abs(jump.lift_off_speed[()] - speed) / max(abs(speed), 1e-9)
         keep_worst(series.speed_error, series.speed_jump, error, made)
-        rise = float(planned.apex[()]) - float(planned.standing[()])
-        error = abs(float(jump.apex_height[()]) - standing - rise) / max(rise, 1e-9)
+        rise = planned.apex[()] - planned.standing[()]
+        error = abs(jump.apex_height[()] - standing - rise) / max(rise, 1e-9)
         keep_worst(series.rise_error, series.rise_jump, error, made)
     jump.lift_off_time[()] = jump.touchdown_time[()] = jump.unloaded_time[()] = NEVER
 
@@ -136,12 +136,12 @@ def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> Non
     """Between two jumps: note how far the feet, (n_feet, 2), are from their planned position."""
     x, y, feet = 0.0, 0.0, foot.shape[0]
     for k in range(feet):
-        moved = float(foot[k, 0]) - float(jump.start_foot[k, 0])
-        x += (moved - (float(planned.foot[k, 0]) - float(planned.start[k, 0]))) / feet
-        moved = float(foot[k, 1]) - float(jump.start_foot[k, 1])
-        y += (moved - (float(planned.foot[k, 1]) - float(planned.start[k, 1]))) / feet
+        moved = float(foot[k, 0]) - jump.start_foot[k, 0]
+        x += (moved - (planned.foot[k, 0] - planned.start[k, 0])) / feet
+        moved = float(foot[k, 1]) - jump.start_foot[k, 1]
+        y += (moved - (planned.foot[k, 1] - planned.start[k, 1])) / feet
     series.place_now[()] = sqrt(x * x + y * y)
-    turn = float(planned.yaw[()]) - float(planned.yaw_start[()])
+    turn = planned.yaw[()] - planned.yaw_start[()]
     error = abs(mean_turn(jump.start_direction, jump.direction) - turn)
     # Half a turn to the left is the same as half a turn to the right.
     series.turn_now[()] = abs(error - 2.0 * pi) if error > pi else error
@@ -150,9 +150,9 @@ def note_place(foot: Array, jump: Jump, planned: Planned, series: Series) -> Non
 @kernel
 def keep_place(series: Series) -> None:
     """When the next jump lifts off: keep the last landing's error if it is the largest."""
-    made = int(series.made[()])
-    keep_worst(series.place_error, series.place_jump, float(series.place_now[()]), made)
-    keep_worst(series.turn_error, series.turn_jump, float(series.turn_now[()]), made)
+    made = series.made[()]
+    keep_worst(series.place_error, series.place_jump, series.place_now[()], made)
+    keep_worst(series.turn_error, series.turn_jump, series.turn_now[()], made)
 
 
 def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:

@@ -153,19 +153,19 @@ def any_touched(touched: Flags1D) -> bool:
 def begin(record: Stand, truth: Truth) -> None:
     """Start a record in its first tick."""
     record.fall_time[()] = record.judged_time[()] = record.forbidden_time[()] = NEVER
-    record.standing_height[()] = float(truth.com[2])
+    record.standing_height[()] = truth.com[2]
 
 
 @kernel
 def note_machine(record: Stand, truth: Truth) -> None:
     """Note forbidden contacts and excesses over the limits of joints and motors."""
-    forbidden = int(truth.forbidden_contacts[()])
+    forbidden = truth.forbidden_contacts[()]
     if forbidden != 0 and record.forbidden[()] == 0:
-        record.forbidden_time[()] = float(record.now[()])
-    record.forbidden[()] = int(record.forbidden[()]) + forbidden
-    record.saturated[()] = float(record.saturated[()]) + float(truth.saturated_share[()])
-    keep_largest(record.violation, float(truth.joint_limit_violation[()]))
-    keep_largest(record.overload, float(truth.motor_overload[()]))
+        record.forbidden_time[()] = record.now[()]
+    record.forbidden[()] = record.forbidden[()] + forbidden
+    record.saturated[()] = record.saturated[()] + truth.saturated_share[()]
+    keep_largest(record.violation, truth.joint_limit_violation[()])
+    keep_largest(record.overload, truth.motor_overload[()])
     keep_largest(record.peak_torque, largest_magnitude(truth.motor_torque))
     keep_largest(record.peak_speed, largest_magnitude(truth.motor_speed))
 
@@ -174,11 +174,11 @@ def note_machine(record: Stand, truth: Truth) -> None:
 def note_fall(record: Stand, truth: Truth, limits: Limits) -> bool:
     """Note a fall; returns whether the robot falls in this tick, which happens at most once."""
     tilted = tilt(truth.base_orientation)
-    height = float(truth.base_position[2]) - largest_of(truth.ground_height)
+    height = truth.base_position[2] - largest_of(truth.ground_height)
     fallen = tilted > limits.fall_tilt or height < limits.fall_height
     if not fallen or record.fall_time[()] != NEVER:
         return False
-    record.fall_time[()] = float(record.now[()])
+    record.fall_time[()] = record.now[()]
     record.fall_tilt[()] = tilted
     record.fall_height[()] = height
     return True
@@ -202,24 +202,24 @@ def note_feet(record: Stand, touched: Flags1D, limits: Limits, stay: bool) -> No
 @kernel
 def note_foot(record: Stand, touched: Flags1D, limits: Limits, foot: int) -> None:
     """The same of one foot that should stay."""
-    now, loaded = float(record.now[()]), False
+    now, loaded = record.now[()], False
     for point in range(touched.shape[0]):
         if limits.foot_of_point[point] == foot and touched[point]:
             loaded = True
-    total = 0.0 if loaded else float(record.lifted_time[foot]) + limits.period
+    total = 0.0 if loaded else record.lifted_time[foot] + limits.period
     record.lifted_time[foot] = total
-    end = float(record.step_end[foot])
+    end = record.step_end[foot]
     if total > limits.step_time:
         going_on = end > 0.0 and now - end < 1.5 * limits.period
         if going_on or record.steps[()] < limits.steps:
-            record.steps[()] = int(record.steps[()]) + (0 if going_on else 1)
+            record.steps[()] = record.steps[()] + (0 if going_on else 1)
             record.step_end[foot] = end = now
     if end > 0.0 and now - end < limits.settling:
         for axis in range(2):
             record.landed_foot[foot, axis] = record.foot[foot, axis]
         return
-    x = float(record.foot[foot, 0]) - float(record.landed_foot[foot, 0])
-    y = float(record.foot[foot, 1]) - float(record.landed_foot[foot, 1])
+    x = record.foot[foot, 0] - record.landed_foot[foot, 0]
+    y = record.foot[foot, 1] - record.landed_foot[foot, 1]
     if loaded or limits.steps == 0:
         keep_largest(record.foot_slip, sqrt(x * x + y * y))
     if total <= limits.step_time or record.steps[()] >= limits.steps:
@@ -237,13 +237,13 @@ def speed_of(velocity: Array1D) -> float:
 def note_rest(record: Stand, truth: Truth, limits: Limits) -> None:
     """Note how the robot stands now, for the judgement of its rest."""
     feet = record.foot.shape[0]
-    record.judged_time[()] = float(record.now[()])
+    record.judged_time[()] = record.now[()]
     record.tilt[()] = tilt(truth.base_orientation)
     record.com_speed[()] = speed_of(truth.com_velocity)
     record.angular_speed[()] = speed_of(truth.base_angular_velocity)
     record.points_unloaded[()] = points_missing(limits.foot_of_point, truth.contact_touched, feet)
     record.margin[()] = support_margin(
-        truth.contact_position, truth.contact_touched, float(truth.com[0]), float(truth.com[1])
+        truth.contact_position, truth.contact_touched, truth.com[0], truth.com[1]
     )
     record.load_share[()] = least_load(
         limits.foot_of_point, truth.contact_force, feet, limits.weight

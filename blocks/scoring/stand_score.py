@@ -201,13 +201,13 @@ def follow_stand(
         settle_time, judge_time: of ``SquatCriteria`` [s].
         ending: becomes why the end of the run is asked for, or zero, (1,).
     """
-    now, height, planned = base_period * tick[0], float(truth.com[2]), planned_com[2]
+    now, height, planned = base_period * tick[0], truth.com[2], planned_com[2]
     stand.now[()] = now
     if stand.ticks[()] == 0:
         begin(stand, truth)
         squat.lowest_height[()] = height
         squat.planned_standing[()] = squat.planned_lowest[()] = planned
-    stand.ticks[()] = int(stand.ticks[()]) + 1
+    stand.ticks[()] = stand.ticks[()] + 1
     note_machine(stand, truth)
     stand.failures[()] = failures[()]
     ending[0] = _FELL if note_fall(stand, truth, limits) else 0

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import PlacedGraph
 
-PATIENCE = 10.0
-"""Seconds to wait for parts that run elsewhere."""
+TIMEOUT = 10.0
+"""Seconds to wait for parts that run remote."""
 
 
 @dataclass(frozen=True)
-class Elsewhere:
+class RemoteRunAddress:
     """Where the parts of a graph are looked for: its file, overrides, the folder of keys and the
     observer's name for TLS, and the process of ``aloft run --local``, zero for the only one."""
 
@@ -34,13 +34,13 @@ class Elsewhere:
     process: int = 0
 
 
-def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> WatchedRun:
+def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedRun:
     """The running graph of that name, or the only one there is; all parts of a graph on several
     machines.
 
     Args:
         name: of the run; empty for the only one.
-        elsewhere: how to reach a graph that no process of this machine answers for.
+        remote: how to reach a graph that no process of this machine answers for.
 
     Raises:
         AloftError: no such graph runs.
@@ -49,24 +49,24 @@ def open_live_run(name: str, elsewhere: Elsewhere | None = None) -> WatchedRun:
     from .running_graphs import find
 
     try:
-        path = find(name or (elsewhere.graph.stem if elsewhere is not None else ""))
+        path = find(name or (remote.graph.stem if remote is not None else ""))
     except AloftError:
-        found = None if elsewhere is None or name else _spread_elsewhere(elsewhere)
+        found = None if remote is None or name else _spread_elsewhere(remote)
         if found is None:
             raise
         return found
     run = LiveRun(path)
-    return _whole(run, path, elsewhere) if run.machine else run
+    return _whole(run, path, remote) if run.machine else run
 
 
-def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
+def _whole(run: LiveRun, path: Path, remote: RemoteRunAddress | None) -> WatchedRun:
     """The whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import place
     from ...runtime.transports.registry import transport_type
 
     placed = place(run.graph)
-    keys = elsewhere.keys if elsewhere is not None else None
+    keys = remote.keys if remote is not None else None
     if keys is None and transport_type(placed.machines).needs_keys(placed):
         typer.echo(
             f"only the part on {run.machine} is shown: the links are encrypted, and the other parts "
@@ -82,11 +82,11 @@ def _whole(run: LiveRun, path: Path, elsewhere: Elsewhere | None) -> WatchedRun:
             return None
         return place(run.graph)
 
-    observer = elsewhere.observer if elsewhere is not None else "viewer"
+    observer = remote.observer if remote is not None else "viewer"
     return SpreadRun(placed, keys, again, path, observer)
 
 
-def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
+def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
     """A graph whose parts answer over the network; ``None`` where it is for one process.
 
     Raises:
@@ -98,10 +98,10 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
     from .running_graphs import settings_of
 
     def settings() -> tuple[str, ...]:
-        return settings_of(elsewhere.graph, elsewhere.process)
+        return settings_of(remote.graph, remote.process)
 
     known = settings()
-    graph = load(elsewhere.graph, [*known, *elsewhere.overrides])
+    graph = load(remote.graph, [*known, *remote.overrides])
     if not graph.machines:
         return None
     placed = place(graph)
@@ -112,16 +112,16 @@ def _spread_elsewhere(elsewhere: Elsewhere) -> SpreadRun | None:
             if settings() == known:
                 return None
             known = settings()
-            return place(load(elsewhere.graph, [*known, *elsewhere.overrides]))
+            return place(load(remote.graph, [*known, *remote.overrides]))
         except AloftError:
             return None
 
-    run = SpreadRun(placed, elsewhere.keys, again, _control(placed), elsewhere.observer)
+    run = SpreadRun(placed, remote.keys, again, _control(placed), remote.observer)
     # the parts of a run that is registered here are there, or come as soon as they have started
-    if not known and not run.is_heard(PATIENCE):
+    if not known and not run.is_heard(TIMEOUT):
         run.close()
         names = ", ".join(spec.name for spec in placed.machines)
-        raise AloftError(f"nothing was heard of {names} for {PATIENCE:g} s: do they run?")
+        raise AloftError(f"nothing was heard of {names} for {TIMEOUT:g} s: do they run?")
     return run
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ...studies.batch.seeds import SeedRow
 
 
-class Runs(Protocol):
+class RunnableGraph(Protocol):
     """What ``run_once`` runs: a graph, or one machine's part of it."""
 
     @property
@@ -56,7 +56,7 @@ class Runs(Protocol):
 
 
 def run_once(
-    graph: Runs,
+    graph: RunnableGraph,
     record: Path | None,
     out: Console,
     as_json: bool,
@@ -65,7 +65,7 @@ def run_once(
     *,
     keep: int = 0,
     split: float = 0.0,
-    said: Sequence[str] = (),
+    messages: Sequence[str] = (),
     also: Mapping[str, Any] | None = None,
     times: bool = True,
     traceback: bool = False,
@@ -73,7 +73,7 @@ def run_once(
     fuse: bool = True,
     real_time: RealTimeOptions | None = None,
 ) -> ExitCode:
-    """Run the graph, record and show it, and print the result; ``said`` are warnings so far,
+    """Run the graph, record and show it, and print the result; ``messages`` are warnings so far,
     ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
     printed."""
     from ...logs.recording.recorder import Recorder
@@ -93,7 +93,7 @@ def run_once(
     ):
         counter = TickCounter(progress, task)
         recorders = [recorder] if recorder is not None else []
-        last_words = LastWords(name, as_json)
+        last_words = CrashReporter(name, as_json)
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
                 sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
@@ -116,7 +116,7 @@ def run_once(
     if as_json:
         shown = str(recording) if recording else None
         overrides = dict(graph.checked.overrides)
-        warnings = [*said, *result.warnings]
+        warnings = [*messages, *result.warnings]
         files = [str(file) for file in recorder.files] if recorder is not None else []
         about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
         about |= {"exit_code": int(code), "recording_problem": problem or None}
@@ -237,7 +237,7 @@ def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
     return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code
 
 
-class LastWords:
+class CrashReporter:
     """A sink that prints the JSON object of an abandoned run; it records nothing.
 
     Args:

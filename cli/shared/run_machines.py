@@ -54,7 +54,7 @@ GRACE = 15.0
 
 
 @dataclass(frozen=True)
-class Wishes:
+class RunOptions:
     """What the command line asks for: settings, where the recording goes (by default where one of
     the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
     whether nothing is compiled, the folder of keys, for links over TLS, and whether blocks of kernels
@@ -71,7 +71,7 @@ class Wishes:
     fuse: bool = True
 
 
-def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
+def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     """Run all parts of the graph in ``path``; print one result.
 
     Raises:
@@ -83,21 +83,21 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
     from ...logs.recording.place import cause_of, remedy
     from .viewing import how_to_view
 
-    placed = place(load(path, wishes.settings))
+    placed = place(load(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
         files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
-        said = _run_processes(path, wishes, placed, files)
+        part_reports = _run_processes(path, options, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
         ages = path_metrics(placed, parts) if parts else {}
-        result = _whole_result(placed, said, ages, run_hash, ticks)
+        result = _whole_result(placed, part_reports, ages, run_hash, ticks)
         recording, problem = None, ""
-        if wishes.keep:
-            target = wishes.record or Path("recordings") / f"{graph.name}.rrd"
+        if options.keep:
+            target = options.record or Path("recordings") / f"{graph.name}.rrd"
             problem = "; ".join(
                 f"machine {name!r}: {part['recording_problem']}"
-                for name, part in said.items()
+                for name, part in part_reports.items()
                 if part.get("recording_problem")
             )
             try:
@@ -111,70 +111,70 @@ def run_local(path: Path, wishes: Wishes, out: Console) -> ExitCode:
                 problem += f"; {remedy(cause_of(error), target)}"
         code = code_with_recording(result.exit_code, problem)
     print_result(out, graph.name, result)
-    _print_links(out, said)
+    _print_links(out, part_reports)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
     for text in (*result.cautions, *result.stop_problems, *result.warnings):
         print_warning(text)
-    if wishes.as_json:
+    if options.as_json:
         overrides = dict(graph.overrides)
         about = {**result.to_json(), "recording": str(recording) if recording else None}
         about |= {"exit_code": int(code), "recording_problem": problem or None}
-        print_json({"graph": graph.name, "overrides": overrides, **about, "machines": said})
+        print_json({"graph": graph.name, "overrides": overrides, **about, "machines": part_reports})
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=wishes.traceback)
+            print_place(result.error, traceback=options.traceback)
     if problem:
         print_error(problem)
     return code
 
 
 def _run_processes(
-    path: Path, wishes: Wishes, placed: PlacedGraph, files: Mapping[str, Path]
+    path: Path, options: RunOptions, placed: PlacedGraph, files: Mapping[str, Path]
 ) -> dict[str, dict[str, Any]]:
     """What each part says at its end, by machine.
 
     Raises:
         AloftError: a part has said nothing.
     """
-    endpoints = transport_type(placed.machines).local_endpoints(len(files), wishes.keys)
+    endpoints = transport_type(placed.machines).local_endpoints(len(files), options.keys)
     settings = [
         f"machines.{name}={endpoint}" for name, endpoint in zip(files, endpoints, strict=True)
     ]
-    settings = [*wishes.settings, *settings]
+    settings = [*options.settings, *settings]
     sets = [text for setting in settings for text in ("--set", setting)]
     with ExitStack() as stack:
         stack.enter_context(registered(path, settings))
         running: dict[str, subprocess.Popen[str]] = {}
         for number, (machine, file) in enumerate(files.items()):
             # the first part answers for the run, which one in real time does by the graph's name
-            params = "none" if number else wishes.params
+            params = "none" if number else options.params
             command = [
                 sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
                 "--record", str(file), "--params", params, "--json", "--quiet",
-                *(["--plain"] if wishes.plain else []), *([] if wishes.fuse else ["--no-fuse"]),
-                *(["--keys", str(wishes.keys)] if wishes.keys is not None else []),
+                *(["--plain"] if options.plain else []), *([] if options.fuse else ["--no-fuse"]),
+                *(["--keys", str(options.keys)] if options.keys is not None else []),
             ]  # fmt: skip
             # in a group of its own, so that Ctrl-C reaches it once, from here
             process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0)
             running[machine] = stack.enter_context(process)
         received = _wait_for_all(running)
-        said = {}
+        part_reports = {}
         for machine, process in running.items():
             assert process.stdout is not None
             lines = process.stdout.read().splitlines()
             try:
-                said[machine] = json.loads(lines[-1])
+                part_reports[machine] = json.loads(lines[-1])
             except (IndexError, ValueError):
                 if received:  # it had not come as far as a run
                     code, reason = ExitCode(128 + received[0]), f"stopped by {received[0].name}"
-                    said[machine] = {"exit_code": code, "reason": reason}
+                    part_reports[machine] = {"exit_code": code, "reason": reason}
                     continue
                 raise AloftError(
                     f"the part on {machine!r} ended with code {process.returncode} and no result"
                 ) from None
-    return said
+    return part_reports
 
 
 def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.Signals]:
@@ -219,7 +219,7 @@ def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.S
 
 def _whole_result(
     placed: PlacedGraph,
-    said: Mapping[str, Mapping[str, Any]],
+    part_reports: Mapping[str, Mapping[str, Any]],
     ages: Mapping[str, Any],
     run_hash: str,
     ticks: int,
@@ -229,35 +229,37 @@ def _whole_result(
     by_block = {
         path: found
         for spec in graph.blocks
-        for path, found in said[spec.machine].get("metrics_by_block", {}).items()
+        for path, found in part_reports[spec.machine].get("metrics_by_block", {}).items()
         if path == spec.path
     }
-    measured = (part.get("metrics_by_block", {}).get(NAME) for part in said.values())
+    measured = (part.get("metrics_by_block", {}).get(NAME) for part in part_reports.values())
     by_block[NAME] = next((found for found in measured if found), ages)
-    metrics, unmet, praise = merge_metrics(by_block)
-    code, reason = _verdict(said, unmet, praise)
-    failed = next(_in_order_of_guilt(said), None)
+    metrics, unmet, success_text = merge_metrics(by_block)
+    code, reason = _verdict(part_reports, unmet, success_text)
+    failed = next(_culprits_first(part_reports), None)
     error = None
-    if code is ExitCode.RUN_FAILED and failed is not None and said[failed].get("error"):
-        error = _error(said[failed]["error"])
+    if code is ExitCode.RUN_FAILED and failed is not None and part_reports[failed].get("error"):
+        error = _error(part_reports[failed]["error"])
     return RunResult(
         success=code is ExitCode.SUCCESS,
         reason=reason,
         exit_code=code,
         ticks=ticks,
         period=graph.base_period,
-        wall_time_s=max((part.get("wall_time_s", 0.0) for part in said.values()), default=0.0),
+        wall_time_s=max(
+            (part.get("wall_time_s", 0.0) for part in part_reports.values()), default=0.0
+        ),
         run_hash=run_hash,
         metrics=metrics,
-        blocks=_times(graph, said),
-        overruns=sum(part.get("overruns", 0) for part in said.values()),
-        skipped_periods=sum(part.get("skipped_periods", 0) for part in said.values()),
+        blocks=_times(graph, part_reports),
+        overruns=sum(part.get("overruns", 0) for part in part_reports.values()),
+        skipped_periods=sum(part.get("skipped_periods", 0) for part in part_reports.values()),
         error=error,
-        stop_problems=_collected(said, "stop_problems"),
-        cautions=_collected(said, "cautions"),
+        stop_problems=_collected(part_reports, "stop_problems"),
+        cautions=_collected(part_reports, "cautions"),
         warnings=tuple(
             f"{name}: {text}"
-            for name, part in said.items()
+            for name, part in part_reports.items()
             for text in part.get("warnings", ())
             if text != part.get("recording_problem")
         ),
@@ -265,40 +267,44 @@ def _whole_result(
     )
 
 
-def _in_order_of_guilt(said: Mapping[str, Mapping[str, Any]]) -> Any:
+def _culprits_first(part_reports: Mapping[str, Mapping[str, Any]]) -> Any:
     """The machines that failed: first those that failed by themselves, then those that were told."""
-    failed = [name for name, part in said.items() if part.get("exit_code", 3) == 3]
-    return iter(sorted(failed, key=lambda name: bool(said[name].get("heard"))))
+    failed = [name for name, part in part_reports.items() if part.get("exit_code", 3) == 3]
+    return iter(sorted(failed, key=lambda name: bool(part_reports[name].get("heard"))))
 
 
 def _verdict(
-    said: Mapping[str, Mapping[str, Any]], unmet: str | None, praise: str | None
+    part_reports: Mapping[str, Mapping[str, Any]], unmet: str | None, success_text: str | None
 ) -> tuple[ExitCode, str]:
-    for name, part in said.items():
+    for name, part in part_reports.items():
         if "exit_code" not in part:  # it did not come as far as a run
             return ExitCode.BAD_INPUT, f"machine {name!r}: {part.get('reason', 'no result')}"
-    for name in _in_order_of_guilt(said):
-        return ExitCode.RUN_FAILED, str(said[name]["reason"])
-    for part in said.values():
+    for name in _culprits_first(part_reports):
+        return ExitCode.RUN_FAILED, str(part_reports[name]["reason"])
+    for part in part_reports.values():
         if part["exit_code"] >= ExitCode.INTERRUPTED:
             return ExitCode(part["exit_code"]), str(part["reason"])
     if unmet is not None:
         return ExitCode.NOT_SUCCESSFUL, unmet
-    reasons = [str(part["reason"]) for part in said.values()]
-    return ExitCode.SUCCESS, praise or reasons[0]
+    reasons = [str(part["reason"]) for part in part_reports.values()]
+    return ExitCode.SUCCESS, success_text or reasons[0]
 
 
-def _times(graph: CheckedGraph, said: Mapping[str, Mapping[str, Any]]) -> dict[str, BlockTimes]:
+def _times(
+    graph: CheckedGraph, part_reports: Mapping[str, Mapping[str, Any]]
+) -> dict[str, BlockTimes]:
     """The times of every block on its own machine."""
     return {
         path: BlockTimes(**found)
         for path in graph.order
-        if (found := said[graph.block(path).machine].get("blocks", {}).get(path))
+        if (found := part_reports[graph.block(path).machine].get("blocks", {}).get(path))
     }
 
 
-def _collected(said: Mapping[str, Mapping[str, Any]], key: str) -> tuple[str, ...]:
-    return tuple(f"{name}: {text}" for name, part in said.items() for text in part.get(key, ()))
+def _collected(part_reports: Mapping[str, Mapping[str, Any]], key: str) -> tuple[str, ...]:
+    return tuple(
+        f"{name}: {text}" for name, part in part_reports.items() for text in part.get(key, ())
+    )
 
 
 def _error(data: Mapping[str, Any]) -> RunError:
@@ -307,9 +313,9 @@ def _error(data: Mapping[str, Any]) -> RunError:
     return error
 
 
-def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
+def _print_links(out: Console, part_reports: Mapping[str, Mapping[str, Any]]) -> None:
     """Print one row for each link."""
-    links = [link for part in said.values() for link in part.get("links", ())]
+    links = [link for part in part_reports.values() for link in part.get("links", ())]
     if any("age_p50_ms" in link for link in links):
         columns: tuple[str, ...] = (
             "link", ">messages", ">lost", ">damaged", ">late ticks", ">median age [ms]",
@@ -327,7 +333,7 @@ def _print_links(out: Console, said: Mapping[str, Mapping[str, Any]]) -> None:
         out.print(table("links", columns, rows))
 
 
-class Part:
+class MachineRun:
     """One machine's part, bound and ready to run once.
 
     Args:

@@ -21,7 +21,7 @@ from ...logs.file.surroundings import named_file
 from ...runtime.language.errors import AloftError
 from ...runtime.loading.flattening.flat import ROBOT_FILES
 from .cut import Cut, Terminal, cut, start_of
-from .running_graph import GRAPH, INTERFACE
+from .slave import GRAPH, INTERFACE
 
 _OURS = Path(__file__).parents[2]
 _ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)

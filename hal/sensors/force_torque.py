@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Matrix3, Vector3
 from ...mathematics.compiling.call_sequence import Call
+from ...mathematics.compiling.equations import cross
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
@@ -24,22 +25,19 @@ class Wrench(Signal):
 
 
 @kernel
-def read_wrench(net: Array, origin: Array, rotation: Array, force: Array, torque: Array) -> None:
-    """The wrench on a link from that with which the link acts on the world.
+def read_wrench(
+    net_force: Vector3, net_torque: Vector3, centre: Vector3, origin: Vector3, rotation: Matrix3,
+    force: Vector3, torque: Vector3,
+) -> None:  # fmt: skip
+    """The wrench on a link, in the sensor's axes, from that with which the link acts on the world.
 
     Args:
-        net: force [N], torque [N m] about the centre of pressure, and that centre [m], (9,), world.
-        origin: of the sensor [m, world], (3,).
-        rotation: from the sensor's axes to the world's, row by row, (9,).
+        net_force, net_torque: on the world [N, N m, world], about ``centre`` [m, world].
+        origin: of the sensor [m, world].
+        rotation: from the sensor's axes to the world's.
     """
-    x, y, z = net[6] - origin[0], net[7] - origin[1], net[8] - origin[2]
-    about_x = float(net[3] + y * net[2] - z * net[1])
-    about_y = float(net[4] + z * net[0] - x * net[2])
-    about_z = float(net[5] + x * net[1] - y * net[0])
-    for axis in range(3):
-        to_x, to_y, to_z = rotation[axis], rotation[3 + axis], rotation[6 + axis]
-        force[axis] = -(to_x * net[0] + to_y * net[1] + to_z * net[2])
-        torque[axis] = -(to_x * about_x + to_y * about_y + to_z * about_z)
+    force[:] = -(rotation.T @ net_force)
+    torque[:] = cross(rotation.T @ (centre - origin), force) - rotation.T @ net_torque
 
 
 class ForceSensor(MountedSensor):
@@ -70,6 +68,11 @@ class ForceSensor(MountedSensor):
     def from_mujoco(self, model: MjModel, data: MjData, out: Mapping[str, Array]) -> list[Call]:
         """Read the net contact force, and move it to the sensor."""
         site = model.site(self.site).id
-        net, at = data.sensor(f"{self.site}/net").data, data.site_xpos[site]
-        turn = data.site_xmat[site]
-        return [KernelCall(read_wrench, net, at, turn, out["force"], out["torque"])]
+        net = data.sensor(f"{self.site}/net").data
+        origin, rotation = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+        return [
+            KernelCall(
+                read_wrench, net[0:3], net[3:6], net[6:9], origin, rotation, out["force"],
+                out["torque"],
+            )
+        ]  # fmt: skip

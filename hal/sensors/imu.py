@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ...blocks.signals import ImuReading
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -17,11 +17,10 @@ if TYPE_CHECKING:
 
 
 @kernel
-def read_imu(gyroscope: Array, accelerometer: Array, rate: Array, force: Array) -> None:
-    """The angular velocity (3,) [rad/s] and the specific force (3,) [m/s^2] at a site."""
-    for axis in range(3):
-        rate[axis] = gyroscope[axis]
-        force[axis] = accelerometer[axis]
+def read_imu(gyroscope: Vector3, accelerometer: Vector3, rate: Vector3, force: Vector3) -> None:
+    """The angular velocity [rad/s] and the specific force [m/s^2] at a site."""
+    rate[:] = gyroscope
+    force[:] = accelerometer
 
 
 class Imu(MountedSensor):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Counts
+from ...mathematics.arrays import Array, Array1D, Array2D, Indices1D
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
@@ -50,25 +50,25 @@ class Errors(NamedTuple):
     """
 
     biased: bool
-    bias: Array
-    draws: Array
-    noise: Array
-    limit: Array
-    resolution: Array
+    bias: Array1D
+    draws: Array1D
+    noise: Array1D
+    limit: Array1D
+    resolution: Array1D
 
 
 @kernel
-def add_errors(true: Array, errors: Errors, reading: Array) -> None:
+def add_errors(true: Array1D, errors: Errors, reading: Array1D) -> None:
     """Write the ``reading`` (n,) of the ``true`` values (n,); what is not a number stays so."""
     for k in range(reading.shape[0]):
-        value = float(true[k])
+        value = true[k]
         if errors.biased:
-            value += float(errors.bias[k])
+            value += errors.bias[k]
         if errors.noise[k] != 0.0:
-            value += float(errors.draws[k]) * float(errors.noise[k])
-        value = min(value, float(errors.limit[k]))
-        value = max(value, -float(errors.limit[k]))
-        step = float(errors.resolution[k])
+            value += errors.draws[k] * errors.noise[k]
+        value = min(value, errors.limit[k])
+        value = max(value, -errors.limit[k])
+        step = errors.resolution[k]
         if step != 0.0:
             value = np.rint(value / step) * step
         reading[k] = value
@@ -118,21 +118,21 @@ class FieldErrors:
 
 
 class DelayLine(NamedTuple):
-    """Past samples of ``n`` numbers: a ring ``samples`` (slots, n), of which slot ``count % slots`` is
-    written next (``count`` (1,)), and how many samples each number is late, ``delay`` (n,)."""
+    """Past samples of ``n`` numbers: a ring ``samples`` (slots, n), of which slot ``taken % slots`` is
+    written next (``taken`` (1,)), and how many samples each number is late, ``delay`` (n,)."""
 
-    samples: Array
-    count: Counts
-    delay: Counts
+    samples: Array2D
+    taken: Indices1D
+    delay: Indices1D
 
 
 @kernel
-def delay_sample(sample: Array, line: DelayLine, reading: Array) -> None:
+def delay_sample(sample: Array1D, line: DelayLine, reading: Array1D) -> None:
     """Put a ``sample`` (n,) into the line, and write the ``reading`` (n,) that is late; before the
     first samples there was what the first one says."""
-    slots, count = line.samples.shape[0], int(line.count[0])
+    slots, count = line.samples.shape[0], line.taken[0]
     for k in range(sample.shape[0]):
         line.samples[count % slots, k] = sample[k]
-        late = min(int(line.delay[k]), count)
+        late = min(line.delay[k], count)
         reading[k] = line.samples[(count - late) % slots, k]
-    line.count[0] = count + 1
+    line.taken[0] = count + 1

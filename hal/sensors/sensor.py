@@ -45,7 +45,7 @@ from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.registry import find_class
 from ...runtime.language.signals import Signal
-from .noise import NoiseModel
+from .noise import FieldErrors, NoiseModel
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel, MjSpec
@@ -108,6 +108,16 @@ class Sensor(ABC):
             for field, each in self.signal.fields.items()
         }
         """How many numbers each field has."""
+
+    def reading(
+        self, true: Mapping[str, Array], errors: Mapping[str, FieldErrors], out: Signal
+    ) -> list[Call]:
+        """The calls that write a sample to ``out``: the ``true`` value of every field, (n,), with its
+        ``errors``."""
+        found: list[Call] = []
+        for field in self.signal.fields:
+            found += errors[field].calls(true[field], getattr(out, field))
+        return found
 
     def packet_size(self) -> int:
         """The bytes of a sample in a packet."""

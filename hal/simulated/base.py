@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from ...blocks.signals import RobotTruth
-from ...mathematics.arrays import Array, Array1D, Vector3
+from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
+from ...runtime.language.steps import as_record
 
 if TYPE_CHECKING:
     from mujoco import MjData
 
 
-class BaseTruth(NamedTuple):
-    """The fields of ``RobotTruth`` of the base."""
-
-    base_position: Vector3
-    base_orientation: Array1D
-    base_linear_velocity: Vector3
-    base_angular_velocity: Vector3
-
-
-def _base_truth(truth: RobotTruth) -> BaseTruth:
-    return BaseTruth(*(getattr(truth, name) for name in BaseTruth._fields))
-
-
 @kernel
-def report_fixed(truth: BaseTruth) -> None:
+def report_fixed(truth: RobotTruth) -> None:
     """The pose and velocity of a base at the world's origin."""
     for axis in range(3):
         truth.base_position[axis] = truth.base_orientation[axis] = 0.0
@@ -39,7 +27,7 @@ def report_fixed(truth: BaseTruth) -> None:
 
 
 @kernel
-def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
+def report_planar(position: Array, velocity: Array, truth: RobotTruth) -> None:
     """The pose and velocity of a base whose coordinates in the simulator are x, z and the pitch."""
     half = 0.5 * float(position[2])
     report_fixed(truth)
@@ -51,7 +39,7 @@ def report_planar(position: Array, velocity: Array, truth: BaseTruth) -> None:
 
 
 @kernel
-def report_floating(position: Array1D, velocity: Array1D, truth: BaseTruth) -> None:
+def report_floating(position: Array1D, velocity: Array1D, truth: RobotTruth) -> None:
     """The pose and velocity of a base whose coordinates are position and quaternion w, x, y, z."""
     for axis in range(3):
         truth.base_position[axis] = position[axis]
@@ -104,7 +92,7 @@ class FixedBase:
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
-        return KernelCall(report_fixed, _base_truth(truth))
+        return KernelCall(report_fixed, as_record(truth))
 
 
 class PlanarBase(FixedBase):
@@ -147,7 +135,7 @@ class PlanarBase(FixedBase):
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
         data = self._data
-        return KernelCall(report_planar, data.qpos, data.qvel, _base_truth(truth))
+        return KernelCall(report_planar, data.qpos, data.qvel, as_record(truth))
 
 
 class FloatingBase(FixedBase):
@@ -186,7 +174,7 @@ class FloatingBase(FixedBase):
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
         data = self._data
-        return KernelCall(report_floating, data.qpos, data.qvel, _base_truth(truth))
+        return KernelCall(report_floating, data.qpos, data.qvel, as_record(truth))
 
 
 BASES: dict[Literal["floating", "planar", "fixed"], type[FixedBase]] = {

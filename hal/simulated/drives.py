@@ -27,6 +27,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
+from ...runtime.language.steps import as_record
 from ..drive_control import Targets
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops
 from .state import DriveState, TickRecord, update_maximum, update_minimum
@@ -47,18 +48,6 @@ class Motors(NamedTuple):
     peak: Array1D
     slope: Array1D
     no_load: Array1D
-
-
-class MotorRecord(NamedTuple):
-    """Sums and extremes of the motors over some physics steps, each (n,): see ``TickRecord``."""
-
-    saturated: Indices1D
-    torque_high: Array1D
-    torque_low: Array1D
-    speed_high: Array1D
-    speed_low: Array1D
-    overload: Array1D
-    joint_torque: Array1D
 
 
 class MotorScratch(NamedTuple):
@@ -103,10 +92,11 @@ def joint_feedback_torque(
 ) -> None:
     """Write feedforward plus joint feedback [N m] to ``out`` (paper, V, first equation):
     ``tau_ff + Kp (q_d - q) + Kd (qd_d - qd)``."""
-    for k in range(out.shape[0]):
-        spring = (position_target[k] - position[k]) * stiffness[k]
-        damper = (velocity_target[k] - velocity[k]) * damping[k]
-        out[k] = (spring + feedforward[k]) + damper
+    out[:] = (
+        (position_target - position) * stiffness
+        + feedforward
+        + (velocity_target - velocity) * damping
+    )
 
 
 @kernel
@@ -136,7 +126,7 @@ def clip_joint_torque(
 
 @kernel
 def drive_motors(
-    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: MotorRecord
+    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: TickRecord
 ) -> None:
     """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
     the motors come to their limits. Of what is not a number the record says so too."""
@@ -149,15 +139,15 @@ def drive_motors(
         scratch.requested, scratch.torque,
     )  # fmt: skip
     for k in range(torque.shape[0]):
-        produced, speed = float(scratch.torque[k]), float(scratch.speed[k])
+        produced, speed = scratch.torque[k], scratch.speed[k]
         if produced != scratch.requested[k]:
             record.saturated[k] += 1
         update_maximum(record.torque_high, k, produced)
         update_minimum(record.torque_low, k, produced)
         update_maximum(record.speed_high, k, speed)
         update_minimum(record.speed_low, k, speed)
-        update_maximum(record.overload, k, produced - float(scratch.upper[k]))
-        update_maximum(record.overload, k, float(scratch.lower[k]) - produced)
+        update_maximum(record.overload, k, produced - scratch.upper[k])
+        update_maximum(record.overload, k, scratch.lower[k] - produced)
         record.joint_torque[k] += torque[k]
 
 
@@ -193,7 +183,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
     Args:
         released: the damping in the damping mode [N m s/rad], (n_joints,).
     """
-    active, pending = int(commands.active[()]), int(commands.pending[()])
+    active, pending = commands.active[()], commands.pending[()]
     joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
@@ -203,7 +193,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
         joints.arrived[0] = True
     commands.active[()] = active
     commands.pending[()] = pending
-    mode = int(commands.mode[active])
+    mode = commands.mode[active]
     if mode == _ACTIVE:
         joint_feedback_torque(
             commands.targets.torque[active], commands.targets.stiffness[active],
@@ -212,7 +202,7 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
         )  # fmt: skip
         return
     for k in range(joints.torque.shape[0]):
-        joints.torque[k] = float(joints.velocity[k]) * -released[k]
+        joints.torque[k] = joints.velocity[k] * -released[k]
         if mode != _DAMPING:
             joints.torque[k] = 0.0
 
@@ -224,7 +214,7 @@ def drive_joints(
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
-    record: MotorRecord,
+    record: TickRecord,
 ) -> None:
     """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
     follow_commands(commands, released, joints)
@@ -239,28 +229,17 @@ def drive_loops(
     joints: Joints,
     motors: Motors,
     scratch: MotorScratch,
-    record: MotorRecord,
+    record: TickRecord,
 ) -> None:
     """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
-    active = int(commands.active[()])
-    if int(commands.mode[active]) == _ACTIVE:
+    active = commands.active[()]
+    if commands.mode[active] == _ACTIVE:
         close_loops(
             loops, commands.targets, active, bool(joints.arrived[0]), joints.position,
             joints.velocity, joints.torque,
         )  # fmt: skip
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
-
-
-class CommandFields(NamedTuple):
-    """The fields of ``JointCommand``."""
-
-    mode: Indices0D
-    torque: Array1D
-    position: Array1D
-    velocity: Array1D
-    stiffness: Array1D
-    damping: Array1D
 
 
 class CommandLatency(NamedTuple):
@@ -275,7 +254,7 @@ class CommandLatency(NamedTuple):
 
 @kernel
 def send_command(
-    command: CommandFields,
+    command: JointCommand,
     step: Indices0D,
     latency: CommandLatency,
     commands: CommandRing,
@@ -285,15 +264,15 @@ def send_command(
 
     ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
     """
-    delay = float(latency.minimum[0])
+    delay = latency.minimum[0]
     if latency.jitter != 0.0:
-        delay += latency.jitter * float(latency.draw[0])
+        delay += latency.jitter * latency.draw[0]
     due = step[()] + math.ceil(delay / latency.timestep - 1e-9)
     due = max(due, last_due[()])
-    pending = int(commands.pending[()])
-    slot = (int(commands.active[()]) + 1 + pending) % commands.due.shape[0]
+    pending = commands.pending[()]
+    slot = (commands.active[()] + 1 + pending) % commands.due.shape[0]
     targets = commands.targets
-    commands.mode[slot] = int(command.mode[()])
+    commands.mode[slot] = command.mode[()]
     for k in range(command.torque.shape[0]):
         targets.torque[slot, k] = command.torque[k]
         targets.position[slot, k] = command.position[k]
@@ -321,7 +300,7 @@ class MotorLimits:
         )
         n = len(robot.joints)
         self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
-        self.record = MotorRecord(*(getattr(record, name) for name in MotorRecord._fields))
+        self.record = as_record(record)
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
 
@@ -401,5 +380,6 @@ class Drives:
     def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
         late as its ``latency`` is long, but not before earlier commands."""
-        fields = CommandFields(*(getattr(command, name) for name in CommandFields._fields))
-        return KernelCall(send_command, fields, step, latency, self._commands, self._state.last_due)
+        return KernelCall(
+            send_command, as_record(command), step, latency, self._commands, self._state.last_due
+        )

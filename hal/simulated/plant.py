@@ -31,6 +31,7 @@ from ...mathematics.compiling.library_call import LibraryCall, address_of
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
+from ...runtime.language.steps import as_record
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
@@ -47,9 +48,7 @@ from .stance import (
 )
 from .state import (
     PhysicsState,
-    RecordTotals,
     SensorMemory,
-    StepRecord,
     StepSensors,
     TickRecord,
     clear,
@@ -99,10 +98,10 @@ def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
     if number < 0 or number >= points.sites.shape[0]:
         points.missing[0] = True
         return
-    site, body = int(points.sites[number]), int(points.bodies[number])
-    x = float(points.places[site, 0]) - float(points.centres[body, 0])
-    y = float(points.places[site, 1]) - float(points.centres[body, 1])
-    z = float(points.places[site, 2]) - float(points.centres[body, 2])
+    site, body = points.sites[number], points.bodies[number]
+    x = points.places[site, 0] - points.centres[body, 0]
+    y = points.places[site, 1] - points.centres[body, 1]
+    z = points.places[site, 2] - points.centres[body, 2]
     wrench = points.wrenches
     wrench[body, 0], wrench[body, 1], wrench[body, 2] = fx, fy, fz
     wrench[body, 3], wrench[body, 4] = y * fz - z * fy, z * fx - x * fz
@@ -236,10 +235,7 @@ class Plant:
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
-        self.clearing = KernelCall(
-            clear, *(getattr(record, name) for name in ("steps", "forbidden", "saturated")),
-            RecordTotals(*(getattr(record, name) for name in RecordTotals._fields)),
-        )  # fmt: skip
+        self.clearing = KernelCall(clear, as_record(record))
         self.start_delay = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -273,7 +269,7 @@ class Plant:
         self._note = KernelCall(
             record_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
             *self._limits, sensors.ground_force, sensors.bounce_steps,
-            StepRecord(*(getattr(record, name) for name in StepRecord._fields)),
+            as_record(record),
         )  # fmt: skip
         self._encoding = KernelCall(
             read_encoders, self.position, sensors.encoder_offset, self._encoder

@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...blocks.signals import ImuReading, JointState
-from ...mathematics.arrays import Array, Counts, Flags
+from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices1D, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from ...robots.robot_description import MountedSensorPart
 from ...runtime.language.signals import Signal
 from ..random_streams import Purpose, RandomStreams, sensor_stream, stream
+from ..sensors.built_in import JointSensors, Switches
+from ..sensors.imu import Imu
 from ..sensors.noise import DelayLine, FieldErrors, NoiseModel, delay_sample
 from ..sensors.sensor import MountedSensor, mounted_sensors
-from ..sensors.switches import Switches
 from .simulated_robot import SimulatorParameters
 from .state import SensorMemory, TickRecord
 
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
 
 
 @kernel
-def accumulate(now: Array, averaged: Flags, total: Array, steps: Counts) -> None:
-    """Add the true values of a physics step, (n,), where they are ``averaged``; else keep them."""
+def accumulate(now: Array1D, averaged: Flags1D, total: Array1D, steps: Indices1D) -> None:
+    """Add the true values of a physics step where they are ``averaged``; else keep them."""
     for k in range(now.shape[0]):
         if averaged[k] and steps[0] > 0:
             total[k] += now[k]
@@ -38,26 +40,25 @@ def accumulate(now: Array, averaged: Flags, total: Array, steps: Counts) -> None
 
 
 @kernel
-def take_sample(averaged: Flags, total: Array, steps: Counts, true: Array) -> None:
-    """Write the true values (n,) of a sample, and begin the next one."""
+def take_sample(averaged: Flags1D, total: Array1D, steps: Indices1D, true: Array1D) -> None:
+    """Write the true values of a sample, and begin the next one."""
     for k in range(true.shape[0]):
-        true[k] = float(total[k]) / max(1, int(steps[0])) if averaged[k] else float(total[k])
-        total[k] = true[k]
+        true[k] = total[k] / max(1, steps[0]) if averaged[k] else total[k]
+    total[:] = true
     steps[0] = 0
 
 
 @kernel
-def copy_numbers(numbers: Array, out: Array) -> None:
-    """Copy numbers, (n,)."""
-    for k in range(out.shape[0]):
-        out[k] = numbers[k]
+def copy_numbers(numbers: Array1D, out: Array1D) -> None:
+    """Copy numbers."""
+    out[:] = numbers
 
 
 @kernel
-def read_nothing(first: Array, second: Array) -> None:
-    """Zeros, (3,), for an IMU that the robot does not have."""
-    for axis in range(3):
-        first[axis] = second[axis] = 0.0
+def read_nothing(rate: Vector3, force: Vector3) -> None:
+    """Zeros, for an IMU that the robot does not have."""
+    rate[:] = 0.0
+    force[:] = 0.0
 
 
 class SimulatedSensor:
@@ -151,26 +152,34 @@ class SimulatedSensors:
         n, seed = len(robot.joints), params.seed
         self._robot, self._params, self._streams = robot, params, streams
         self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
-        self._gyroscope = FieldErrors(
-            NoiseModel(noise=params.gyro_noise, bias=params.gyro_bias, range=params.gyro_range), 3,
-            stream(seed, Purpose.GYRO_BIAS), streams[Purpose.GYRO],
-        )  # fmt: skip
-        self._accelerometer = FieldErrors(
-            NoiseModel(
-                noise=params.accelerometer_noise, bias=params.accelerometer_bias,
-                range=params.accelerometer_range,
-            ),
-            3, stream(seed, Purpose.ACCELEROMETER_BIAS), streams[Purpose.ACCELEROMETER],
-        )  # fmt: skip
-        encoders = NoiseModel(bias=params.encoder_offset, resolution=params.encoder_resolution)
-        self._position = FieldErrors(encoders, n, stream(seed, Purpose.ENCODER_OFFSET), None)
-        velocity = NoiseModel(noise=params.joint_velocity_noise)
-        self._velocity = FieldErrors(
-            velocity, n, None, streams[Purpose.JOINT_VELOCITY], biased=False
+        self._imu = Imu("imu", MountedSensorPart(kind="imu", link=robot.base))
+        gyroscope = NoiseModel(
+            noise=params.gyro_noise, bias=params.gyro_bias, range=params.gyro_range
         )
-        self.gyro_bias, self.accelerometer_bias = self._gyroscope.bias, self._accelerometer.bias
-        """The biases of the robot's own IMU [rad/s, m/s^2]."""
-        self.encoder_offset = self._position.bias
+        accelerometer = NoiseModel(
+            noise=params.accelerometer_noise, bias=params.accelerometer_bias,
+            range=params.accelerometer_range,
+        )  # fmt: skip
+        self._imu_errors = {
+            "angular_velocity": FieldErrors(
+                gyroscope, 3, stream(seed, Purpose.GYRO_BIAS), streams[Purpose.GYRO]
+            ),
+            "specific_force": FieldErrors(
+                accelerometer, 3, stream(seed, Purpose.ACCELEROMETER_BIAS),
+                streams[Purpose.ACCELEROMETER],
+            ),
+        }  # fmt: skip
+        self._joints = JointSensors("joints", robot.dimensions)
+        encoders = NoiseModel(bias=params.encoder_offset, resolution=params.encoder_resolution)
+        velocity = NoiseModel(noise=params.joint_velocity_noise)
+        self._joint_errors = {
+            "position": FieldErrors(encoders, n, stream(seed, Purpose.ENCODER_OFFSET), None),
+            "velocity": FieldErrors(
+                velocity, n, None, streams[Purpose.JOINT_VELOCITY], biased=False
+            ),
+            "torque": FieldErrors(NoiseModel(), n, None, None, biased=False),
+        }
+        self.encoder_offset = self._joint_errors["position"].bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
         self.switch_threshold = Switches.draw_thresholds(
             params.switch_threshold, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
@@ -218,20 +227,15 @@ class SimulatedSensors:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
         if not self._has_imu:
             return [KernelCall(read_nothing, out.angular_velocity, out.specific_force)]
-        return [
-            *self._gyroscope.calls(rate, out.angular_velocity),
-            *self._accelerometer.calls(force, out.specific_force),
-        ]
+        true = {"angular_velocity": rate, "specific_force": force}
+        return self._imu.reading(true, self._imu_errors, out)
 
     def reading_joints(
         self, position: Array, velocity: Array, torque: Array, out: JointState
     ) -> list[Call]:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
-        return [
-            *self._position.calls(position, out.position),
-            *self._velocity.calls(velocity, out.velocity),
-            KernelCall(copy_numbers, torque, out.torque),
-        ]
+        true = {"position": position, "velocity": velocity, "torque": torque}
+        return self._joints.reading(true, self._joint_errors, out)
 
     def reading_switches(self, step: Counts, record: TickRecord, closed: Flags) -> list[Call]:
         """Write a sample of the switches, (n_contacts,); without switches none is closed. ``step`` is a

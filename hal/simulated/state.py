@@ -87,45 +87,16 @@ class StepSensors(NamedTuple):
     position: Array1D
 
 
-class StepRecord(NamedTuple):
-    """Where it is noted: see ``TickRecord``."""
-
-    steps: Indices0D
-    load: Array2D
-    accelerometer: Vector3
-    forbidden: Indices0D
-    violation: Array1D
-    closed: Flags1D
-    bounce_end: Indices1D
-
-
-class RecordTotals(NamedTuple):
-    """The sums and extremes of numbers that begin anew with every tick: see ``TickRecord``."""
-
-    load: Array2D
-    accelerometer: Vector3
-    joint_torque: Array1D
-    violation: Array1D
-    overload: Array1D
-    torque_high: Array1D
-    torque_low: Array1D
-    speed_high: Array1D
-    speed_low: Array1D
-
-
 @kernel
-def clear(
-    steps: Indices0D, forbidden: Indices0D, saturated: Indices1D, record: RecordTotals
-) -> None:
-    """Begin a new record. ``steps`` and ``forbidden`` are without a dimension."""
-    steps[()] = forbidden[()] = 0
+def clear(record: TickRecord) -> None:
+    """Begin a new record, except for the memory of the switches."""
+    record.steps[()] = record.forbidden[()] = 0
     for point in range(record.load.shape[0]):
         for axis in range(4):
             record.load[point, axis] = 0.0
-    for axis in range(3):
-        record.accelerometer[axis] = 0.0
-    for k in range(saturated.shape[0]):
-        saturated[k] = 0
+    record.accelerometer[:] = 0.0
+    for k in range(record.saturated.shape[0]):
+        record.saturated[k] = 0
         record.joint_torque[k] = record.violation[k] = record.overload[k] = 0.0
         record.torque_high[k] = record.speed_high[k] = -math.inf
         record.torque_low[k] = record.speed_low[k] = math.inf
@@ -190,7 +161,7 @@ def record_step(
     upper: Array1D,
     ground_force: Array1D,
     bounce_steps: int,
-    record: StepRecord,
+    record: TickRecord,
 ) -> None:
     """Note a physics step that has been made, and count it.
 
@@ -200,20 +171,19 @@ def record_step(
         ground_force, bounce_steps: as for ``watch_switches``.
     """
     watch_switches(
-        step[()], sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
+        int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
     step[()] = step[()] + 1
-    record.steps[()] = int(record.steps[()]) + 1
+    record.steps[()] = record.steps[()] + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
-        allowed += float(sensors.load[point, 0])
+        allowed += sensors.load[point, 0]
         for axis in range(4):
             record.load[point, axis] += sensors.load[point, axis]
-    for axis in range(3):
-        record.accelerometer[axis] += sensors.accelerometer[axis]
+    record.accelerometer[:] += sensors.accelerometer
     if sensors.contacts[0] > allowed:
-        record.forbidden[()] = int(record.forbidden[()]) + 1
+        record.forbidden[()] = record.forbidden[()] + 1
     for joint in range(lower.shape[0]):
-        angle = float(sensors.position[joint])
+        angle = sensors.position[joint]
         update_maximum(record.violation, joint, lower[joint] - angle)
         update_maximum(record.violation, joint, angle - upper[joint])

@@ -8,11 +8,8 @@ import numpy as np
 
 from ...blocks.signals import RobotTruth
 from ...mathematics.arrays import (
-    Array0D,
     Array1D,
     Array2D,
-    Flags1D,
-    Indices0D,
     Indices1D,
     Rows3,
     Vector3,
@@ -20,6 +17,7 @@ from ...mathematics.arrays import (
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from ...runtime.language.steps import as_record
 from .base import FixedBase
 from .scenes import Scene
 from .stance import depth_of_contacts
@@ -51,49 +49,14 @@ class TrueState(NamedTuple):
     boxes: Array2D
 
 
-class TickExtremes(NamedTuple):
-    """Sums and extremes over the physics steps of a tick: see ``TickRecord``."""
-
-    steps: Indices0D
-    load: Array2D
-    forbidden: Indices0D
-    violation: Array1D
-    overload: Array1D
-    saturated: Indices1D
-    torque_high: Array1D
-    torque_low: Array1D
-    speed_high: Array1D
-    speed_low: Array1D
-
-
-class TruthFields(NamedTuple):
-    """The fields of ``RobotTruth`` but those of the base."""
-
-    joint_position: Array1D
-    joint_velocity: Array1D
-    com: Vector3
-    com_velocity: Vector3
-    angular_momentum: Vector3
-    contact_position: Rows3
-    contact_force: Rows3
-    contact_touched: Flags1D
-    ground_height: Array1D
-    forbidden_contacts: Indices0D
-    joint_limit_violation: Array0D
-    motor_overload: Array0D
-    saturated_share: Array0D
-    motor_torque: Array1D
-    motor_speed: Array1D
-
-
 @kernel
 def height_of_ground(floor: Array1D, boxes: Array2D, x: float, y: float) -> float:
     """The height [m, world] of the highest surface at a place: as ``Scene.ground_height``."""
-    height = floor[0]
+    height = float(floor[0])
     for box in range(boxes.shape[0]):
         inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
         if boxes[box, 4] > height and inside:
-            height = boxes[box, 4]
+            height = float(boxes[box, 4])
     return height
 
 
@@ -107,44 +70,43 @@ def largest(values: Array1D) -> float:
 
 
 @kernel
-def report_contacts(instant: TrueState, peaks: TickExtremes, report: TruthFields) -> None:
+def report_contacts(instant: TrueState, peaks: TickRecord, report: RobotTruth) -> None:
     """The contact points: where they are, the ground under them, and the mean force on each."""
-    steps = int(peaks.steps[()])
+    steps = peaks.steps[()]
     for point in range(instant.below.shape[0]):
-        place = int(instant.contacts[point])
-        x, y = float(instant.places[place, 0]), float(instant.places[place, 1])
+        place = instant.contacts[point]
+        x, y = instant.places[place, 0], instant.places[place, 1]
         report.contact_position[point, 0], report.contact_position[point, 1] = x, y
         report.contact_position[point, 2] = instant.places[place, 2] - instant.below[point]
         report.ground_height[point] = height_of_ground(instant.floor, instant.boxes, x, y)
         touched = False
         for axis in range(3):
-            force = float(peaks.load[point, 1 + axis]) / -steps
+            force = peaks.load[point, 1 + axis] / -steps
             report.contact_force[point, axis] = force
             touched = touched or force != 0.0
         report.contact_touched[point] = touched
 
 
 @kernel
-def report_truth(instant: TrueState, peaks: TickExtremes, report: TruthFields) -> None:
+def report_truth(instant: TrueState, peaks: TickRecord, report: RobotTruth) -> None:
     """Write the truth about a tick that has been simulated."""
-    for axis in range(3):
-        report.com[axis] = instant.com[axis]
-        report.com_velocity[axis] = instant.com_velocity[axis]
-        report.angular_momentum[axis] = instant.angular_momentum[axis]
+    report.com[:] = instant.com
+    report.com_velocity[:] = instant.com_velocity
+    report.angular_momentum[:] = instant.angular_momentum
     report_contacts(instant, peaks, report)
     count, at_limit = report.joint_position.shape[0], 0
     for k in range(count):
         report.joint_position[k] = instant.joint_position[k]
         report.joint_velocity[k] = instant.joint_velocity[k]
-        at_limit += int(peaks.saturated[k])
-        high, low = float(peaks.torque_high[k]), float(peaks.torque_low[k])
+        at_limit += peaks.saturated[k]
+        high, low = peaks.torque_high[k], peaks.torque_low[k]
         report.motor_torque[k] = low if -low > high else high
-        high, low = float(peaks.speed_high[k]), float(peaks.speed_low[k])
+        high, low = peaks.speed_high[k], peaks.speed_low[k]
         report.motor_speed[k] = low if -low > high else high
-    report.forbidden_contacts[()] = int(peaks.forbidden[()])
+    report.forbidden_contacts[()] = peaks.forbidden[()]
     report.joint_limit_violation[()] = largest(peaks.violation)
     report.motor_overload[()] = largest(peaks.overload)
-    report.saturated_share[()] = at_limit / (int(peaks.steps[()]) * max(1, count))
+    report.saturated_share[()] = at_limit / (peaks.steps[()] * max(1, count))
 
 
 class TruthReport:
@@ -176,12 +138,11 @@ class TruthReport:
             np.array([scene.floor]),
             np.array(boxes, dtype=np.float64).reshape(-1, 5),
         )
-        self._peaks = TickExtremes(*(getattr(record, name) for name in TickExtremes._fields))
+        self._peaks = as_record(record)
 
     def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
-        report = TruthFields(*(getattr(truth, name) for name in TruthFields._fields))
         return (
             self._base.publishing(truth),
-            KernelCall(report_truth, self._instant, self._peaks, report),
+            KernelCall(report_truth, self._instant, self._peaks, as_record(truth)),
         )

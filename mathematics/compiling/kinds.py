@@ -46,6 +46,7 @@ NUMBER = NumberKind()
 
 def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     """What an annotation, or the text of one, says; ``scope`` has the names in it."""
+    annotation = getattr(annotation, "__forward_arg__", annotation)  # the text in a named tuple
     if isinstance(annotation, str):
         try:
             annotation = eval(annotation, dict(scope))

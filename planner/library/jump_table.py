@@ -187,17 +187,17 @@ def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
     """
     rows, last = table.rows, table.rows.shape[0] - 1
     row, share = locate(table.time, time)
-    length = float(table.time[row + 1]) - float(table.time[row])
-    outside = time - min(max(time, float(table.time[0])), float(table.time[last]))
+    length = table.time[row + 1] - table.time[row]
+    outside = time - min(max(time, table.time[0]), table.time[last])
     beyond = 0 if outside < 0.0 else last
     for k in range(out.shape[0]):
         if not table.fed[k]:
             continue
-        risen = (float(rows[row + 1, k]) - float(rows[row, k])) * (0.5 * share)
-        part = (risen + float(rows[row, k])) * (share * length)
-        total = float(table.sums[row, k]) + part
+        risen = (rows[row + 1, k] - rows[row, k]) * (0.5 * share)
+        part = (risen + rows[row, k]) * (share * length)
+        total = table.sums[row, k] + part
         if outside != 0.0:
-            total += float(rows[beyond, k]) * outside
+            total += rows[beyond, k] * outside
         out[k] += sign * total
 
 
@@ -212,7 +212,7 @@ def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Ar
         if table.fed[k] and hold > 0.0:
             out[k] = 0.0
             continue
-        out[k] = float(rows[row, k]) + (float(rows[row + 1, k]) - float(rows[row, k])) * share
+        out[k] = rows[row, k] + (rows[row + 1, k] - rows[row, k]) * share
     if hold > 0.0:
         sum_to(table, time + lead + hold, 1.0, out)
         sum_to(table, time + lead, -1.0, out)
@@ -254,16 +254,16 @@ def write_fields(values: Array1D, fields: Fields) -> None:
 def write_marks(table: Rows, time: float, marks: Marks) -> None:
     """Write the phase, the times of the flight, and which points carry load."""
     jump = present_jump(time, table.touchdowns)
-    thrust, lift_off = float(table.jumps[jump, 0]), float(table.jumps[jump, 1])
-    touchdown = float(table.jumps[jump, 2])
-    squat, recover = float(table.marks[0]), float(table.marks[1])
+    thrust, lift_off = table.jumps[jump, 0], table.jumps[jump, 1]
+    touchdown = table.jumps[jump, 2]
+    squat, recover = table.marks[0], table.marks[1]
     phase = planned_phase(time, squat, thrust, lift_off, touchdown, recover)
     if jump > 0 and phase < _THRUST:  # between two jumps it has landed, and does not squat
         phase = _LANDING
     marks.time[()] = time
     marks.phase[()] = phase
     if jump + 1 < table.jumps.shape[0] and time >= 0.5 * (lift_off + touchdown):
-        lift_off, touchdown = float(table.jumps[jump + 1, 1]), float(table.jumps[jump + 1, 2])
+        lift_off, touchdown = table.jumps[jump + 1, 1], table.jumps[jump + 1, 2]
     marks.lift_off_time[()] = lift_off
     marks.touchdown_time[()] = touchdown
     marks.toes_first[()] = table.toes_first[jump]

@@ -17,7 +17,7 @@ INTO, OUT = "<in>", "<out>"
 
 
 @dataclass(frozen=True)
-class Wire:
+class DiagramWire:
     """One wire between two nodes of a diagram, each end as (node, port)."""
 
     source: tuple[str, str]
@@ -25,12 +25,12 @@ class Wire:
     delay: int = 0
     truth: bool = False
     transition: str = ""
-    said: str = ""
+    wire_text: str = ""
     """The source as the graph file says it, such as ``robot.joints.position[2]``."""
 
 
 @dataclass
-class Node:
+class DiagramNode:
     """A block, a box, or a border of the box around it."""
 
     path: str
@@ -51,8 +51,8 @@ class Node:
 class Diagram:
     """One level of a graph: its nodes by path, in the order of execution, and its wires."""
 
-    nodes: dict[str, Node]
-    wires: list[Wire]
+    nodes: dict[str, DiagramNode]
+    wires: list[DiagramWire]
 
 
 def diagram(graph: CheckedGraph, closed: Collection[str] = ()) -> Diagram:
@@ -60,7 +60,7 @@ def diagram(graph: CheckedGraph, closed: Collection[str] = ()) -> Diagram:
     rows = [row for row in table(graph) if "~" not in row.path]
     machines = {spec.path: spec.machine for spec in graph.blocks}
     links = [
-        _Link(source, f"{row.path}.{item.name}", item)
+        _DiagramLink(source, f"{row.path}.{item.name}", item)
         for row in rows
         for item in row.inputs
         for source in item.sources
@@ -79,7 +79,7 @@ def subgraphs(graph: CheckedGraph) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _Link:
+class _DiagramLink:
     """A wire of the whole graph, from ``block.port`` to ``block.input``."""
 
     source: str
@@ -90,12 +90,12 @@ class _Link:
 def _level(
     prefix: str,
     rows: Sequence[BlockRow],
-    links: Sequence[_Link],
+    links: Sequence[_DiagramLink],
     machines: dict[str, str],
     closed: Collection[str],
 ) -> Diagram:
     """The diagram of what lies below a path."""
-    nodes: dict[str, Node] = {}
+    nodes: dict[str, DiagramNode] = {}
     inner: dict[str, list[BlockRow]] = {}
     for row in rows:
         first, slash, _ = row.path.removeprefix(prefix).partition("/")
@@ -103,11 +103,11 @@ def _level(
         if not slash:
             nodes[path] = _block(row, first, machines.get(path, ""))
         else:
-            nodes.setdefault(path, Node(path, first, "sub-graph", is_box=True))
+            nodes.setdefault(path, DiagramNode(path, first, "sub-graph", is_box=True))
             inner.setdefault(path, []).append(row)
     if prefix:
-        nodes = {INTO: Node(INTO, ""), **nodes, OUT: Node(OUT, "")}
-    wires: dict[Wire, None] = {}
+        nodes = {INTO: DiagramNode(INTO, ""), **nodes, OUT: DiagramNode(OUT, "")}
+    wires: dict[DiagramWire, None] = {}
     for link in links:
         ends = _end(link.source, prefix, nodes, True), _end(link.target, prefix, nodes, False)
         if None in ends or ends == (INTO, OUT):
@@ -120,7 +120,7 @@ def _level(
         # several readers behind a border share the port of their common source
         into = _port(nodes[target], link.target, prefix, False, link.source)
         item = link.row
-        shown = Wire(
+        shown = DiagramWire(
             (source, out), (target, into), item.delay, item.truth, item.transition, item.source
         )
         wires.setdefault(shown)
@@ -130,8 +130,8 @@ def _level(
     return Diagram(nodes, list(wires))
 
 
-def _block(row: BlockRow, title: str, machine: str) -> Node:
-    return Node(
+def _block(row: BlockRow, title: str, machine: str) -> DiagramNode:
+    return DiagramNode(
         row.path,
         title,
         row.use,
@@ -143,7 +143,7 @@ def _block(row: BlockRow, title: str, machine: str) -> Node:
     )
 
 
-def _end(port: str, prefix: str, nodes: dict[str, Node], is_source: bool) -> str | None:
+def _end(port: str, prefix: str, nodes: dict[str, DiagramNode], is_source: bool) -> str | None:
     """The node of a level at which an end of a wire lies; its border if it lies outside."""
     block = port.rpartition(".")[0]
     if not block.startswith(prefix):
@@ -152,7 +152,7 @@ def _end(port: str, prefix: str, nodes: dict[str, Node], is_source: bool) -> str
     return path if path in nodes else None
 
 
-def _port(node: Node, end: str, prefix: str, is_source: bool, source: str = "") -> str:
+def _port(node: DiagramNode, end: str, prefix: str, is_source: bool, source: str = "") -> str:
     """The port of a node for an end of a wire; boxes and borders get one where it is missing."""
     if not node.is_box and node.path not in (INTO, OUT):
         return end.rpartition(".")[2]

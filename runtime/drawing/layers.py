@@ -10,20 +10,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .diagram import INTO, OUT, Diagram, Wire
+from .diagram import INTO, OUT, Diagram, DiagramWire
 
 _SWEEPS = 24
 
 
 @dataclass(frozen=True)
-class Pass:
+class WirePassage:
     """The place of a net in a column that it only passes."""
 
     net: tuple[str, str]
     layer: int
 
 
-Place = str | Pass
+Place = str | WirePassage
 """A node, by its path, or the passage of a net."""
 
 
@@ -33,8 +33,8 @@ class Layers:
 
     columns: list[list[Place]]
     layer: dict[str, int]
-    forward: list[Wire]
-    back: list[Wire]
+    forward: list[DiagramWire]
+    back: list[DiagramWire]
     links: dict[tuple[Place, Place], list[tuple[str, str]]] = field(default_factory=dict)
     """Between neighbouring columns: the ports at both ends, empty for a passage."""
 
@@ -86,7 +86,7 @@ def _sequence(diagram: Diagram) -> dict[str, int]:
 
 
 def _longest_paths(
-    diagram: Diagram, forward: Sequence[Wire], rank: dict[str, int]
+    diagram: Diagram, forward: Sequence[DiagramWire], rank: dict[str, int]
 ) -> dict[str, int]:
     """The column of every node: behind all its sources, and not further left than need be."""
     layer = dict.fromkeys(diagram.nodes, 0)
@@ -113,14 +113,14 @@ def _add_passages(layers: Layers) -> None:
         before: Place = net[0]
         port = net[1]
         for number in range(layers.layer[net[0]] + 1, end):
-            passage = Pass(net, number)
+            passage = WirePassage(net, number)
             layers.columns[number].append(passage)
             layers.links.setdefault((before, passage), []).append((port, ""))
             before, port = passage, ""
     for wire in layers.forward:
         number = layers.layer[wire.target[0]]
         direct = layers.layer[wire.source[0]] == number - 1
-        before = wire.source[0] if direct else Pass(wire.source, number - 1)
+        before = wire.source[0] if direct else WirePassage(wire.source, number - 1)
         ends = (wire.source[1] if direct else "", wire.target[1])
         found = layers.links.setdefault((before, wire.target[0]), [])
         if ends not in found:
@@ -131,7 +131,7 @@ def _reduce_crossings(layers: Layers, diagram: Diagram) -> None:
     """Sort every column by the mean place of what it is wired to, to and fro; keep the best."""
 
     def share(place: Place, port: str, outputs: bool) -> float:
-        if isinstance(place, Pass):
+        if isinstance(place, WirePassage):
             return 0.5
         ports = diagram.nodes[place].outputs if outputs else diagram.nodes[place].inputs
         return (ports.index(port) + 1) / (len(ports) + 1) if port in ports else 0.5
@@ -173,10 +173,10 @@ def _crossings(layers: Layers, diagram: Diagram) -> int:
     where = {p: k for c in layers.columns for k, p in enumerate(c)}
     spans: dict[int, list[tuple[int, int, int, int]]] = {}
     for (a, b), ends in layers.links.items():
-        number = a.layer if isinstance(a, Pass) else layers.layer[a]
+        number = a.layer if isinstance(a, WirePassage) else layers.layer[a]
         for out, into in ends:
-            first = 0 if isinstance(a, Pass) else diagram.nodes[a].outputs.index(out)
-            last = 0 if isinstance(b, Pass) else diagram.nodes[b].inputs.index(into)
+            first = 0 if isinstance(a, WirePassage) else diagram.nodes[a].outputs.index(out)
+            last = 0 if isinstance(b, WirePassage) else diagram.nodes[b].inputs.index(into)
             spans.setdefault(number, []).append((where[a], first, where[b], last))
     total = 0
     for found in spans.values():

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .diagram import INTO, OUT, Diagram, Node, Wire
-from .layers import Layers, Pass, Place, arrange
+from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
+from .layers import Layers, Place, WirePassage, arrange
 
 ROW = 18.0
 """From one port to the next."""
@@ -35,7 +35,7 @@ def width_of(text: str, size: float) -> float:
 class Box:
     """A node in its place; ``inside`` is the drawing of an open box, relative to (x, y)."""
 
-    node: Node
+    node: DiagramNode
     width: float
     height: float
     x: float = 0.0
@@ -57,7 +57,7 @@ class Line:
     """A wire, or a part that several wires share, as a path of right angles."""
 
     points: tuple[tuple[float, float], ...]
-    wire: Wire
+    wire: DiagramWire
     ends: bool = True
     """Whether it ends at a block's input, with an arrow head."""
 
@@ -69,23 +69,23 @@ class Drawing:
     diagram: Diagram
     boxes: dict[str, Box]
     lines: list[Line] = field(default_factory=list)
-    dots: list[tuple[float, float, Wire]] = field(default_factory=list)
+    dots: list[tuple[float, float, DiagramWire]] = field(default_factory=list)
     width: float = 0.0
     height: float = 0.0
 
 
-def note_of(wire: Wire) -> str:
+def note_of(wire: DiagramWire) -> str:
     """What stands on a wire that is not a plain one: delay, change of rate, what is selected."""
     notes = [f"z⁻{str(wire.delay).translate(_RAISED)}"] if wire.delay else []
     notes += [wire.transition] if wire.transition else []
     port = wire.source[1].rpartition(".")[2]
-    selected = wire.said.partition(f".{port}")[2]
-    if selected and not wire.said.startswith(("[", "{")):
+    selected = wire.wire_text.partition(f".{port}")[2]
+    if selected and not wire.wire_text.startswith(("[", "{")):
         notes.append(selected)
     return " ".join(notes)
 
 
-def size_of(node: Node) -> tuple[float, float]:
+def size_of(node: DiagramNode) -> tuple[float, float]:
     """Width and height of a block or a closed box."""
     rows = max(len(node.inputs), len(node.outputs))
     if node.path in (INTO, OUT):
@@ -113,9 +113,9 @@ class _Hop:
     """
 
     net: Net
-    wire: Wire
+    wire: DiagramWire
     starts: float | None
-    ends: list[tuple[float, Wire | None]] = field(default_factory=list)
+    ends: list[tuple[float, DiagramWire | None]] = field(default_factory=list)
     goes_to: int | None = None
     comes_from: int | None = None
     track: int = 0
@@ -139,16 +139,18 @@ class _Hop:
 class Router:
     """The wires of one diagram. ``columns`` are the left and right edges of its columns."""
 
-    def __init__(self, layers: Layers, boxes: dict[str, Box], passages: dict[Pass, float]) -> None:
+    def __init__(
+        self, layers: Layers, boxes: dict[str, Box], passages: dict[WirePassage, float]
+    ) -> None:
         self.layers = layers
         self.boxes = boxes
         self.passages = passages
         self.columns: list[tuple[float, float]] = []
-        self.wires: dict[Net, Wire] = {}
+        self.wires: dict[Net, DiagramWire] = {}
         low = [box.y + box.height for box in boxes.values()] + list(passages.values())
         self.floor = max(low, default=0.0) + 20.0
         self.gaps: list[dict[tuple[Net, str], _Hop]] = [{} for _ in range(len(layers.columns) + 1)]
-        self.lanes: list[tuple[int, int, Net, list[Wire]]] = []
+        self.lanes: list[tuple[int, int, Net, list[DiagramWire]]] = []
         for wire in [*layers.forward, *layers.back]:
             self.wires.setdefault(wire.source, wire)
         self._forward()
@@ -160,7 +162,7 @@ class Router:
         box = self.boxes[net[0]]
         return box.y + box.port(net[1], True)
 
-    def _into(self, wire: Wire) -> float:
+    def _into(self, wire: DiagramWire) -> float:
         box = self.boxes[wire.target[0]]
         return box.y + box.port(wire.target[1], False)
 
@@ -169,18 +171,18 @@ class Router:
 
     def _forward(self) -> None:
         for passage, height in self.passages.items():
-            before = Pass(passage.net, passage.layer - 1)
+            before = WirePassage(passage.net, passage.layer - 1)
             starts = self.passages.get(before, self._out(passage.net))
             self._hop(passage.layer, passage.net, starts).ends.append((height, None))
         for wire in self.layers.forward:
             number = self.layers.layer[wire.target[0]]
-            before = Pass(wire.source, number - 1)
+            before = WirePassage(wire.source, number - 1)
             starts = self.passages.get(before, self._out(wire.source))
             self._hop(number, wire.source, starts).ends.append((self._into(wire), wire))
 
     def _back(self) -> None:
         """Lanes for the nets that lead back, the shortest uppermost."""
-        nets: dict[tuple[Net, int], list[Wire]] = {}
+        nets: dict[tuple[Net, int], list[DiagramWire]] = {}
         for wire in self.layers.back:
             nets.setdefault((wire.source, self.layers.layer[wire.target[0]]), []).append(wire)
         in_order = sorted(
@@ -249,7 +251,7 @@ class Router:
             ):
                 drawing.dots.append((x, y, hop.wire))
 
-    def ends(self, wire: Wire | None) -> bool:
+    def ends(self, wire: DiagramWire | None) -> bool:
         """Whether a branch ends at a block, and not at a border behind which it goes on."""
         if wire is None:
             return False
@@ -263,7 +265,7 @@ class Router:
             return box.x + box.width
         return edges[0] - 2.0
 
-    def _end(self, number: int, hop: _Hop, wire: Wire | None) -> float:
+    def _end(self, number: int, hop: _Hop, wire: DiagramWire | None) -> float:
         """Where a branch ends: at a block, or at the edge of the column that it passes."""
         if wire is None:
             return self.columns[number][0] - 2.0
@@ -339,7 +341,7 @@ def draw(diagram: Diagram) -> Drawing:
     drawing = Drawing(diagram, boxes)
     for path, box in boxes.items():
         box.y = heights[path]
-    router = Router(layers, boxes, {p: h for p, h in heights.items() if isinstance(p, Pass)})
+    router = Router(layers, boxes, {p: h for p, h in heights.items() if isinstance(p, WirePassage)})
     gaps = column_gaps(router)
     x = gaps[0]
     for number, column in enumerate(layers.columns):
@@ -365,11 +367,11 @@ def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
         top = 0.0
         for place in column:
             y[place] = top
-            top += _height(place, boxes) + (_PASS_GAP if isinstance(place, Pass) else _GAP)
+            top += _height(place, boxes) + (_PASS_GAP if isinstance(place, WirePassage) else _GAP)
     links: dict[Place, list[tuple[Place, float, float, float]]] = {}
     for (a, b), ends in layers.links.items():
         for out, into in ends:
-            weight = (1.0, 4.0, 16.0)[isinstance(a, Pass) + isinstance(b, Pass)]
+            weight = (1.0, 4.0, 16.0)[isinstance(a, WirePassage) + isinstance(b, WirePassage)]
             from_a = boxes[a].port(out, True) if isinstance(a, str) else 0.0
             from_b = boxes[b].port(into, False) if isinstance(b, str) else 0.0
             links.setdefault(a, []).append((b, from_a, from_b, weight))
@@ -391,10 +393,12 @@ def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
 
 def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) -> None:
     """Take small steps out of the lines that pass columns, where there is room."""
-    before = {b: (a, ends[0][0]) for (a, b), ends in layers.links.items() if isinstance(b, Pass)}
+    before = {
+        b: (a, ends[0][0]) for (a, b), ends in layers.links.items() if isinstance(b, WirePassage)
+    }
     for column in layers.columns:
         for number, place in enumerate(column):
-            if not isinstance(place, Pass):
+            if not isinstance(place, WirePassage):
                 continue
             source, port = before[place]
             wish = y[source] + (boxes[source].port(port, True) if isinstance(source, str) else 0.0)
@@ -426,7 +430,7 @@ def _settle(
     for number, place in enumerate(column):
         if number:
             before = column[number - 1]
-            both = isinstance(before, Pass) and isinstance(place, Pass)
+            both = isinstance(before, WirePassage) and isinstance(place, WirePassage)
             top += _height(before, boxes) + (_PASS_GAP if both else _GAP)
         starts.append(top)
     blocks: list[list[float]] = []  # of places that move together: sum, weight, count

@@ -141,7 +141,7 @@ fit();
 
 
 @dataclass(frozen=True)
-class Addition:
+class PageAddition:
     """What a page has besides the diagram: data, controls, and the style and script for them."""
 
     name: str
@@ -155,7 +155,7 @@ def page(
     graph: CheckedGraph,
     closed: Collection[str] = (),
     values: Values | None = None,
-    addition: Addition | None = None,
+    addition: PageAddition | None = None,
 ) -> str:
     """The page's text. It asks no other machine for anything.
 

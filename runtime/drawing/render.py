@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import IO, Any
 
-from .diagram import INTO, OUT, Diagram, Node, Wire
+from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
 from .layout import HEAD, NOTE, PAD, PORT, TITLE, USE, Box, Drawing, note_of, width_of
 
 LIGHT = {
@@ -53,11 +53,11 @@ class Style:
     rates: dict[float, int]
     machines: dict[str, int]
 
-    def wire(self, wire: Wire) -> int:
+    def wire(self, wire: DiagramWire) -> int:
         """The number of a wire's colour."""
         return self.sources.get(owner(wire.source), 0) % len(WIRES_LIGHT)
 
-    def block(self, node: Node) -> int:
+    def block(self, node: DiagramNode) -> int:
         """The number of a block's colour."""
         return self.rates.get(node.rate_hz, 0) % len(RATES_LIGHT)
 
@@ -84,7 +84,7 @@ def style_of(diagram: Diagram) -> Style:
     )
 
 
-def _nodes(diagram: Diagram) -> Iterable[Node]:
+def _nodes(diagram: Diagram) -> Iterable[DiagramNode]:
     for node in diagram.nodes.values():
         yield node
         if node.inside is not None:
@@ -112,7 +112,7 @@ def legend(diagram: Diagram, style: Style) -> list[tuple[str, str]]:
     return found
 
 
-def _wires(diagram: Diagram) -> Iterable[Wire]:
+def _wires(diagram: Diagram) -> Iterable[DiagramWire]:
     yield from diagram.wires
     for node in diagram.nodes.values():
         if node.inside is not None:
@@ -198,7 +198,7 @@ def _content(drawing: Drawing, style: Style) -> Iterator[str]:
             )
 
 
-def _classes(wire: Wire, style: Style) -> str:
+def _classes(wire: DiagramWire, style: Style) -> str:
     classes = [f"w{style.wire(wire)}"]
     classes += ["delay"] if wire.delay else []
     classes += ["rates"] if wire.transition else []
@@ -206,13 +206,13 @@ def _classes(wire: Wire, style: Style) -> str:
     return " ".join(classes)
 
 
-def _path(points: tuple[tuple[float, float], ...], wire: Wire, style: Style) -> str:
+def _path(points: tuple[tuple[float, float], ...], wire: DiagramWire, style: Style) -> str:
     text = "M" + " L".join(f"{x:g} {y:g}" for x, y in points)
     source = escape(port_of(wire.source))
     return f'<path class="wire {_classes(wire, style)}" data-source="{source}" d="{text}"/>'
 
 
-def _head(x: float, y: float, wire: Wire, style: Style) -> str:
+def _head(x: float, y: float, wire: DiagramWire, style: Style) -> str:
     points = f"{x:g},{y:g} {x - 7:g},{y - 3.4:g} {x - 7:g},{y + 3.4:g}"
     return f'<polygon class="head {_classes(wire, style)}" points="{points}"/>'
 
@@ -341,7 +341,7 @@ class _Painter:
         self.wires = WIRES_DARK if dark else WIRES_LIGHT
         self.rates = RATES_DARK if dark else RATES_LIGHT
 
-    def colour(self, wire: Wire) -> str:
+    def colour(self, wire: DiagramWire) -> str:
         return self.colours["truth"] if wire.truth else self.wires[self.style.wire(wire)]
 
     def content(self, drawing: Drawing, x: float, y: float) -> None:
@@ -364,14 +364,14 @@ class _Painter:
                 a, b = line.points[-1]
                 self.text(x + a - 9, y + b - 4, note_of(line.wire), NOTE, "soft", "right")
 
-    def line(self, xs: list[float], ys: list[float], wire: Wire) -> None:
+    def line(self, xs: list[float], ys: list[float], wire: DiagramWire) -> None:
         dashes: Any = (0, (5, 3)) if wire.delay else (0, (1.5, 2)) if wire.truth else "-"
         width = 2.6 if wire.transition else 1.3
         self.axes.plot(
             xs, ys, color=self.colour(wire), lw=width, ls=dashes, solid_capstyle="round", zorder=2
         )
 
-    def head(self, x: float, y: float, wire: Wire) -> None:
+    def head(self, x: float, y: float, wire: DiagramWire) -> None:
         self.axes.fill([x, x - 7, x - 7], [y, y - 3.4, y + 3.4], color=self.colour(wire), lw=0)
 
     def text(
@@ -444,7 +444,7 @@ class _Painter:
                 self.rectangle(x, y - 9, 22, 13, self.colours["page"], edge, 6)
                 self.axes.plot([x + 4, x + 18], [y - 3] * 2, color=edge, lw=2.0, zorder=4)
             elif not kind.startswith("machine"):
-                sample = Wire(
+                sample = DiagramWire(
                     ("", ""), ("", ""), kind == "delay", kind == "truth", "x" * (kind == "rates")
                 )
                 self.line([x, x + 26], [y - 3, y - 3], sample)

@@ -238,13 +238,17 @@ class Block:
 
     @classmethod
     def fitted(
-        cls, params: Parameters, folder: Path, robot: RobotDescription | None = None
+        cls,
+        params: Parameters,
+        folder: Path,
+        robot: RobotDescription | None = None,
+        graph_folder: Path | None = None,
     ) -> type[Block]:
         """The class whose ports are those that the parameters, or the graph's robot, ask for; by default
         the class itself.
 
         Another class has the name of this one. Files that parameters name are relative to
-        ``folder``. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
+        ``folder``; beside the loaded graph, in ``graph_folder``, users keep their modules. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
         """
         return cls
 

@@ -72,12 +72,21 @@ def declare_steps(cls: type[Any]) -> None:
         own.pop(name, None)
         names = arguments_of(function)
         if is_kernel(function) or isinstance(value, staticmethod) or "self" not in names[:1]:
-            function.declared_kinds = {n: _declared(cls, function, n) for n in names}  # type: ignore[attr-defined]
+            declare(cls, function)
             own[name] = function
             made = step_in_file_of(cls, name, written_code(function))
             made.__doc__, made.binds = function.__doc__, function
             setattr(cls, name, made)
     cls.named_steps = own
+
+
+def declare(cls: type[Any], function: FunctionType) -> None:
+    """Check what a function of a class takes against the class's declarations, and note its kinds.
+
+    Raises:
+        DeclarationError: an argument is not declared, or with another type.
+    """
+    function.declared_kinds = {n: _declared(cls, function, n) for n in arguments_of(function)}  # type: ignore[attr-defined]
 
 
 def _declared(cls: type[Any], function: FunctionType, name: str) -> Kind:
@@ -199,24 +208,38 @@ def bind_steps(block: Block) -> None:
         BlockError: something that a step takes is missing or of a type that a kernel cannot take.
     """
     for name, function in type(block).named_steps.items():
-        call: Any
-        if is_kernel(function):
-            used = names_used(function)
-            arguments = [
-                _kernel_argument(block, function, each, used) for each in arguments_of(function)
-            ]
-            if reports_event(function):
-                block.event = np.zeros(1, np.int64)
-                arguments.append(block.event)
-            call = KernelCall(function, *arguments)
-        else:
-            call = PythonCall(
-                function, tuple(_python_argument(block, n) for n in arguments_of(function))
-            )
+        call = call_of(block, function)
         if name == "update":
             block.update_calls = (call,)
         else:
             block.kernel_calls = (call,)
+
+
+def call_of(block: Block, function: FunctionType) -> KernelCall | PythonCall:
+    """The call of a function that names what it takes of a block.
+
+    Raises:
+        BlockError: something that it takes is missing or of a type that a kernel cannot take.
+    """
+    if not is_kernel(function):
+        return PythonCall(
+            function, tuple(_python_argument(block, n) for n in arguments_of(function))
+        )
+    used = names_used(function)
+    arguments = [_kernel_argument(block, function, each, used) for each in arguments_of(function)]
+    if reports_event(function):
+        block.event = np.zeros(1, np.int64)
+        arguments.append(block.event)
+    return KernelCall(function, *arguments)
+
+
+def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
+    """The call of a kernel with these arguments, in their order; it gets of signals what it reads."""
+    used = names_used(function)  # type: ignore[arg-type]
+    return KernelCall(
+        function,
+        *(as_record(each, used) if isinstance(each, Signal) else each for each in arguments),
+    )
 
 
 def names_used(function: FunctionType) -> frozenset[str]:
@@ -247,10 +270,10 @@ def _kernel_argument(block: Block, function: FunctionType, name: str, used: froz
     return as_record(value, used) if isinstance(value, Signal) else value
 
 
-def as_record(signal: Signal, used: frozenset[str]) -> Any:
-    """The named tuple of those fields of a signal that kernels name."""
+def as_record(signal: Signal, used: frozenset[str] | None = None) -> Any:
+    """The named tuple of those fields of a signal that kernels name; by default of all."""
     views = signal.views()
-    names = tuple(name for name in views if name in used) or tuple(views)[:1]
+    names = tuple(name for name in views if used is None or name in used) or tuple(views)[:1]
     return record_type(type(signal).__name__, names)(*(views[name] for name in names))
 
 

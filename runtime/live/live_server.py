@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-from ..drawing.page import ADDRESS, Addition, LoopbackHandler, page, policy
+from ..drawing.page import ADDRESS, LoopbackHandler, PageAddition, page, policy
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
 from .tunables import Tunables, write_overlay
@@ -50,7 +50,7 @@ def live_page(
     """
     button = '<button id="tune">parameters</button>' if tuning else ""
     data = {"token": token, "tuning": tuning, "save": save, "opened": opened}
-    addition = Addition(
+    addition = PageAddition(
         "live",
         data,
         f'{_CONTROLS}{button}<output id="parts"></output><output id="line"></output>',

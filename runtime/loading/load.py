@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..language.stages import CheckedGraph
-from .checking.examine import examine
+from .checking.check_graph import check_graph
 from .flattening.flat import FlatGraph
 from .flattening.flatten import flatten_file, flatten_text
 from .problems import LoadError, Problems, Report
@@ -24,7 +24,7 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
         LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = examine(flatten_file(graph_path(path), overrides, problems), problems)
+    graph = check_graph(flatten_file(graph_path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
@@ -35,14 +35,14 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
         LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = examine(flatten_text(text, Path(path), overrides, problems), problems)
+    graph = check_graph(flatten_text(text, Path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
     """The report on a graph file; ``ok`` when it may run."""
     problems = Problems()
-    examine(flatten_file(graph_path(path), overrides, problems), problems)
+    check_graph(flatten_file(graph_path(path), overrides, problems), problems)
     return problems.report(str(path))
 
 

@@ -125,16 +125,16 @@ def _input(
     if issubclass(source.block_type, ConstantSignal):
         return InputRow(name, "constant", signal.__name__, fields)
     origins: tuple[str, ...] = (origin,)
-    said = origin
+    wire_text = origin
     if issubclass(source.block_type, Gather):
         origins = tuple(dict.fromkeys(_origin(specs, wire) for wire in source.wires.values()))
-        said = source.block_type.said
+        wire_text = source.block_type.wire_text
     ends = [specs[each.rpartition(".")[0]] for each in origins]
     changes = dict.fromkeys(_transition(graph, end, spec) for end in ends)
     ports = zip(ends, origins, strict=True)
     return InputRow(
         name,
-        said,
+        wire_text,
         signal.__name__,
         fields,
         wire.delay,

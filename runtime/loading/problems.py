@@ -148,25 +148,25 @@ class Report:
         count = len(self.problems)
         return f"{self.file}: {count or 'no'} problem{'s' if count != 1 else ''}"
 
-    def shown(self) -> tuple[list[Problem], list[str]]:
+    def printed(self) -> tuple[list[Problem], list[str]]:
         """The problems to print, the first ``MOST_SHOWN`` of each kind, and a line on the others."""
         counts: dict[Code, int] = {}
-        kept = []
+        printed_problems = []
         for problem in self.problems:
             counts[problem.code] = counts.get(problem.code, 0) + 1
             if counts[problem.code] <= MOST_SHOWN:
-                kept.append(problem)
+                printed_problems.append(problem)
         more = [
             f"{count - MOST_SHOWN} more problems of the kind {code}; --json has all of them"
             for code, count in counts.items()
             if count > MOST_SHOWN
         ]
-        return kept, more
+        return printed_problems, more
 
     def text(self) -> str:
         """The report as plain text; of very many problems of one kind the first ones."""
-        kept, more = self.shown()
-        return "\n\n".join([*(p.text() for p in kept), *more, self.headline()])
+        printed_problems, more = self.printed()
+        return "\n\n".join([*(p.text() for p in printed_problems), *more, self.headline()])
 
     def rich(self) -> Text:
         """The whole report for a terminal, in colour."""
@@ -174,8 +174,8 @@ class Report:
 
         styles = {"expected": "green", "found": "red", "nearest": "cyan", "fix": "bold green"}
         out = Text()
-        kept, more = self.shown()
-        for problem in kept:
+        printed_problems, more = self.printed()
+        for problem in printed_problems:
             out.append(f"{problem.where}: ", "bold")
             out.append(f"{problem.code}: ", "bold red")
             out.append(f"{problem.message}\n")
@@ -227,8 +227,8 @@ class Problems:
         Where a place has a syntax error, its other problems follow from that and are left out.
         """
         unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
-        kept = [p for p in self._found if unread.get(p.where, p) is p]
-        return Report(file, tuple(sorted(kept, key=lambda problem: problem.where)))
+        printed_problems = [p for p in self._found if unread.get(p.where, p) is p]
+        return Report(file, tuple(sorted(printed_problems, key=lambda problem: problem.where)))
 
 
 def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
@@ -241,7 +241,7 @@ def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
     return tuple(lowered[match] for match in found)
 
 
-def instead(key: str, value: str, where: Position, right: str) -> str:
+def fix_for_key(key: str, value: str, where: Position, right: str) -> str:
     """The fix to paste for a misspelt key: the corrected override, or the key with its value."""
     if not where.line:
         start, dot, rest = where.file.rpartition(f".{key}")
@@ -252,7 +252,7 @@ def instead(key: str, value: str, where: Position, right: str) -> str:
 def listing(names: Iterable[str], limit: int = 12) -> str:
     """Names in one line, cut off after ``limit`` names."""
     all_names = list(names)
-    shown = ", ".join(all_names[:limit])
+    printed = ", ".join(all_names[:limit])
     if len(all_names) > limit:
-        return f"{shown}, ... ({len(all_names)} in all)"
-    return shown or "none"
+        return f"{printed}, ... ({len(all_names)} in all)"
+    return printed or "none"

@@ -29,7 +29,7 @@ Instant = float | None
 """The time at which the newest sample was taken that a value depends on [s], if on any."""
 
 
-class _Times:
+class _SampleTimes:
     """Follows through the ticks of a graph which sample of ``source`` every block depends on."""
 
     def __init__(self, graph: CheckedGraph, source: str) -> None:
@@ -123,7 +123,7 @@ def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
             f"the age of {source} at {target} would need {pattern + settling} ticks to compute; at "
             f"most {LONGEST} are looked at"
         )
-    times = _Times(graph, source)
+    times = _SampleTimes(graph, source)
     worst: float | None = None
     for tick in range(settling + pattern):
         times.tick(tick)
@@ -169,7 +169,7 @@ class Timeline:
     links: Mapping[str, LinkTimes] = field(default_factory=dict)
 
 
-class _Part:
+class _PartSamples:
     """Follows through the ticks of one part which sample each value depends on."""
 
     def __init__(
@@ -192,7 +192,7 @@ class _Part:
         self.found: list[tuple[int, SampleTime]] = []
         self.done = False
 
-    def run(self, parts: Mapping[str, _Part]) -> Iterator[None]:
+    def run(self, parts: Mapping[str, _PartSamples]) -> Iterator[None]:
         """Go through all ticks; stops to wait for what another part has not come to yet."""
         at = self.source.rpartition(".")[0]
         for place, tick in enumerate(self.timeline.ticks):
@@ -216,7 +216,7 @@ class _Part:
         self.done = True
 
     def _collect(
-        self, spec: BlockSpec, place: int, parts: Mapping[str, _Part], *, keep: bool = False
+        self, spec: BlockSpec, place: int, parts: Mapping[str, _PartSamples], *, keep: bool = False
     ) -> Iterator[None]:
         newest: SampleTime = None
         for name in spec.wires:
@@ -228,7 +228,9 @@ class _Part:
         else:
             self.output[spec.path] = newest
 
-    def _note(self, spec: BlockSpec, place: int, parts: Mapping[str, _Part]) -> Iterator[None]:
+    def _note(
+        self, spec: BlockSpec, place: int, parts: Mapping[str, _PartSamples]
+    ) -> Iterator[None]:
         yield from self._arrives(spec, self.port, place, parts)
         self.found.append((place, self._read(spec, self.port, place, parts)))
 
@@ -236,7 +238,7 @@ class _Part:
         return self.timeline.links.get(spec.wires[name].source_block)
 
     def _arrives(
-        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _Part]
+        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _PartSamples]
     ) -> Iterator[None]:
         """Wait until the sender has come to the tick whose message was read here."""
         link, source = self._link(spec, name), spec.wires[name].source_block
@@ -249,7 +251,7 @@ class _Part:
             yield
 
     def _read(
-        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _Part]
+        self, spec: BlockSpec, name: str, place: int, parts: Mapping[str, _PartSamples]
     ) -> SampleTime:
         wire, link = spec.wires[name], self._link(spec, name)
         followed = wire.source == self.source
@@ -280,7 +282,7 @@ def measured_ages(
     """
     alone = len(timelines) == 1
     parts = {
-        machine: _Part(graph, None if alone else machine, timeline, source, target)
+        machine: _PartSamples(graph, None if alone else machine, timeline, source, target)
         for machine, timeline in timelines.items()
         if len(timeline.ticks)
     }

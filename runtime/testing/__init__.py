@@ -4,15 +4,15 @@ and a counter of allocated arrays."""
 from .allocations import count_array_allocations
 from .bench import BlockBench
 from .conformance import ConformanceError, check_block, conformance_cases
-from .graphs import Use, checked_graph
+from .graphs import BlockUse, checked_graph
 from .stretch import Stretch, StretchError
 
 __all__ = [
     "BlockBench",
+    "BlockUse",
     "ConformanceError",
     "Stretch",
     "StretchError",
-    "Use",
     "check_block",
     "checked_graph",
     "conformance_cases",

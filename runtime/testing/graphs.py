@@ -16,7 +16,7 @@ from ..language.stages import BlockSpec, CheckedGraph, ClockSpec, Wire
 
 
 @dataclass(frozen=True)
-class Use:
+class BlockUse:
     """A block in a graph: its class, parameters, the source of each input, period and offset."""
 
     block_type: type[Block]
@@ -27,7 +27,7 @@ class Use:
 
 
 def checked_graph(
-    blocks: Mapping[str, Use],
+    blocks: Mapping[str, BlockUse],
     *,
     rate: float = 500.0,
     ticks: int | None = None,
@@ -70,7 +70,7 @@ def checked_graph(
 
 def _spec(
     path: str,
-    use: Use,
+    use: BlockUse,
     wires: Mapping[str, Wire],
     robot: RobotDescription | None,
     dimensions: Mapping[str, int] | None,
@@ -88,7 +88,7 @@ def _spec(
 def _delay_spec(
     path: str,
     wire: Wire,
-    blocks: Mapping[str, Use],
+    blocks: Mapping[str, BlockUse],
     robot: RobotDescription | None,
     dimensions: Mapping[str, int] | None,
 ) -> BlockSpec:

@@ -14,11 +14,13 @@ from pathlib import Path
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .transport import NetworkTransport
+from .udp import UdpTransport
 from .zenoh_transport import ZenohTransport
 
 TRANSPORTS: dict[str, type[NetworkTransport]] = {
     "tcp": ZenohTransport,
     "tls": ZenohTransport,
+    "udp": UdpTransport,
 }
 """The class of each scheme."""
 EXAMPLE = "tcp/127.0.0.1:7450"

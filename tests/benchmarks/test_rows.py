@@ -1,8 +1,12 @@
 """The rows of benchmarks, and cases that take turns."""
 
-import numpy as np
+import os
+import time
 
-from aloft.benchmarks.rows import Row, compare, take_turns
+import numpy as np
+import pytest
+
+from aloft.benchmarks.rows import Row, compare, other_process, take_turns
 
 
 def test_goals() -> None:
@@ -25,3 +29,36 @@ def test_ratios_are_of_the_same_round() -> None:
     row = compare("b", times, "a", goal=2.0)
     assert (row.value, row.ratio, row.met) == (5.0, 2.0, True)
     assert compare("b", times, "a", goal=1.9).met is False
+
+
+ECHO = """
+import json, os, sys
+for line in sys.stdin:
+    print(json.dumps([os.getpid(), line.strip()]), flush=True)
+"""
+
+
+def gone(pid: int) -> bool:
+    """Whether there is no such process, soon."""
+    for _ in range(500):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def test_it_answers_and_ends() -> None:
+    with other_process(ECHO) as other:
+        pid, said = other.ask("one")
+        assert said == "one" and other.ask("two") == [pid, "two"]
+    assert gone(pid)
+
+
+def test_it_ends_when_the_measurement_fails_and_when_it_is_frozen() -> None:
+    with pytest.raises(ZeroDivisionError), other_process(ECHO) as other:
+        pid, _ = other.ask("one")
+        other.freeze()
+        _ = 1 / 0
+    assert gone(pid)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.benchmarks.aloft_process import time_process
-from aloft.benchmarks.startup import startup
+from aloft.benchmarks.startup import startup, time_process
 
 
 def test_a_process_is_timed_as_often_as_asked(tmp_path: Path) -> None:

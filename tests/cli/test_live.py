@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from aloft.cli.shared.live import Elsewhere, open_live_run
+from aloft.cli.shared.live import RemoteRunAddress, open_live_run
 from aloft.cli.shared.running_graphs import local_runs
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.live.live_server import WatchedRun
@@ -47,13 +47,13 @@ def wait_for(run: WatchedRun, holds: Callable[[dict[str, Any]], bool]) -> dict[s
 def test_a_graph_of_one_process_is_not_looked_for_elsewhere(here: Path) -> None:
     here.write_text("rate: 1 Hz\nblocks: {one: {use: blocks.SineWave}}\n")
     with pytest.raises(AloftError, match="no graph is running"):
-        open_live_run("", Elsewhere(here))
+        open_live_run("", RemoteRunAddress(here))
 
 
 def test_parts_that_nobody_hears_are_named(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("aloft.cli.shared.live.PATIENCE", 0.2)
+    monkeypatch.setattr("aloft.cli.shared.live.TIMEOUT", 0.2)
     with pytest.raises(AloftError, match=r"nothing was heard of near, far for 0\.2 s: do they run"):
-        open_live_run("", Elsewhere(here, ["machines.near=tcp/127.0.0.1:9"]))
+        open_live_run("", RemoteRunAddress(here, ["machines.near=tcp/127.0.0.1:9"]))
 
 
 @pytest.mark.long
@@ -65,11 +65,11 @@ def test_both_parts_of_a_local_run_are_shown_tuned_and_followed(here: Path) -> N
     second = None
     try:
         wait_until(lambda: local_runs(here))
-        run = open_live_run("", Elsewhere(here))
+        run = open_live_run("", RemoteRunAddress(here))
         assert isinstance(run, SpreadRun)
         wait_for(run, lambda f: f["state"] == "running" and "twice" in f["times"])
         run.close()
-        run = open_live_run("", Elsewhere(here))  # now that a part answers here
+        run = open_live_run("", RemoteRunAddress(here))  # now that a part answers here
         assert isinstance(run, SpreadRun) and run.has_parameters
         run.close()
         run = open_live_run("waves-near")

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.ros2.codec import Codec
-from aloft.ros2.message_types import MessageType
-from aloft.ros2.names import attachment
+from aloft.ros2.codec import Codec, MessageType
+from aloft.ros2.node import attachment
 from aloft.ros2.subscribe import Subscribe
 from aloft.runtime.testing.bench import BlockBench
 

@@ -2,21 +2,6 @@
 
 from __future__ import annotations
 
-from .angular_momentum import AngularMomentum
-from .contact_points import ContactPoints
-from .linear_momentum import LinearMomentum
-from .posture import Posture
-from .task import KernelTask, Situation, Task, TaskChoice
-from .torso_orientation import TorsoOrientation
+from .task import FeedbackGains, FeedbackTask, Task, TaskError, TaskJacobian
 
-__all__ = [
-    "AngularMomentum",
-    "ContactPoints",
-    "KernelTask",
-    "LinearMomentum",
-    "Posture",
-    "Situation",
-    "Task",
-    "TaskChoice",
-    "TorsoOrientation",
-]
+__all__ = ["FeedbackGains", "FeedbackTask", "Task", "TaskError", "TaskJacobian"]

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
-from ....mathematics.arrays import Array1D, Array2D, Vector3
-from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
-from ....robots.description import RobotDescription
 from ....runtime.language.parameters import Parameters, parameter
-from .task import KernelTask, Situation
+from ...signals import DynamicsTerms, WholeBodyTarget
+from .task import Task
 
 Vector = tuple[float, float, float]
 
@@ -31,22 +25,7 @@ class AngularGains(Parameters):
     )
 
 
-class Feedback(NamedTuple):
-    """Weights and gains as arrays, (3,) each, and whether the target is tracked."""
-
-    weight: Array1D
-    damping: Array1D
-    track: bool
-
-
-class Momentum(NamedTuple):
-    """An angular momentum [N m s] and its rate [N m] about the centre of mass, (3,) each, world."""
-
-    value: Vector3
-    rate: Vector3
-
-
-class AngularMomentum(KernelTask):
+class AngularMomentum(Task):
     """The rate of the angular momentum k is -K_d k, the paper's damping (V, task 4), or, with
     ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
 
@@ -55,43 +34,20 @@ class AngularMomentum(KernelTask):
     inertia of the whole robot: about 160 for a robot of 5 kg, and below one for a robot of 30 kg.
     """
 
-    Gains = AngularGains
+    Gains = Params = AngularGains
+    size = 3
 
-    def __init__(self, situation: Situation, rows: TaskRows) -> None:
-        super().__init__(situation, rows)
-        terms, target = situation.terms, situation.target
-        self._measured = Momentum(terms.angular_momentum, terms.centroidal_drift[3:6])
-        self._target = Momentum(target.angular_momentum, target.angular_momentum_rate)
-
-    @classmethod
-    def row_count(cls, robot: RobotDescription, gains: AngularGains) -> int:
-        return 3
-
-    def prepare(self, gains: AngularGains) -> KernelCall:
-        feedback = Feedback(
-            np.array(gains.angular_weight), np.array(gains.angular_damping),
-            gains.track_angular_momentum,
-        )  # fmt: skip
-        matrix = self.situation.terms.centroidal_matrix
-        return KernelCall(angular_rows, matrix, self._measured, self._target, feedback, self.rows)
-
-
-@kernel
-def angular_rows(
-    matrix: Array2D, measured: Momentum, target: Momentum, gains: Feedback, rows: TaskRows
-) -> None:
-    """Three rows for the rate of the angular momentum.
-
-    Args:
-        matrix: centroidal momentum matrix (6, n_velocities).
-        measured: the measured momentum; its ``rate`` is the drift, the rate at zero acceleration.
-        target: the planned momentum and its rate.
-    """
-    for i in range(3):
-        for k in range(matrix.shape[1]):
-            rows.jacobian[i, k] = matrix[3 + i, k]
-        wanted = -float(gains.damping[i]) * float(measured.value[i])
-        if gains.track:
-            wanted += float(target.rate[i]) + float(gains.damping[i]) * float(target.value[i])
-        rows.desired[i] = wanted - float(measured.rate[i])
-        rows.weights[i] = gains.weight[i]
+    @kernel
+    @staticmethod
+    def step(
+        terms: DynamicsTerms, target: WholeBodyTarget, params: AngularGains, rows: TaskRows
+    ) -> None:
+        for i in range(3):
+            for k in range(rows.jacobian.shape[1]):
+                rows.jacobian[i, k] = terms.centroidal_matrix[3 + i, k]
+            damping = params.angular_damping[i]
+            rate = -damping * terms.angular_momentum[i]
+            if params.track_angular_momentum:
+                rate += target.angular_momentum_rate[i] + damping * target.angular_momentum[i]
+            rows.desired[i] = rate - terms.centroidal_drift[3 + i]
+            rows.weights[i] = params.angular_weight[i]

@@ -6,24 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import (
-    Array1D,
-    Array3D,
-    Flags1D,
-    Indices0D,
-    Indices1D,
-    Rows3,
-)
-from ....mathematics.compiling.kernel_call import KernelCall
+from ....mathematics.arrays import Array1D, Indices1D
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
+from ....robots.limb import chain_to
 from ....runtime.language.parameters import Parameters, parameter
-from ...signals import Phase
-from .foot_joints import rolling_joint
-from .task import KernelTask, Situation
-
-_THRUST = int(Phase.THRUST)
+from ...signals import DynamicsTerms, JointState, Phase, PhaseState, WholeBodyTarget
+from .task import Task
 
 
 class ContactGains(Parameters):
@@ -61,53 +51,20 @@ class ContactGains(Parameters):
     )
 
 
-class PointGains(NamedTuple):
-    """``ContactGains`` as a kernel takes them."""
-
-    stance_weight: float
-    stance_damping: float
-    swing_weight: float
-    swing_stiffness: float
-    swing_damping: float
-    step_weight: float
-    rolling_weight: float
-    rolling_stiffness: float
-    rolling_damping: float
-
-
-class Points(NamedTuple):
-    """The contact points: (n, 3, n_velocities), then (n, 3) each [m, m/s, m/s^2, world]."""
-
-    jacobian: Array3D
-    drift: Rows3
-    position: Rows3
-    velocity: Rows3
-
-
-class Steps(NamedTuple):
-    """The points of a foot that takes a step, (n,), and their acceleration [m/s^2, world] (n, 3)."""
-
-    stepping: Flags1D
-    acceleration: Rows3
-
-
 class Ankles(NamedTuple):
-    """The joint that each foot rolls with: its index in the generalised velocity, -1 for none, and
-    its desired acceleration [rad/s^2], (n_feet,) each."""
+    """The joints with which feet roll over their toes.
 
+    ``foot`` (n_contacts,) is the foot of each point. ``place`` (n_feet,) is the index of each foot's
+    joint in the generalised velocity, -1 for none, and ``acceleration`` (n_feet,) its desired
+    acceleration [rad/s^2].
+    """
+
+    foot: Indices1D
     place: Indices1D
     acceleration: Array1D
 
 
-class JointMotion(NamedTuple):
-    """Joint angles [rad], velocities and accelerations, (n_joints,) each."""
-
-    position: Array1D
-    velocity: Array1D
-    acceleration: Array1D
-
-
-class ContactPoints(KernelTask):
+class ContactPoints(Task):
     """Points in stance do not accelerate (paper, V, task 1): J a + drift = -damping velocity.
 
     Points that are not in stance while others are go to the ground, at the mean height of the
@@ -115,171 +72,132 @@ class ContactPoints(KernelTask):
     rely on the force of a heel that hovers. In THRUST such points are lifting off. Those of a foot
     with an ankle are free to rise, as the heels do while the toes still push, and are damped across
     their foot, while the ankle follows the plan with feedforward and feedback. The points of a foot
-    without an ankle (see ``foot_joints.rolling_joint``) only have their velocity damped.
+    without an ankle (see ``rolling_joint``) only have their velocity damped.
 
     Points of a foot that takes a step have the acceleration that ``PhaseState`` gives them.
     """
 
-    Gains = ContactGains
-
-    def __init__(self, situation: Situation, rows: TaskRows) -> None:
-        super().__init__(situation, rows)
-        robot, terms, target = situation.robot, situation.terms, situation.target
-        self._points = Points(
-            terms.contact_jacobian, terms.contact_drift, terms.contact_position,
-            terms.contact_velocity,
-        )  # fmt: skip
-        self._steps = Steps(situation.phase.stepping, situation.phase.step_acceleration)
-        self._foot = np.array(robot.foot_of_contact(), dtype=np.int64)
-        joints = [rolling_joint(robot, foot) for foot in range(len(robot.feet))]
-        first = robot.base_velocities
-        places = [-1 if joint is None else first + joint for joint in joints]
-        self._ankles = Ankles(np.array(places, dtype=np.int64), np.zeros(len(joints)))
-        self._planned = JointMotion(
-            target.joint_position, target.joint_velocity, target.joint_acceleration
-        )
+    Gains = Params = ContactGains
 
     @classmethod
-    def row_count(cls, robot: RobotDescription, gains: ContactGains) -> int:
+    def row_count(cls, params: ContactGains, robot: RobotDescription) -> int:
         return 3 * len(robot.contacts)
 
-    def prepare(self, gains: ContactGains) -> KernelCall:
-        now = self.situation
-        numbers = {name: float(getattr(gains, name)) for name in PointGains._fields}
-        return KernelCall(
-            contact_task, self._points, now.phase.stance, self._steps, now.phase.phase, self._foot,
-            now.terms.foot_rotation, self._planned, now.joints.position, now.terms.velocity,
-            self._ankles, PointGains(**numbers), self.rows,
+    def setup(self) -> None:
+        robot = self.robot
+        joints = [rolling_joint(robot, foot) for foot in range(len(robot.feet))]
+        places = [-1 if joint is None else robot.base_velocities + joint for joint in joints]
+        self.ankles = Ankles(
+            np.array(robot.foot_of_contact(), np.int64), np.array(places, np.int64),
+            np.zeros(len(joints)),
         )  # fmt: skip
 
+    @kernel
+    @staticmethod
+    def step(
+        terms: DynamicsTerms,
+        target: WholeBodyTarget,
+        phase: PhaseState,
+        joints: JointState,
+        ankles: Ankles,
+        params: ContactGains,
+        rows: TaskRows,
+    ) -> None:
+        contact_rows(terms, phase, params, rows)
+        step_rows(terms, phase, params, rows)
+        if phase.phase == Phase.THRUST:
+            ankle_accelerations(terms, target, joints, params, ankles)
+            lifting_rows(terms, phase, ankles, params, rows)
 
-@kernel
-def contact_task(
-    points: Points,
-    stance: Flags1D,
-    steps: Steps,
-    phase: Indices0D,
-    foot: Indices1D,
-    foot_rotation: Array3D,
-    planned: JointMotion,
-    position: Array1D,
-    velocity: Array1D,
-    ankles: Ankles,
-    gains: PointGains,
-    rows: TaskRows,
-) -> None:
-    """All rows of the task.
 
-    Args:
-        phase: the phase of the jump, of shape ().
-        foot, foot_rotation: as for ``lifting_rows``.
-        position, velocity: as for ``follow_plan``.
+def rolling_joint(robot: RobotDescription, foot: int) -> int | None:
+    """The joint that turns a foot about its lateral axis while the foot rolls over its toes.
+
+    It is the leg's last hinge whose axis is nearly across the robot (within 45 degrees of y, at the
+    zero pose). A point foot has none: it does not roll, and its leg's last hinge is the knee.
     """
-    contact_rows(
-        points, stance, gains.stance_weight, gains.stance_damping, gains.swing_weight,
-        gains.swing_stiffness, gains.swing_damping, rows,
-    )  # fmt: skip
-    step_rows(points, steps, gains.step_weight, rows)
-    if phase[()] == _THRUST:
-        follow_plan(
-            planned, position, velocity, gains.rolling_stiffness, gains.rolling_damping, ankles
-        )
-        lifting_rows(
-            points, stance, foot, foot_rotation, ankles, gains.swing_weight,
-            gains.swing_damping, gains.rolling_weight, rows,
-        )  # fmt: skip
+    name = robot.feet[foot].name
+    if sum(contact.foot == name for contact in robot.contacts) < 2:
+        return None
+    for index in reversed(chain_to(robot, robot.feet[foot].link)):
+        joint = robot.joints[index]
+        x, y, z = joint.axis
+        if joint.kind == "hinge" and y * y > x * x + z * z:
+            return index
+    return None
 
 
 @kernel
 def contact_rows(
-    points: Points,
-    stance: Flags1D,
-    stance_weight: float,
-    stance_damping: float,
-    swing_weight: float,
-    swing_stiffness: float,
-    swing_damping: float,
-    rows: TaskRows,
+    terms: DynamicsTerms, phase: PhaseState, params: ContactGains, rows: TaskRows
 ) -> None:
     """Three rows for each contact point: zero acceleration in stance, else a pull to the ground.
 
     A spring and a damper bring the height of a point that is not in stance to the mean height of
     the points in stance, and its horizontal velocity is damped.
     """
-    count = stance.shape[0]
+    count = phase.stance.shape[0]
     ground, loaded = 0.0, 0
     for i in range(count):
-        if stance[i]:
-            ground += float(points.position[i, 2])
+        if phase.stance[i]:
+            ground += terms.contact_position[i, 2]
             loaded += 1
     ground = ground / loaded if loaded else 0.0
     for i in range(count):
         for k in range(3):
             row = 3 * i + k
             for j in range(rows.jacobian.shape[1]):
-                rows.jacobian[row, j] = points.jacobian[i, k, j]
-            speed, drift = float(points.velocity[i, k]), float(points.drift[i, k])
-            if stance[i]:
-                rows.weights[row] = stance_weight
-                rows.desired[row] = -stance_damping * speed - drift
+                rows.jacobian[row, j] = terms.contact_jacobian[i, k, j]
+            speed, drift = terms.contact_velocity[i, k], terms.contact_drift[i, k]
+            if phase.stance[i]:
+                rows.weights[row] = params.stance_weight
+                rows.desired[row] = -params.stance_damping * speed - drift
             else:
-                rows.weights[row] = swing_weight
-                wanted = -swing_damping * speed
+                rows.weights[row] = params.swing_weight
+                desired = -params.swing_damping * speed
                 if k == 2:
-                    wanted += swing_stiffness * (ground - float(points.position[i, 2]))
-                rows.desired[row] = wanted - drift
+                    desired += params.swing_stiffness * (ground - terms.contact_position[i, 2])
+                rows.desired[row] = desired - drift
 
 
 @kernel
-def step_rows(points: Points, steps: Steps, weight: float, rows: TaskRows) -> None:
+def step_rows(
+    terms: DynamicsTerms, phase: PhaseState, params: ContactGains, rows: TaskRows
+) -> None:
     """Give the points of a foot that takes a step their acceleration."""
-    for i in range(steps.stepping.shape[0]):
-        if not steps.stepping[i]:
+    for i in range(phase.stepping.shape[0]):
+        if not phase.stepping[i]:
             continue
         for k in range(3):
             row = 3 * i + k
-            rows.weights[row] = weight
-            rows.desired[row] = float(steps.acceleration[i, k]) - float(points.drift[i, k])
+            rows.weights[row] = params.step_weight
+            rows.desired[row] = phase.step_acceleration[i, k] - terms.contact_drift[i, k]
 
 
 @kernel
-def follow_plan(
-    planned: JointMotion,
-    position: Array1D,
-    velocity: Array1D,
-    stiffness: float,
-    damping: float,
+def ankle_accelerations(
+    terms: DynamicsTerms,
+    target: WholeBodyTarget,
+    joints: JointState,
+    params: ContactGains,
     ankles: Ankles,
 ) -> None:
-    """Compute the acceleration that keeps every ankle on the plan: feedforward and feedback.
-
-    Args:
-        position: measured joint angles, (n_joints,).
-        velocity: generalised velocity, (n_velocities,).
-    """
-    first = velocity.shape[0] - position.shape[0]
+    """Compute the acceleration that keeps every ankle on the plan: feedforward and feedback."""
+    first = terms.velocity.shape[0] - joints.position.shape[0]
     for foot in range(ankles.place.shape[0]):
-        place = int(ankles.place[foot])
+        place = ankles.place[foot]
         if place >= 0:
             joint = place - first
             ankles.acceleration[foot] = (
-                float(planned.acceleration[joint])
-                + stiffness * (float(planned.position[joint]) - position[joint])
-                + damping * (float(planned.velocity[joint]) - velocity[place])
+                target.joint_acceleration[joint]
+                + params.rolling_stiffness * (target.joint_position[joint] - joints.position[joint])
+                + params.rolling_damping * (target.joint_velocity[joint] - terms.velocity[place])
             )
 
 
 @kernel
 def lifting_rows(
-    points: Points,
-    stance: Flags1D,
-    foot: Indices1D,
-    foot_rotation: Array3D,
-    ankles: Ankles,
-    weight: float,
-    damping: float,
-    ankle_weight: float,
-    rows: TaskRows,
+    terms: DynamicsTerms, phase: PhaseState, ankles: Ankles, params: ContactGains, rows: TaskRows
 ) -> None:
     """Replace the rows of ``contact_rows`` for points that leave the ground before lift-off.
 
@@ -287,28 +205,28 @@ def lifting_rows(
     over its other points and does not rotate about the vertical. A row for the ankle controls how
     fast it rolls, because the motion of the centre of mass and the torso does not determine that.
     Points of a foot without an ankle have all of their velocity damped.
-
-    Args:
-        foot: the foot of every point, (n_contacts,).
-        foot_rotation: rotations from foot to world, (n_feet, 3, 3).
     """
-    for i in range(stance.shape[0]):
-        if stance[i]:
+    damping = params.swing_damping
+    for i in range(phase.stance.shape[0]):
+        if phase.stance[i]:
             continue
-        row, wanted, ankle = 3 * i, 0.0, int(ankles.place[foot[i]])
+        foot = ankles.foot[i]
+        row, desired, ankle = 3 * i, 0.0, ankles.place[foot]
         if ankle < 0:
-            rows.desired[row + 2] = -damping * float(points.velocity[i, 2]) - float(
-                points.drift[i, 2]
+            rows.desired[row + 2] = (
+                -damping * terms.contact_velocity[i, 2] - terms.contact_drift[i, 2]
             )
             continue
         rows.jacobian[row, :] = 0.0
         for k in range(3):
-            across = foot_rotation[foot[i], k, 1]
-            wanted -= across * (damping * float(points.velocity[i, k]) + float(points.drift[i, k]))
+            across = terms.foot_rotation[foot, k, 1]
+            desired -= across * (damping * terms.contact_velocity[i, k] + terms.contact_drift[i, k])
             for j in range(rows.jacobian.shape[1]):
-                rows.jacobian[row, j] += across * float(points.jacobian[i, k, j])
-        rows.desired[row] = wanted
+                rows.jacobian[row, j] += across * terms.contact_jacobian[i, k, j]
+        rows.desired[row] = desired
         rows.jacobian[row + 1, :] = 0.0
         rows.jacobian[row + 1, ankle] = 1.0
-        rows.desired[row + 1] = ankles.acceleration[foot[i]]
-        rows.weights[row], rows.weights[row + 1], rows.weights[row + 2] = weight, ankle_weight, 0.0
+        rows.desired[row + 1] = ankles.acceleration[foot]
+        rows.weights[row] = params.swing_weight
+        rows.weights[row + 1] = params.rolling_weight
+        rows.weights[row + 2] = 0.0

@@ -24,7 +24,7 @@ from .settings import Settings
 
 
 @dataclass
-class Draft:
+class BlockDraft:
     """A block while it is checked.
 
     ``complete`` is true if all its dimensions are known. ``absent`` holds the outputs that it
@@ -39,7 +39,7 @@ class Draft:
     absent: Mapping[str, str] = field(default_factory=dict)
     quantities: dict[str, Quantity] = field(default_factory=dict)
     """Unit and frame of every output, by ``port.field``; those of blocks that take any are there
-    once ``carry`` has been called."""
+    once ``infer_quantities`` has been called."""
     period_ticks: int = 1
     offset_ticks: int = 0
     stands_for: str = ""
@@ -70,7 +70,7 @@ class Draft:
         return known or UNCHECKED
 
 
-def check_emit(draft: Draft, problems: Problems) -> None:
+def check_emit(draft: BlockDraft, problems: Problems) -> None:
     """Report every input that the ``emit`` of a Moore block reads."""
     assert draft.block_type is not None
     flat = draft.flat
@@ -90,7 +90,7 @@ def check_emit(draft: Draft, problems: Problems) -> None:
         )
 
 
-def check_defaults(draft: Draft, problems: Problems) -> None:
+def check_defaults(draft: BlockDraft, problems: Problems) -> None:
     """Report defaults of unwired inputs that name an unknown field or have the wrong shape."""
     flat = draft.flat
     for name, port in draft.inputs.items():
@@ -119,13 +119,13 @@ def check_defaults(draft: Draft, problems: Problems) -> None:
             )
 
 
-def lacks_robot(draft: Draft, settings: Settings) -> bool:
+def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
     """Whether the block needs something of a robot that the graph's robot does not have."""
     assert draft.block_type is not None
     return bool(unmet_needs(draft.block_type, settings.robot))
 
 
-def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[str, str]:
+def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapping[str, str]:
     """Report every misfit of one block, whose parameters have been checked.
 
     Returns:
@@ -150,7 +150,7 @@ def check_fit(draft: Draft, settings: Settings, problems: Problems) -> Mapping[s
     return {} if misfits else draft.block_type.absent_outputs(draft.params, settings.robot)
 
 
-def report_misfit(draft: Draft, misfit: Misfit, problems: Problems) -> None:
+def report_misfit(draft: BlockDraft, misfit: Misfit, problems: Problems) -> None:
     """Report a misfit at the parameter it concerns, or else at the block."""
     flat = draft.flat
     steps = misfit.parameter.split(".") if misfit.parameter else []
@@ -200,7 +200,7 @@ class _Array:
         return f"{self.port}.{self.field.name}"
 
 
-def check_sizes(graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problems) -> bool:
+def check_sizes(graph: FlatGraph, drafts: Mapping[str, BlockDraft], problems: Problems) -> bool:
     """Report every block whose signals are too large. Returns whether all signals fit in memory."""
     total, found = 0, len(problems)
     for draft in drafts.values():
@@ -221,7 +221,7 @@ def check_sizes(graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problem
     return len(problems) == found
 
 
-def _arrays(draft: Draft, drafts: Mapping[str, Draft]) -> Iterator[_Array]:
+def _arrays(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> Iterator[_Array]:
     """The arrays that a block needs: its outputs, its states whose shapes are known before it is
     set up, constants for its unwired inputs, and the buffers of delayed wires."""
     states = draft.block_type.states if draft.block_type is not None else {}
@@ -241,7 +241,7 @@ def _arrays(draft: Draft, drafts: Mapping[str, Draft]) -> Iterator[_Array]:
 def _of_signal(
     port: str,
     signal: type[Signal],
-    draft: Draft,
+    draft: BlockDraft,
     count: int = 1,
     where: Position | None = None,
 ) -> Iterator[_Array]:
@@ -252,7 +252,9 @@ def _of_signal(
             yield _Array(port, item, size, where)
 
 
-def _report(graph: FlatGraph, draft: Draft, largest: _Array, size: int, problems: Problems) -> None:
+def _report(
+    graph: FlatGraph, draft: BlockDraft, largest: _Array, size: int, problems: Problems
+) -> None:
     """Report one block's size at the number that makes it so large: a parameter or a dimension."""
     flat = draft.flat
     shape = draft.shape(largest.field) or ()

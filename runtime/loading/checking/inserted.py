@@ -26,11 +26,11 @@ from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
 from ..flattening.flat import FlatWire
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
-from .block_check import Draft
+from .block_check import BlockDraft
 
 
 @dataclass(frozen=True)
-class StageFunction:
+class GatherPiece:
     """Some elements of one source, or numbers, and where they go in the field ``target``.
 
     ``copies`` are stretches (first in the source, first in the target, length), both in row order.
@@ -52,11 +52,11 @@ class Gather(Block):
     """
 
     Params = Parameters
-    pieces: ClassVar[tuple[StageFunction, ...]] = ()
+    pieces: ClassVar[tuple[GatherPiece, ...]] = ()
     wanted: ClassVar[Mapping[str, Quantity | None]] = {}
     """What the reader's fields are; ``None`` for one that takes any."""
 
-    said: ClassVar[str] = ""
+    wire_text: ClassVar[str] = ""
     """The wire as the graph has it."""
 
     @classmethod
@@ -104,17 +104,17 @@ class Gather(Block):
 
 
 def gather_block_type(
-    pieces: tuple[StageFunction, ...],
+    pieces: tuple[GatherPiece, ...],
     inputs: Mapping[str, type[Signal]],
     output: type[Signal],
     wanted: Mapping[str, Quantity | None],
     *,
-    said: str,
+    wire_text: str,
     reads_truth: bool,
 ) -> type[Gather]:
     """The block type that makes the signal ``output`` of these pieces.
 
-    ``said`` is the wire as the graph has it, and ``reads_truth`` whether its reader may do that.
+    ``wire_text`` is the wire as the graph has it, and ``reads_truth`` whether its reader may do that.
     """
     ports: dict[str, Any] = {
         name: Input(signal, text="what is selected from", reads_truth=reads_truth)
@@ -124,7 +124,7 @@ def gather_block_type(
         "__doc__": Gather.__doc__,
         "pieces": pieces,
         "wanted": dict(wanted),
-        "said": said,
+        "wire_text": wire_text,
         "y": Output(output, text="the parts together"),
         **ports,
     }
@@ -174,7 +174,9 @@ def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
     return type(f"Constant{signal.__name__}", (ConstantSignal,), body)
 
 
-def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values: Any) -> BlockSpec:
+def insert_delay(
+    reader: BlockDraft, name: str, wire: FlatWire, source: BlockDraft, values: Any
+) -> BlockSpec:
     """The block that delays a wire; it runs in the same ticks as the wire's source."""
     signal = source.outputs[wire.source_port].signal
     return BlockSpec(
@@ -189,7 +191,7 @@ def insert_delay(reader: Draft, name: str, wire: FlatWire, source: Draft, values
     )
 
 
-def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
+def insert_constant(reader: BlockDraft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
     """The block that writes a constant which stands in place of a source."""
     signal: type[Any] = reader.inputs[name].signal
     return BlockSpec(
@@ -205,7 +207,7 @@ def insert_constant(reader: Draft, name: str, wire: FlatWire, values: Any) -> Bl
 
 
 def read_values(
-    values: MapNode, signal: type[Signal], owner: Draft, at: str, problems: Problems
+    values: MapNode, signal: type[Signal], owner: BlockDraft, at: str, problems: Problems
 ) -> dict[str, Any]:
     """Values by field of ``signal``: numbers, nested lists, or texts with a unit, all checked."""
     found: dict[str, Any] = {}
@@ -259,7 +261,7 @@ def own_unit(node: Node) -> Unit | None:
     return next((unit for unit in units if unit is not ONE), units[0] if units else None)
 
 
-def _array(node: Node, field: Field, owner: Draft) -> tuple[Any, str]:
+def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     """The value and an empty text, or ``None`` and a text that says what was expected."""
     shape = owner.shape(field)
     unit = f" in {field.unit}" if field.unit is not None and str(field.unit) != "1" else ""

@@ -23,7 +23,7 @@ from ...language.signals import Field
 from ...language.stages import Position
 from ...language.units import parse_quantity
 from ..flattening.flat import FlatBlock
-from ..problems import Code, LoadError, Problems, instead, listing, nearest
+from ..problems import Code, LoadError, Problems, fix_for_key, listing, nearest
 from ..reading.nodes import (
     Entry,
     ListNode,
@@ -217,7 +217,7 @@ def _by_name(node: Node, robot: RobotDescription | None) -> str:
 def _right_name(entry: Entry, near: Sequence[str]) -> str:
     if not near:
         return f"remove {entry.key!r}"
-    return instead(entry.key, text_of(plain(entry.value)), entry.key_where, near[0])
+    return fix_for_key(entry.key, text_of(plain(entry.value)), entry.key_where, near[0])
 
 
 def _is_explained(mistake: _Mistake, others: Iterable[_Mistake]) -> bool:

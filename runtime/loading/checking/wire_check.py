@@ -15,13 +15,15 @@ from ...language.units import Unit
 from ..flattening.flat import FlatGraph, FlatWire
 from ..problems import Code, Problems, listing, nearest
 from ..reading.nodes import text_of
-from .block_check import Draft
+from .block_check import BlockDraft
 
 
 class WireCheck:
     """Checks the wires of a graph, one block at a time."""
 
-    def __init__(self, graph: FlatGraph, drafts: Mapping[str, Draft], problems: Problems) -> None:
+    def __init__(
+        self, graph: FlatGraph, drafts: Mapping[str, BlockDraft], problems: Problems
+    ) -> None:
         self.graph = graph
         self.drafts = drafts
         self.problems = problems
@@ -33,21 +35,21 @@ class WireCheck:
         known = [path for path, draft in self.drafts.items() if not draft.stands_for]
         return [*known, *self.graph.subgraphs]
 
-    def check(self, draft: Draft) -> None:
+    def check(self, draft: BlockDraft) -> None:
         """Report every problem of the wires into one block."""
         if draft.block_type is None:
             return
         flat = draft.flat
-        meant: dict[str, None] = {}
+        likely_inputs: dict[str, None] = {}
         proposed: dict[str, None] = {}
         for name, wire in flat.wires.items():
             port = draft.inputs.get(name)
             if port is None:
-                meant[self._unknown_input(draft, name, wire)] = None
+                likely_inputs[self._unknown_input(draft, name, wire)] = None
             elif wire.constant is None:
                 self._check_wire(draft, name, port, wire)
         for name, port in draft.inputs.items():
-            wired = name in flat.wires or name in flat.excused or name in meant
+            wired = name in flat.wires or name in flat.excused or name in likely_inputs
             if not wired and not port.optional:
                 candidates = self._candidates(draft, port, proposed)
                 proposed.update(dict.fromkeys(candidates[:1]))
@@ -61,7 +63,7 @@ class WireCheck:
                     fix=f"in: {{{name}: {candidates[0] if candidates else 'block.port'}}}",
                 )
 
-    def _unknown_input(self, draft: Draft, name: str, wire: FlatWire) -> str:
+    def _unknown_input(self, draft: BlockDraft, name: str, wire: FlatWire) -> str:
         """Report an unknown input. Returns the input that was meant, if that is clear."""
         flat = draft.flat
         free = [n for n in draft.inputs if n not in flat.wires]
@@ -85,7 +87,7 @@ class WireCheck:
         )
         return best
 
-    def _check_wire(self, target: Draft, name: str, port: Input[Any], wire: FlatWire) -> None:
+    def _check_wire(self, target: BlockDraft, name: str, port: Input[Any], wire: FlatWire) -> None:
         at = target.stands_for or f"{target.flat.path}.{name}"
         ends = self.source(at, wire, target, port)
         if ends is None:
@@ -153,8 +155,8 @@ class WireCheck:
             self.source(at, inner, None, None)
 
     def source(
-        self, at: str, wire: FlatWire, target: Draft | None, port: Input[Any] | None
-    ) -> tuple[Draft, Output[Any]] | None:
+        self, at: str, wire: FlatWire, target: BlockDraft | None, port: Input[Any] | None
+    ) -> tuple[BlockDraft, Output[Any]] | None:
         """The block and the output that a wire comes from; ``None`` after a problem."""
         name = at.rpartition(".")[2]
         source = self.drafts.get(wire.source_block)
@@ -217,7 +219,7 @@ class WireCheck:
         )
 
     def _candidates(
-        self, target: Draft, port: Input[Any], proposed: Iterable[str] = ()
+        self, target: BlockDraft, port: Input[Any], proposed: Iterable[str] = ()
     ) -> tuple[str, ...]:
         """Outputs that could feed an input; those with the same type of signal come first.
 
@@ -244,7 +246,7 @@ class WireCheck:
         return tuple([*exact, *other][:3])
 
 
-def _fitting(source: Draft, output: Output[Any], port: Input[Any]) -> Iterator[str]:
+def _fitting(source: BlockDraft, output: Output[Any], port: Input[Any]) -> Iterator[str]:
     """The fields of an output of which an input with one field may select one."""
     wanted, *more = port.signal.fields.values()
     asked = quantity_of(wanted) or UNCHECKED
@@ -270,7 +272,7 @@ class Mismatch:
 
 
 def compare(
-    output: Output[Any], reader: type[Signal], source: Draft, target: Draft
+    output: Output[Any], reader: type[Signal], source: BlockDraft, target: BlockDraft
 ) -> Iterator[Mismatch]:
     """All mismatches of the fields that the signals of an output and of its reader have."""
     for name, wanted in reader.fields.items():
@@ -304,7 +306,7 @@ def compare(
             )
 
 
-def _says_unit(source: Draft) -> bool:
+def _says_unit(source: BlockDraft) -> bool:
     """Whether the source is a block whose parameter ``unit`` may still be set."""
     fields = type(source.params).model_fields if source.params is not None else {}
     return "unit" in fields and source.flat.parameters.get("unit") is None
@@ -344,7 +346,7 @@ def _shape_text(item: Field, shape: tuple[int, ...]) -> str:
     return f"[{', '.join(map(str, item.shape))}] = {numbers}"
 
 
-def fits(output: Output[Any], port: Input[Any], source: Draft, target: Draft) -> bool:
+def fits(output: Output[Any], port: Input[Any], source: BlockDraft, target: BlockDraft) -> bool:
     """Whether a wire from ``output`` to ``port`` would have no problem."""
     if output.truth and not port.reads_truth:
         return False

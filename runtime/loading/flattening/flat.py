@@ -18,7 +18,7 @@ ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
 
 
 @dataclass(frozen=True)
-class Item:
+class WireElement:
     """One piece of a wire that is put together: what is selected of a source, or a ``literal``."""
 
     where: Position
@@ -35,12 +35,12 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Part:
+class WirePart:
     """What one field of an input is made of; ``field`` is empty for its only one."""
 
     field: str
     where: Position
-    items: tuple[Item, ...]
+    items: tuple[WireElement, ...]
     is_list: bool = False
 
     def plain(self) -> Any:
@@ -60,7 +60,7 @@ class FlatWire(HasSource):
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
-    parts: tuple[Part, ...] = ()
+    parts: tuple[WirePart, ...] = ()
     shown: str = ""
     """What stands in the graph in place of ``source``, where loading has put a block between."""
 

@@ -23,10 +23,10 @@ from ..reading.overrides import (
 )
 from ..reading.written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
 from .flat import FlatBlock, FlatGraph, FlatWire
-from .links import Link, read_link
 from .machines import placed
 from .rates import wrap_offset
 from .subgraphs import Bindings, Instance, Resolver, parameter_values, report_unused
+from .written_wires import WrittenWire, read_wire
 
 _MAXIMAL_BLOCKS = 5000
 _SUFFIXES = (".yaml", ".yml")
@@ -45,7 +45,7 @@ class _Scope:
     shifted: bool = False
     """Whether the offset is said further out than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
-    wires: Mapping[str, tuple[Link | None, Position, str]] = field(default_factory=dict)
+    wires: Mapping[str, tuple[WrittenWire | None, Position, str]] = field(default_factory=dict)
     """Wires that other files give, by ``block.input``: the link, its place and its file."""
 
     @property
@@ -55,11 +55,11 @@ class _Scope:
 
 
 @dataclass
-class _Draft:
+class _GraphDraft:
     """A block whose wires are not resolved yet."""
 
     block: FlatBlock
-    links: dict[str, Link | None]
+    links: dict[str, WrittenWire | None]
     shifted: bool = False
     """Whether the offset is inherited from further out than the rate."""
 
@@ -88,7 +88,7 @@ class _Flattener:
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
         self.files = FileTree(problems)
-        self.drafts: dict[str, _Draft] = {}
+        self.drafts: dict[str, _GraphDraft] = {}
         self.instances: dict[str, Instance] = {}
 
     def run(self, path: Path, tree: MapNode | None, overrides: Overrides) -> FlatGraph:
@@ -157,7 +157,7 @@ class _Flattener:
     def _expand(self, files: list[WrittenGraph], scope: _Scope) -> None:
         prefix = scope.prefix
         sets: list[Override] = []
-        wires: dict[str, tuple[Link | None, Position, str]] = {}
+        wires: dict[str, tuple[WrittenWire | None, Position, str]] = {}
         first: dict[str, WrittenBlock] = {}
         mine: list[tuple[WrittenBlock, WrittenGraph]] = []
         for file in files:
@@ -181,7 +181,7 @@ class _Flattener:
     def _report_lost(
         self,
         sets: Iterable[Override],
-        wires: Mapping[str, tuple[Link | None, Position, str]],
+        wires: Mapping[str, tuple[WrittenWire | None, Position, str]],
         scope: _Scope,
     ) -> None:
         """Report overrides and wires of blocks that do not exist."""
@@ -233,9 +233,9 @@ class _Flattener:
             fix="rename one; to change a block of an included file use 'set' and 'wires'",
         )
 
-    def _link(self, entry: Entry, scope: _Scope, at: str) -> Link | None:
+    def _link(self, entry: Entry, scope: _Scope, at: str) -> WrittenWire | None:
         node = scope.bindings.substitute(entry.value)
-        return read_link(node, scope.prefix, scope.instance, at, self.problems)
+        return read_wire(node, scope.prefix, scope.instance, at, self.problems)
 
     def _block(self, block: WrittenBlock, file: WrittenGraph, scope: _Scope) -> None:
         path = scope.prefix + block.name
@@ -261,7 +261,7 @@ class _Flattener:
         offset = substitute(block.offset) if block.offset else scope.offset
         machine = substitute(block.machine) if block.machine else scope.machine
         shifted = block.offset is None and (block.rate is not None or scope.shifted)
-        draft = _Draft(
+        draft = _GraphDraft(
             FlatBlock(
                 path,
                 block.where,
@@ -291,8 +291,8 @@ class _Flattener:
 
     def _links(
         self, block: WrittenBlock, file: WrittenGraph, scope: _Scope, path: str
-    ) -> tuple[dict[str, Link | None], dict[str, Position]]:
-        links: dict[str, Link | None] = {}
+    ) -> tuple[dict[str, WrittenWire | None], dict[str, Position]]:
+        links: dict[str, WrittenWire | None] = {}
         places: dict[str, Position] = {}
         for entry in block.inputs or ():
             links[entry.key] = self._link(entry, scope, f"{path}.{entry.key}")
@@ -316,7 +316,9 @@ class _Flattener:
             places[name] = where
         return links, places
 
-    def _instance(self, draft: _Draft, use: ScalarNode, file: WrittenGraph, scope: _Scope) -> None:
+    def _instance(
+        self, draft: _GraphDraft, use: ScalarNode, file: WrittenGraph, scope: _Scope
+    ) -> None:
         """Expand one use of a sub-graph."""
         path, problems = draft.block.path, self.problems
         instance = Instance(path, draft.block.where, str(use.value), draft.links)
@@ -341,7 +343,7 @@ class _Flattener:
         self._expand(files, inner)
 
 
-def _finish(draft: _Draft, resolver: Resolver) -> FlatBlock:
+def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
     """The block, every wire of which comes from an output of a block that is no sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []

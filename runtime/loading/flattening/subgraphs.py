@@ -10,12 +10,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from ...language.stages import Position
-from ..problems import Code, Problems, instead, listing, nearest
+from ..problems import Code, Problems, fix_for_key, listing, nearest
 from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
 from ..reading.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
-from .flat import FlatBlock, FlatWire, Item, Part
-from .links import Link
+from .flat import FlatBlock, FlatWire, WireElement, WirePart
+from .written_wires import WrittenWire
 
 UNWIRED = "unwired"
 """The result for a wire that comes from an optional, unwired input of a sub-graph."""
@@ -28,10 +28,10 @@ class Instance:
     path: str
     where: Position
     file: str
-    links: dict[str, Link | None]
+    links: dict[str, WrittenWire | None]
     inputs: dict[str, MapNode | str | None] = field(default_factory=dict)
     """The declared inputs: ``None`` required, ``"unwired"`` optional, or constant values."""
-    outputs: dict[str, Link | None] = field(default_factory=dict)
+    outputs: dict[str, WrittenWire | None] = field(default_factory=dict)
     broken: bool = True
 
     def declare_inputs(
@@ -93,11 +93,12 @@ class Resolver:
         self.instances = instances
         self.problems = problems
 
-    def resolve(self, link: Link | None, at: str) -> FlatWire | str | None:
+    def resolve(self, link: WrittenWire | None, at: str) -> FlatWire | str | None:
         """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
         if link is None:
             return None
-        start, seen = link, {}  # type: Link, dict[str, None]
+        start = link
+        seen: dict[str, None] = {}
         total = FlatWire("", start.where)
         selection = WHOLE
         while True:
@@ -114,7 +115,9 @@ class Resolver:
                 total = replace(total, delay=link.delay, initial=link.initial)
             total = replace(total, truth=total.truth or link.truth)
             if link.parts:
-                return self._put_together(link, replace(total, where=start.where), selection, at)
+                return self._resolve_composite(
+                    link, replace(total, where=start.where), selection, at
+                )
             if link.selection:
                 try:
                     selection = selection.of(link.selection)
@@ -127,23 +130,23 @@ class Resolver:
                 self._ring(seen, key, start, at)
                 return None
             seen[key] = None
-            following: Link | str | None
+            following: WrittenWire | str | None
             if link.instance is not None:
                 following = self._input(link, at)
             elif block in self.instances:
                 following = self._output(self.instances[block], port, link, at)
             elif selection:
                 inner = FlatWire(link.source, start.where, truth=total.truth)
-                item = Item(start.where, inner, selection)
-                return replace(total, parts=(Part("", start.where, (item,)),))
+                item = WireElement(start.where, inner, selection)
+                return replace(total, parts=(WirePart("", start.where, (item,)),))
             else:
                 return replace(total, source=link.source)
             if following is None or isinstance(following, str):
                 return following
             link = following
 
-    def _put_together(
-        self, link: Link, total: FlatWire, selection: Selection, at: str
+    def _resolve_composite(
+        self, link: WrittenWire, total: FlatWire, selection: Selection, at: str
     ) -> FlatWire | None:
         """The wire of a link with parts, of which ``selection`` takes something."""
         parts = link.parts
@@ -163,7 +166,7 @@ class Resolver:
             items = []
             for each in part.items:
                 if each.literal is not None:
-                    items.append(Item(each.where, literal=each.literal))
+                    items.append(WireElement(each.where, literal=each.literal))
                     continue
                 wire = self.resolve(each, at)
                 if wire is None:
@@ -172,17 +175,17 @@ class Resolver:
                     self._selection("a part comes from an input that is not wired", each, at)
                     return None
                 items += self._pieces(wire, selection, total)
-            resolved.append(Part(part.field, part.where, tuple(items), part.is_list))
+            resolved.append(WirePart(part.field, part.where, tuple(items), part.is_list))
         if selection.field:
             resolved = [replace(resolved[0], field="")]
         return replace(total, parts=tuple(resolved))
 
-    def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[Item]:
+    def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[WireElement]:
         """The pieces that a resolved wire adds to a part."""
         rest = Selection("", selection.indices)
         if not wire.parts:
             inner = replace(wire, truth=wire.truth or total.truth)
-            return [Item(wire.where, inner, rest)]
+            return [WireElement(wire.where, inner, rest)]
         return [
             replace(
                 item,
@@ -201,7 +204,7 @@ class Resolver:
         ]
 
     def _of_constant(
-        self, constant: MapNode, selection: Selection, start: Link, at: str
+        self, constant: MapNode, selection: Selection, start: WrittenWire, at: str
     ) -> FlatWire | None:
         """A part of constant values, which is a number again."""
         entry = constant.get(selection.field) if selection.field else None
@@ -209,10 +212,10 @@ class Resolver:
             self._selection(f"{str(selection)!r} cannot be selected of a constant", start, at)
             return None
         node = (entry or constant.entries[0]).value
-        item = Item(start.where, literal=node)
-        return FlatWire("", start.where, parts=(Part("", start.where, (item,)),))
+        item = WireElement(start.where, literal=node)
+        return FlatWire("", start.where, parts=(WirePart("", start.where, (item,)),))
 
-    def _selection(self, message: str, link: Link, at: str) -> None:
+    def _selection(self, message: str, link: WrittenWire, at: str) -> None:
         self.problems.add(
             Code.SELECTION, f"the wire to {at} cannot be made: {message}", link.where, at=at
         )
@@ -240,7 +243,7 @@ class Resolver:
             }
         return found
 
-    def _input(self, link: Link, at: str) -> Link | str | None:
+    def _input(self, link: WrittenWire, at: str) -> WrittenWire | str | None:
         assert link.instance is not None
         instance = self.instances[link.instance]
         if link.source not in instance.inputs:
@@ -260,10 +263,12 @@ class Resolver:
             return instance.links[link.source]
         default = instance.inputs[link.source]
         if isinstance(default, MapNode):
-            return Link(default.where, constant=default)
+            return WrittenWire(default.where, constant=default)
         return default
 
-    def _output(self, instance: Instance, port: str, link: Link, at: str) -> Link | None:
+    def _output(
+        self, instance: Instance, port: str, link: WrittenWire, at: str
+    ) -> WrittenWire | None:
         if instance.broken:
             return None
         if port not in instance.outputs:
@@ -283,7 +288,7 @@ class Resolver:
             return None
         return instance.outputs[port]
 
-    def _ring(self, seen: Mapping[str, None], key: str, start: Link, at: str) -> None:
+    def _ring(self, seen: Mapping[str, None], key: str, start: WrittenWire, at: str) -> None:
         names = [name.replace("<", ".inputs.") for name in seen]
         ring = names[list(seen).index(key) :]
         self.problems.add(
@@ -294,7 +299,7 @@ class Resolver:
             found=" -> ".join([*ring, ring[0]]),
         )
 
-    def _delayed_twice(self, link: Link, start: Link, at: str) -> None:
+    def _delayed_twice(self, link: WrittenWire, start: WrittenWire, at: str) -> None:
         self.problems.add(
             Code.DELAY,
             f"the wire to {at} is delayed inside and outside of a sub-graph",
@@ -305,7 +310,7 @@ class Resolver:
             fix="give the delay in one of the two places",
         )
 
-    def _delayed_constant(self, start: Link, at: str) -> None:
+    def _delayed_constant(self, start: WrittenWire, at: str) -> None:
         self.problems.add(
             Code.DELAY,
             f"the wire to {at} delays a constant",
@@ -333,7 +338,7 @@ def parameter_values(
                 expected=listing(declared),
                 found=entry.key,
                 nearest=similar,
-                fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
+                fix=fix_for_key(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
                 if similar
                 else f"remove {entry.key!r}",
             )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...language.stages import Position
-from ..problems import Code, Problems, instead, listing, nearest
+from ..problems import Code, Problems, fix_for_key, listing, nearest
 from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 
 GRAPH_KEYS = (
@@ -127,7 +127,7 @@ def unknown_key(entry: Entry, legal: Iterable[str], of: str, problems: Problems)
         expected=listing(names, 16),
         found=entry.key,
         nearest=similar,
-        fix=instead(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
+        fix=fix_for_key(entry.key, text_of(plain(entry.value)), entry.key_where, similar[0])
         if similar
         else f"remove {entry.key!r}",
     )

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from aloft.benchmarks.frontier import frontier as module
-from aloft.benchmarks.frontier.directions import DIRECTIONS, Direction
 from aloft.benchmarks.frontier.frontier import frontier
-from aloft.benchmarks.frontier.jobs import PlanJob, RunJob, enough
+from aloft.benchmarks.frontier.search import DIRECTIONS, Direction, PlanJob, RunJob, enough
 from aloft.studies.batch.jobs import JobResult, attempt
 from aloft.studies.journal import Outcome
 

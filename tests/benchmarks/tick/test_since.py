@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.benchmarks.tick import since
-from aloft.benchmarks.tick.comparisons import COMPILED, FUSED, earlier_rows
-from aloft.benchmarks.tick.since import EarlierController
+from aloft.benchmarks.tick import tick
+from aloft.benchmarks.tick.programs import COMPILED, FUSED, earlier_rows
+from aloft.benchmarks.tick.tick import EarlierController
 from aloft.runtime.language.errors import AloftError
 
 GIT = ("git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
@@ -24,7 +24,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "__main__.py").write_text(MAIN)
     for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
         subprocess.run([*GIT, *words], cwd=tmp_path, check=True)
-    monkeypatch.setattr(since, "ROOT", tmp_path)
+    monkeypatch.setattr(tick, "ROOT", tmp_path)
     return tmp_path
 
 

@@ -6,7 +6,14 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from aloft.benchmarks.tick.comparisons import (
+from aloft.benchmarks.tick.controller import (
+    OUTSIDE,
+    HandWrittenLoop,
+    RecordedController,
+    RecordedJump,
+    record_jump,
+)  # fmt: skip
+from aloft.benchmarks.tick.programs import (
     BARE,
     COMPILED,
     FUSED,
@@ -16,17 +23,9 @@ from aloft.benchmarks.tick.comparisons import (
     QP_OSQP,
     WHOLE_BODY,
     WHOLE_BODY_TSID,
+    OsqpController,
 )  # fmt: skip
-from aloft.benchmarks.tick.controller import (
-    OUTSIDE,
-    HandWrittenLoop,
-    RecordedController,
-    RecordedJump,
-    record_jump,
-)  # fmt: skip
-from aloft.benchmarks.tick.process import late_share
-from aloft.benchmarks.tick.programs import OsqpController
-from aloft.benchmarks.tick.tick import tick
+from aloft.benchmarks.tick.tick import late_share, tick
 
 
 @pytest.fixture(scope="module")

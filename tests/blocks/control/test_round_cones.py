@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.control.round_program import rows_without_pyramids
 from aloft.blocks.control.whole_body_controller import WholeBodyController
+from aloft.blocks.control.whole_body_program import rows_without_pyramids
 from aloft.blocks.signals import Phase
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.control.whole_body_controller import WholeBodyController
+from aloft.blocks.control.whole_body_controller import (
+    ActiveCalls,
+    WholeBodyController,
+    activate_calls,
+    keep_solution,
+)
 from aloft.blocks.signals import Phase
+from aloft.mathematics.whole_body_solution import ILL_POSED, SOLVED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -338,7 +345,7 @@ def test_errors_name_the_fix(dynamics):
         "Torso": "no task called 'Torso'; did you mean TorsoOrientation?",
         "nowhere:Task": "task nowhere:Task: there is no module 'nowhere'",
         "math:pi": "task math:pi: pi does not derive from Task",
-        "aloft.blocks.control.tasks:Task": "does not define row_count, update",
+        "aloft.blocks.control.tasks:Task": "does not define step, size",
     }.items():
         with pytest.raises(BlockError, match=re.escape(message)):
             BlockBench(WholeBodyController, {"tasks": [task]}, robot=ROBOT)
@@ -372,3 +379,46 @@ def test_the_default_force_limit_follows_the_robots_weight(dynamics):
     bench = make(model(dynamics))
     bench.step()
     assert bench.block._weights.force_max[0] == pytest.approx(8.0 * WEIGHT)
+
+
+@pytest.mark.parametrize("phase", list(Phase))
+@pytest.mark.parametrize("stance", [[False, False], [False, True]])
+def test_one_kind_of_gains_is_active_where_a_point_is_in_stance(phase, stance) -> None:
+    active = ActiveCalls(*(np.full(1, 7) for _ in ActiveCalls._fields))
+    activate_calls(SimpleNamespace(phase=np.array(int(phase)), stance=np.array(stance)), active)
+    kind = "thrust" if phase == Phase.THRUST else "landing" if phase > Phase.THRUST else "stand"
+    expected = {kind: 1, "loaded": 1} if any(stance) else {}
+    assert {name: int(each[0]) for name, each in active._asdict().items() if each[0]} == expected
+
+
+def solution_after(loaded: int, code: int):
+    command = SimpleNamespace(
+        torque=np.array([3.0, 4.0]), acceleration=np.ones(3), force=np.ones((2, 3)),
+        solved=np.array(False), failures=np.array(-1),
+    )  # fmt: skip
+    memory = SimpleNamespace(torque=np.array([1.0, 2.0]), failed=np.array(2), failures=np.array(5))
+    unsolved = np.full(1, 7)
+    keep_solution(np.array([loaded]), np.array([code]), command, memory, unsolved)
+    return command, memory, int(unsolved[0])
+
+
+def test_a_solution_is_remembered() -> None:
+    command, memory, unsolved = solution_after(1, SOLVED)
+    assert unsolved == 0 and bool(command.solved)
+    assert memory.torque.tolist() == command.torque.tolist() == [3.0, 4.0]
+    assert (int(memory.failed), int(memory.failures), int(command.failures)) == (0, 5, 5)
+
+
+def test_without_a_point_in_stance_everything_is_zero_and_counts_as_solved() -> None:
+    command, memory, unsolved = solution_after(0, ILL_POSED)
+    assert unsolved == 0 and bool(command.solved)
+    for array in (command.torque, command.acceleration, command.force, memory.torque):
+        assert not array.any()
+    assert (int(memory.failed), int(memory.failures), int(command.failures)) == (0, 5, 5)
+
+
+def test_without_a_solution_python_is_asked_and_nothing_changes() -> None:
+    command, memory, unsolved = solution_after(1, ILL_POSED)
+    assert unsolved == 1 and not bool(command.solved)
+    assert memory.torque.tolist() == [1.0, 2.0] and command.torque.tolist() == [3.0, 4.0]
+    assert (int(memory.failed), int(memory.failures), int(command.failures)) == (2, 5, -1)

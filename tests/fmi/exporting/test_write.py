@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.fmi.exporting.running_graph import RunningGraph
+from aloft.fmi.exporting.slave import RunningGraph
 from aloft.fmi.exporting.write import export
 from aloft.runtime.language.errors import AloftError
 

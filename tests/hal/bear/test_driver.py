@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from aloft.blocks.signals import CommandMode, DrivePhase, JointCommand
 from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.driver import DriveLaw, Driver
+from aloft.hal.bear.driver import DriveLaw, Driver, check_ready, configure
 from aloft.hal.bear.motor_loop import MotorThread
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.twin.twin import Twin, standing_twin
@@ -161,3 +162,55 @@ def test_the_motor_thread_damps(driving: Driver, age: float, stop_reason: str, t
     finally:
         thread.stop()
     assert loop.fault.startswith(text) and loop.phase is DrivePhase.DAMPED
+
+
+def ready(**changes: object) -> SimpleNamespace:
+    """What ``check_ready`` looks at, with everything at its bounds."""
+    settings = hardware()
+    drives, farthest = settings.drives, settings.soft_start.farthest
+    voltage = np.tile([drives.lowest_voltage, drives.highest_voltage], 5)
+    measured = SimpleNamespace(
+        voltage=voltage, temperature=np.full(10, drives.highest_temperature),
+        position=np.tile([farthest, -farthest], 5),
+    )  # fmt: skip
+    return SimpleNamespace(hardware=settings, measured=measured)
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "change", "text"),
+    [
+        ("voltage", 0, -0.1, "V instead of"), ("voltage", 1, 0.1, "V instead of"),
+        ("temperature", 4, 1.0, "deg C"), ("position", 2, 0.01, "rad away"),
+        ("position", 3, -0.01, "rad away"), ("position", 3, np.nan, "rad away"),
+    ],
+)  # fmt: skip
+def test_drives_are_ready_up_to_their_bounds(
+    name: str, column: int, change: float, text: str
+) -> None:
+    names = ROBOT.transmission.motors
+    loop = ready()
+    check_ready(loop, np.zeros(10), names)  # type: ignore[arg-type]
+    getattr(loop.measured, name)[column] += change
+    with pytest.raises(BusError, match=f"the drives are not enabled: {names[column]} .*{text}"):
+        check_ready(loop, np.zeros(10), names)  # type: ignore[arg-type]
+
+
+def test_drives_get_the_gains_and_limits_of_the_file() -> None:
+    written: dict[int, dict[str, float]] = {}
+    bus = SimpleNamespace(verify=lambda device, values: written.update({device: dict(values)}))
+    settings, names = hardware(), ROBOT.transmission.motors
+    stiffness = {name: 2.0 + k for k, name in enumerate(names)}
+    damping = {name: 0.1 * (1 + k) for k, name in enumerate(names)}
+    configure(bus, settings, stiffness, damping)  # type: ignore[arg-type]
+    drives = settings.drives
+    for name in names:
+        values = written[settings.motors[name].id]
+        # what the drive computes in amperes gives the motor's torque
+        torque = drives.torque_constant * values["p_gain_direct_force"]
+        assert torque == pytest.approx(stiffness[name])
+        torque = drives.torque_constant * values["d_gain_direct_force"]
+        assert torque == pytest.approx(damping[name])
+        assert values["watchdog_timeout"] == pytest.approx(1e6 * drives.watchdog, abs=1.0)
+        assert values["limit_i_max"] == drives.current_limit and values["mode"] == 3
+        for loop in ("iq", "id"):
+            assert [values[f"{letter}_gain_{loop}"] for letter in "pid"] == drives.iq_gains

@@ -6,6 +6,8 @@ from hypothesis import strategies as st
 
 from aloft.hal.bear.protocol import (
     BROADCAST,
+    CONFIG,
+    STATUS,
     Frame,
     FrameReader,
     Instruction,
@@ -76,3 +78,28 @@ def test_a_frame_behind_garbage_is_found(frame: Frame) -> None:
 def test_what_is_no_frame(device: int, data: bytes, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         frame_bytes(device, Instruction.PING, data)
+
+
+def test_registers_have_addresses_of_their_own_and_gains_stand_side_by_side() -> None:
+    for area in (STATUS, CONFIG):
+        addresses = [register.address for register in area.values()]
+        assert len(set(addresses)) == len(addresses) and min(addresses) >= 0
+    for loop in ("id", "iq", "velocity", "position", "direct_force"):
+        p, i, d = (CONFIG[f"{letter}_gain_{loop}"] for letter in "pid")
+        assert (i.address - p.address, d.address - p.address) == (1, 2)
+        for register in (p, i, d):
+            assert register.least == 0.0 <= register.default < register.most and register.writable
+
+
+@pytest.mark.parametrize("name", ["goal_iq", "goal_position"])
+@pytest.mark.parametrize("value", [0.0, 1.5, -2.25])
+def test_a_registers_value_is_four_bytes_there_and_back(name: str, value: float) -> None:
+    data = STATUS[name].pack(value)
+    assert len(data) == 4 and STATUS[name].unpack(data) == value
+
+
+@pytest.mark.parametrize("value", [-1, 1.5])
+def test_whole_numbers_take_nothing_else(value: float) -> None:
+    assert STATUS["torque_enable"].unpack(STATUS["torque_enable"].pack(3)) == 3
+    with pytest.raises(ValueError, match="torque_enable is a whole number from 0"):
+        STATUS["torque_enable"].pack(value)

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aloft.hal.simulated.drives import (
-    MotorRecord,
     Motors,
     MotorScratch,
     clip_joint_torque,
@@ -14,6 +13,7 @@ from aloft.hal.simulated.drives import (
     joint_feedback_torque,
     motor_torque_limits,
 )
+from aloft.hal.simulated.state import TickRecord
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -99,10 +99,9 @@ def test_a_step_of_the_motors_is_recorded_and_what_is_not_a_number_is_not_hidden
     square = np.eye(3)
     motors = Motors(square, square, square, np.full(3, 2.0), np.ones(3), np.full(3, 10.0))
     scratch = MotorScratch(*np.zeros((5, 3)))
-    high, low = np.full(3, -np.inf), np.full(3, np.inf)
-    record = MotorRecord(
-        np.zeros(3, np.int64), high.copy(), low.copy(), high.copy(), low.copy(), *np.zeros((2, 3))
-    )
+    record = TickRecord.allocate({"n_joints": 3, "n_contacts": 1})
+    record.torque_high[:] = record.speed_high[:] = -np.inf
+    record.torque_low[:] = record.speed_low[:] = np.inf
     torque = np.array([1.0, -5.0, 0.5])
     drive_motors(np.array([9.5, 0.5, -0.5]), torque, motors, scratch, record)
     np.testing.assert_array_equal(torque, [0.5, -2.0, 0.5])

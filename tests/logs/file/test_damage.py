@@ -22,7 +22,7 @@ from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
 from aloft.runtime.running.sinks import Note
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 BATCHES, BATCH = 6, 10
 
@@ -36,7 +36,7 @@ def written_rows(size: int) -> np.ndarray:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("damage") / "a.rrd"
-    bound = BoundGraph(checked_graph({"c": Use(Constant, {"value": [1.0, 2.0]})}))
+    bound = BoundGraph(checked_graph({"c": BlockUse(Constant, {"value": [1.0, 2.0]})}))
     header = header_of(bound)
     rows = written_rows(header.bus.size)
     writer = RecordingWriter(path, header)

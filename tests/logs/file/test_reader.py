@@ -14,7 +14,7 @@ from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph, Snapshot
 from aloft.runtime.running.sinks import Note, parameter_note
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Odd(Signal):
@@ -38,7 +38,7 @@ class Source(Block):
 
 @pytest.fixture
 def bound() -> BoundGraph:
-    return BoundGraph(checked_graph({"a/b": Use(Source)}, ticks=10))
+    return BoundGraph(checked_graph({"a/b": BlockUse(Source)}, ticks=10))
 
 
 def rows_of(bound: BoundGraph, count: int) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_signals_are_described_without_their_code(bound: BoundGraph, tmp_path: P
     assert header.bus.layout() == bound.memory.bus.layout
     assert header.state.layout() == bound.memory.state.layout
     assert header.blocks[0].type.endswith(":Source")
-    other = BoundGraph(checked_graph({"a/c": Use(Source)}))
+    other = BoundGraph(checked_graph({"a/c": BlockUse(Source)}))
     assert header_of(other).schema_hashes != header.schema_hashes
     RecordingWriter(tmp_path / "a.rrd", header).close()
     run = read(tmp_path / "a.rrd")

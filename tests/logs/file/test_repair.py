@@ -13,7 +13,7 @@ from aloft.logs.file.repair import RepairError, repair
 from aloft.logs.recording.place import part_of
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 BATCHES, BATCH = 10, 20
 
@@ -22,7 +22,7 @@ BATCHES, BATCH = 10, 20
 def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
     """A recording of batches, and the size of the file after each flush."""
     path = tmp_path_factory.mktemp("repair") / "a.rrd"
-    bound = BoundGraph(checked_graph({"c": Use(Constant, {"value": [1.0, 2.0]})}))
+    bound = BoundGraph(checked_graph({"c": BlockUse(Constant, {"value": [1.0, 2.0]})}))
     size = bound.memory.bus.layout.size
     header = make_header(bound.graph, bound.memory.bus.layout, bytes(size))
     writer = RecordingWriter(path, header)

@@ -11,7 +11,7 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Number(Signal):
@@ -37,7 +37,7 @@ def test_files_are_known_by_their_content(tmp_path: Path) -> None:
     (tmp_path / "table.csv").write_text("1")
     (tmp_path / "plan.npz").write_text("2")
     name = str(tmp_path / "table.csv")
-    bound = BoundGraph(checked_graph({"r": Use(Reads, {"table": name})}))
+    bound = BoundGraph(checked_graph({"r": BlockUse(Reads, {"table": name})}))
     header = header_of(bound)
     then = header.files
     assert then == {

@@ -15,7 +15,7 @@ from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Numbers(Signal):
@@ -57,7 +57,7 @@ def test_a_viewer_that_fails_is_a_warning(
         recorder = Recorder(tmp_path / "a.rrd", live=viewer.source)
         strike = Strike(300, viewer.process.pid, number)
         result = run(
-            checked_graph({"count": Use(Count)}, ticks=1000),
+            checked_graph({"count": BlockUse(Count)}, ticks=1000),
             sinks=[recorder, strike],
             clock=ClockSpec("paced"),
         )
@@ -75,7 +75,7 @@ def test_a_viewer_that_fails_is_a_warning(
             reasons = ("the viewer has been closed", "the viewer did not take the end of the run")
             assert warning.endswith(reasons) or any(f"{reason};" in warning for reason in reasons)
     finally:
-        os.kill(viewer.process.pid, signal.SIGCONT) if viewer.lives() else None
+        os.kill(viewer.process.pid, signal.SIGCONT) if viewer.is_alive() else None
         viewer.stop()
 
 
@@ -83,7 +83,7 @@ def test_a_viewer_that_is_not_there_is_a_warning(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     recorder = Recorder(tmp_path / "a.rrd", live="rerun+http://127.0.0.1:9/proxy")
-    result = run(checked_graph({"count": Use(Count)}, ticks=100), sinks=[recorder])
+    result = run(checked_graph({"count": BlockUse(Count)}, ticks=100), sinks=[recorder])
     assert result.success
     (warning,) = result.warnings
     assert warning.startswith("the viewer did not show all of the run: ")

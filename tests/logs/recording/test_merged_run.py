@@ -20,7 +20,7 @@ from aloft.runtime.language.errors import AloftError
 from aloft.runtime.placement.placed import PlacedGraph, place
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 from aloft.runtime.testing.spread import run_parts_of
 from aloft.runtime.transports.hub import Hub
 
@@ -76,7 +76,7 @@ def test_a_missing_part_is_named(made: Made) -> None:
 
 def test_a_recording_of_another_graph_is_refused(made: Made, tmp_path: Path) -> None:
     placed, paths, _ = made
-    other = checked_graph({"c": Use(Constant, {"value": [1.0]})}, ticks=3)
+    other = checked_graph({"c": BlockUse(Constant, {"value": [1.0]})}, ticks=3)
     run(other, sinks=[Recorder(tmp_path / "o.rrd")])
     with pytest.raises(
         AloftError, match=r"are not of one run of test: last\.y\.value is not in the part of far"

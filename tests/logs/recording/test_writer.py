@@ -24,7 +24,7 @@ from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.run_result import RunResult
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 TICKS = 300
 
@@ -103,7 +103,9 @@ def hopper_description() -> RobotDescription:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[CheckedGraph, RunResult, Path]:
     graph = checked_graph(
-        {"robot": Use(Hopper), "leg/robot": Use(Hopper)}, robot=hopper_description(), ticks=TICKS
+        {"robot": BlockUse(Hopper), "leg/robot": BlockUse(Hopper)},
+        robot=hopper_description(),
+        ticks=TICKS,
     )
     result = run(graph)
     path = tmp_path_factory.mktemp("recording") / "new folder" / "hop.rrd"
@@ -256,7 +258,7 @@ def test_what_cannot_be_written_is_an_os_error(
 
 
 def test_a_run_without_a_log_cannot_be_recorded(tmp_path: Path) -> None:
-    graph = checked_graph({"robot": Use(Hopper)}, robot=hopper_description(), ticks=3)
+    graph = checked_graph({"robot": BlockUse(Hopper)}, robot=hopper_description(), ticks=3)
     with pytest.raises(RuntimeError, match="log=True"):
         write_recording(tmp_path / "hop.rrd", run(graph, log=False))
     assert not (tmp_path / "hop.rrd").exists()

@@ -27,7 +27,7 @@ from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 
 class Noise(Block):
@@ -101,10 +101,10 @@ class Failing(Gain):
 def graph(kind: type[Gain] = Gain, robot: type[Noise] = Noise, factor: float = 3.0) -> CheckedGraph:
     return checked_graph(
         {
-            "late": Use(UnitDelay, {"n": 2}, {"u": "gain.y"}),
-            "robot": Use(robot),
-            "gain": Use(kind, {"n": 2, "gain": factor}, {"u": "robot.y"}),
-            "slow": Use(SineWave, {"n": 1}, period_ticks=5),
+            "late": BlockUse(UnitDelay, {"n": 2}, {"u": "gain.y"}),
+            "robot": BlockUse(robot),
+            "gain": BlockUse(kind, {"n": 2, "gain": factor}, {"u": "robot.y"}),
+            "slow": BlockUse(SineWave, {"n": 1}, period_ticks=5),
         },
         ticks=900,
     )
@@ -171,9 +171,9 @@ def test_from_a_keyframe_byte_for_byte_as_from_the_beginning(recorded: KeptRun) 
 
 def test_a_simulation_with_another_seed_is_fed_or_differs(recorded: KeptRun) -> None:
     other = checked_graph(
-        {"late": Use(UnitDelay, {"n": 2}, {"u": "gain.y"}), "robot": Use(Noise, {"seed": 1}),
-         "gain": Use(Gain, {"n": 2, "gain": 3.0}, {"u": "robot.y"}),
-         "slow": Use(SineWave, {"n": 1}, period_ticks=5)}, ticks=900,
+        {"late": BlockUse(UnitDelay, {"n": 2}, {"u": "gain.y"}), "robot": BlockUse(Noise, {"seed": 1}),
+         "gain": BlockUse(Gain, {"n": 2, "gain": 3.0}, {"u": "robot.y"}),
+         "slow": BlockUse(SineWave, {"n": 1}, period_ticks=5)}, ticks=900,
     )  # fmt: skip
     first = replay(recorded, graph=other).first
     assert first is not None and (first.tick, first.block) == (0, "robot")
@@ -271,7 +271,7 @@ def test_what_cannot_be_replayed(recorded: KeptRun) -> None:
         replay(recorded, first_tick=900)
     with pytest.raises(ReplayError, match="no tick from 500 up to 400"):
         replay(recorded, first_tick=500, last_tick=400)
-    other = checked_graph({"new": Use(SineWave), "gain": Use(Gain, {}, {"u": "new.y"})})
+    other = checked_graph({"new": BlockUse(SineWave), "gain": BlockUse(Gain, {}, {"u": "new.y"})})
     with pytest.raises(ReplayError, match=r"new\.y\.value is not in the recording"):
         replay(recorded, graph=other, run=["gain"])
 

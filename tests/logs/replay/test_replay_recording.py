@@ -12,12 +12,12 @@ from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 
 def graph(factor: float) -> CheckedGraph:
-    wave = Use(SineWave, {"n": 2, "frequency": 5.0})
-    gain = Use(Gain, {"n": 2, "gain": factor}, {"u": "wave.y"})
+    wave = BlockUse(SineWave, {"n": 2, "frequency": 5.0})
+    gain = BlockUse(Gain, {"n": 2, "gain": factor}, {"u": "wave.y"})
     return checked_graph({"wave": wave, "gain": gain}, ticks=300)
 
 

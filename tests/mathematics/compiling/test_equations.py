@@ -1,5 +1,7 @@
 """Equations of kernels: the loops that replace them compute what NumPy or hand-written loops do."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from enum import IntEnum

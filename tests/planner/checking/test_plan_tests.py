@@ -346,3 +346,103 @@ def test_a_joint_that_stays_at_its_limit_is_named(by_hand: JumpPlan, joint: int,
     position = by_hand.position.copy()
     position[:, 7 + joint] = ROBOT.joint_limits[joint, side]
     assert name in active_limits(replace(by_hand, position=position), ROBOT)
+
+
+@pytest.fixture(scope="module")
+def two_jumps() -> Evidence:
+    """Up a step of 5 cm and down again behind it."""
+    plan = shipped("up_and_down")
+    robot = plan.task.equipped(ROBOT)
+    return Evidence(plan, robot, replay(plan, robot))
+
+
+def test_two_jumps_are_followed_one_after_the_other(two_jumps: Evidence) -> None:
+    plan, samples = two_jumps.plan, two_jumps.replay.samples
+    (first, landed), (second, end) = plan.flights
+    times = [
+        0.0,
+        first,
+        0.5 * (first + landed),
+        landed,
+        second,
+        0.5 * (second + end),
+        end,
+        plan.time[-1],
+    ]
+    progress = np.interp(times, samples.time, two_jumps.progress)
+    np.testing.assert_allclose(progress, [0.0, 0.0, 0.5, 1.0, 1.0, 1.5, 2.0, 2.0], atol=1e-9)
+    place = two_jumps.place
+    np.testing.assert_array_equal(
+        place, (samples.time >= landed).astype(int) + (samples.time >= end)
+    )
+    assert two_jumps.rises == pytest.approx([0.08, 0.06], abs=1e-6)
+    # both times where feet stand, their points are on the ground, which is higher in between
+    standing = plan.contact[samples.knot] & (plan.phase[samples.knot] != Phase.FLIGHT)[:, None]
+    assert np.abs(two_jumps.point_height[standing]).max() < 1e-3
+    between = (samples.time > landed + 0.01) & (samples.time < second - 0.01)
+    assert samples.points[between][:, :, 2].min() > 0.049
+
+
+@pytest.mark.parametrize(("jump", "amount"), [(0, 0.05), (1, -0.04)])
+def test_the_jump_that_misses_its_task_is_named(
+    two_jumps: Evidence, jump: int, amount: float
+) -> None:
+    plan, ends = two_jumps.plan, two_jumps.replay.flights
+    lift_off, touchdown = ends[jump]
+    faster = shifted(plan, "velocity", amount, (lift_off, 2))
+    tests = found(faster)
+    speed = two_jumps.replay.com_velocity[lift_off, 2]
+    q, v = faster.position[lift_off], faster.velocity[lift_off]
+    other = ExactDynamics(ROBOT).centroidal(q, v)[1][2]
+    missed = (other**2 - speed**2) / (2.0 * GRAVITY)
+    assert tests["rise"].where == f" jump {jump + 1}"
+    assert tests["rise"].value == pytest.approx(abs(missed), abs=1e-6)
+    # all stances behind that flight are moved aside
+    for axis, name in ((0, "x"), (1, "y")):
+        tests = found(shifted(plan, "position", amount, (slice(touchdown, None), axis)))
+        assert tests["landing_place"].value == pytest.approx(abs(amount), abs=1e-3)
+        assert tests["landing_place"].where in {f"{name} jump {k + 1}" for k in range(jump, 2)}
+    moved = found(shifted(plan, "position", 0.3, (touchdown + 1, 9)))
+    assert moved["impact"].where == f" jump {jump + 1}"
+
+
+def test_no_limit_is_negative(by_hand: JumpPlan, two_jumps: Evidence) -> None:
+    for plan in (two_jumps.plan, by_hand, asked(by_hand, formulation="full")):
+        for test in check_plan(plan, ROBOT).tests:
+            assert test.limit > 0.0 or test.name == "body_on_ground", test
+
+
+def test_the_clearance_of_the_feet_is_that_in_the_middle_of_each_flight(
+    two_jumps: Evidence,
+) -> None:
+    plan, samples = two_jumps.plan, two_jumps.replay.samples
+    lowest = []
+    for start, end in plan.flights:
+        k = int(np.abs(samples.time - 0.5 * (start + end)).argmin())
+        lowest.append(two_jumps.point_height[k].min())
+    test = found(asked(plan, foot_clearance=0.3))["foot_clearance"]
+    assert test.value == pytest.approx(0.3 - min(lowest), abs=1e-9)
+
+
+@pytest.mark.parametrize(("joint", "side"), [(0, 0), (0, 1), (3, 0), (3, 1), (9, 1)])
+def test_a_joint_beyond_either_limit_is_named(by_hand: JumpPlan, joint: int, side: int) -> None:
+    limits = ROBOT.joint_limits
+    position = by_hand.position.copy()
+    position[10, 7 + joint] = limits[joint, side] + (0.2 if side else -0.2)
+    test = found(replace(by_hand, position=position))["joint_limits"]
+    assert test.value == pytest.approx(0.2) and test.where.startswith(f"{JOINTS[joint]} at ")
+
+
+def test_the_hardest_motors_are_named(by_hand: JumpPlan, evidence: Evidence) -> None:
+    tests, motors = found(by_hand), ROBOT.transmission.motors
+    speed = np.abs(evidence.motor_speed)
+    sample, motor = np.unravel_index(int(speed.argmax()), speed.shape)
+    assert len(set(ROBOT.motors.no_load_speed)) == 1, "else shares would have to be compared"
+    time = evidence.replay.samples.time[sample]
+    assert tests["motor_speed"].value == pytest.approx(speed.max())
+    assert tests["motor_speed"].where.endswith(f"{time:.3f} s")
+    assert tests["motor_speed"].where.split()[0] in motors
+    half = found(asked(by_hand, effort=0.5))
+    assert half["motor_speed"].limit == pytest.approx(
+        1.01 * 0.5 * ROBOT.motors.no_load_speed[motor]
+    )

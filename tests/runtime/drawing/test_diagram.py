@@ -45,7 +45,7 @@ def test_what_loading_inserts_is_not_drawn(graph: CheckedGraph) -> None:
     shown = diagram(graph)
     assert list(shown.nodes) == ["plant", "wish", "control", "watch"]
     delayed = next(wire for wire in shown.wires if wire.target == ("plant", "u"))
-    assert (delayed.delay, delayed.said) == (2, "control/limit.y.value[0]")
+    assert (delayed.delay, delayed.wire_text) == (2, "control/limit.y.value[0]")
     assert delayed.source == ("control", "control/limit.y")
 
 

@@ -3,21 +3,21 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.runtime.drawing.diagram import Diagram, Node, Wire
-from aloft.runtime.drawing.layers import Pass, arrange
+from aloft.runtime.drawing.diagram import Diagram, DiagramNode, DiagramWire
+from aloft.runtime.drawing.layers import WirePassage, arrange
 
 
 def diagram_of(edges: list[tuple[str, str]]) -> Diagram:
-    nodes: dict[str, Node] = {}
+    nodes: dict[str, DiagramNode] = {}
     wires = []
     for a, b in edges:
         for name in (a, b):
-            nodes.setdefault(name, Node(name, name))
+            nodes.setdefault(name, DiagramNode(name, name))
         if "y" not in nodes[a].outputs:
             nodes[a].outputs.append("y")
         port = f"u{len(nodes[b].inputs)}"
         nodes[b].inputs.append(port)
-        wires.append(Wire((a, "y"), (b, port)))
+        wires.append(DiagramWire((a, "y"), (b, port)))
     return Diagram(nodes, wires)
 
 
@@ -35,8 +35,10 @@ def test_a_feedback_is_the_one_wire_that_leads_back() -> None:
 def test_a_long_wire_passes_the_columns_between_once_for_all_its_readers() -> None:
     edges = [("a", "b"), ("b", "c"), ("c", "d"), ("a", "c"), ("a", "d")]
     layers = arrange(diagram_of(edges))
-    passes = [place for column in layers.columns for place in column if isinstance(place, Pass)]
-    assert passes == [Pass(("a", "y"), 1), Pass(("a", "y"), 2)]
+    passes = [
+        place for column in layers.columns for place in column if isinstance(place, WirePassage)
+    ]
+    assert passes == [WirePassage(("a", "y"), 1), WirePassage(("a", "y"), 2)]
 
 
 def test_a_source_stands_beside_its_reader() -> None:
@@ -64,7 +66,7 @@ def test_any_graph_has_columns(edges: list[tuple[str, str]]) -> None:
     for wire in layers.forward:
         assert layers.layer[wire.source[0]] < layers.layer[wire.target[0]]
     for a, b in layers.links:
-        left = a.layer if isinstance(a, Pass) else layers.layer[a]
-        right = b.layer if isinstance(b, Pass) else layers.layer[b]
+        left = a.layer if isinstance(a, WirePassage) else layers.layer[a]
+        right = b.layer if isinstance(b, WirePassage) else layers.layer[b]
         assert right == left + 1
     assert arrange(diagram).columns == layers.columns

@@ -12,7 +12,7 @@ from aloft.runtime.language.stages import Wire
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import BlockBench
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Mixed(Signal):
@@ -70,8 +70,8 @@ def test_one_type_per_signal_and_length() -> None:
 def test_a_delayed_wire_counts_periods_of_its_source() -> None:
     graph = checked_graph(
         {
-            "a": Use(VectorCounter, period_ticks=2, offset_ticks=1),
-            "b": Use(Gain, {}, {"u": Wire("a.y", "b.u", delay=2, initial={"value": -5.0})}),
+            "a": BlockUse(VectorCounter, period_ticks=2, offset_ticks=1),
+            "b": BlockUse(Gain, {}, {"u": Wire("a.y", "b.u", delay=2, initial={"value": -5.0})}),
         },
         dimensions={"n": 1},
         ticks=10,
@@ -97,7 +97,7 @@ def test_initial_values_are_checked() -> None:
 def test_a_wrong_initial_value_names_the_delay() -> None:
     wire = Wire("a.y", "b.u", delay=1, initial={"value": [1.0, 2.0]})
     graph = checked_graph(
-        {"a": Use(VectorCounter), "b": Use(Gain, {}, {"u": wire})}, dimensions={"n": 1}
+        {"a": BlockUse(VectorCounter), "b": BlockUse(Gain, {}, {"u": wire})}, dimensions={"n": 1}
     )
     with pytest.raises(RunError) as caught:
         BoundGraph(graph)

@@ -11,7 +11,7 @@ from aloft.blocks.general.sine_wave import SineWave
 from aloft.blocks.general.sum import Sum
 from aloft.runtime.language.stages import CheckedGraph, Wire
 from aloft.runtime.placement.placed import spread
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Number(Signal):
@@ -83,9 +83,9 @@ def ring(params: Mapping[str, object] | None = None, ticks: int = 40) -> Checked
     """A robot on one machine, a controller of two blocks on two others: there and back in a tick."""
     graph = checked_graph(
         {
-            "robot": Use(Counter, {}, {"u": "last.y"}),
-            "first": Use(Failing, params or {}, {"u": "robot.y"}),
-            "last": Use(Failing, {}, {"u": "first.y"}),
+            "robot": BlockUse(Counter, {}, {"u": "last.y"}),
+            "first": BlockUse(Failing, params or {}, {"u": "robot.y"}),
+            "last": BlockUse(Failing, {}, {"u": "first.y"}),
         },
         ticks=ticks,
     )
@@ -94,7 +94,7 @@ def ring(params: Mapping[str, object] | None = None, ticks: int = 40) -> Checked
 
 def random_graph(rng: np.random.Generator, blocks: int = 14, ticks: int = 60) -> CheckedGraph:
     """Blocks of both kinds at several rates with delays and loops, placed at random."""
-    uses: dict[str, Use] = {"wave": Use(SineWave, {"n": 2, "frequency": 3.7})}
+    uses: dict[str, BlockUse] = {"wave": BlockUse(SineWave, {"n": 2, "frequency": 3.7})}
     names = [f"b{k}" for k in range(blocks)]
     moore = [bool(rng.random() < 0.3) for _ in names]
     for k, name in enumerate(names):
@@ -111,11 +111,11 @@ def random_graph(rng: np.random.Generator, blocks: int = 14, ticks: int = 60) ->
             return Wire(f"b{pick}.y", "", delay) if delay else f"b{pick}.y"
 
         if moore[k]:
-            uses[name] = Use(Integrator, {"n": 2}, {"u": source()}, period, offset)
+            uses[name] = BlockUse(Integrator, {"n": 2}, {"u": source()}, period, offset)
         elif rng.random() < 0.5:
-            uses[name] = Use(Gain, {"n": 2, "gain": 0.9}, {"u": source()}, period, offset)
+            uses[name] = BlockUse(Gain, {"n": 2, "gain": 0.9}, {"u": source()}, period, offset)
         else:
-            uses[name] = Use(
+            uses[name] = BlockUse(
                 Sum,
                 {"n": 2, "weights": [0.5, -0.6]},
                 {"a": source(), "b": source()},

@@ -19,7 +19,7 @@ from aloft.runtime.live.parameter_endpoint import (
 )
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def running(path: Path) -> Iterator[BoundGraph]:
     """A graph that ticks as fast as it can until the test is over."""
     bound = BoundGraph(
-        checked_graph({"wave": Use(SineWave), "gain": Use(Gain, wires={"u": "wave.y"})})
+        checked_graph({"wave": BlockUse(SineWave), "gain": BlockUse(Gain, wires={"u": "wave.y"})})
     )
     executor = Executor(bound, log=False, sinks=[ParameterEndpoint(path)])
     thread = threading.Thread(target=executor.run)

@@ -13,7 +13,7 @@ from aloft.blocks.general.gain import Gain
 from aloft.blocks.general.sine_wave import SineWave
 from aloft.runtime.live.parameter_endpoint import _answer
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 TRIES = int(os.environ.get("ALOFT_FUZZ", "800"))
 VALUES = (
@@ -53,7 +53,7 @@ def starting() -> dict[str, Any]:
 
 def test_every_request_has_an_answer_and_the_next_one_too() -> None:
     bound = BoundGraph(
-        checked_graph({"wave": Use(SineWave), "gain": Use(Gain, wires={"u": "wave.y"})})
+        checked_graph({"wave": BlockUse(SineWave), "gain": BlockUse(Gain, wires={"u": "wave.y"})})
     )
     bound.parameters.submit = lambda adjustment: None  # type: ignore[method-assign]
     draw = random.Random(11)

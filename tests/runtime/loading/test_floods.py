@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from aloft.runtime.loading import check
-from aloft.runtime.loading.checking import carry, wire_check
+from aloft.runtime.loading.checking import infer_units, wire_check
 
 
 def test_one_missing_block_read_by_many(tmp_path: Path) -> None:
@@ -39,8 +39,12 @@ def test_a_ring_of_very_many_blocks(tmp_path: Path) -> None:
 def test_the_work_for_one_missing_block_grows_with_its_readers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls = dict.fromkeys(("answers_of", "fits", "nearest"), 0)
-    for module, name in ((carry, "answers_of"), (wire_check, "fits"), (wire_check, "nearest")):
+    calls = dict.fromkeys(("inferred_outputs", "fits", "nearest"), 0)
+    for module, name in (
+        (infer_units, "inferred_outputs"),
+        (wire_check, "fits"),
+        (wire_check, "nearest"),
+    ):
         original = getattr(module, name)
 
         def counted(*given: Any, name: str = name, original: Any = original) -> Any:
@@ -53,6 +57,6 @@ def test_the_work_for_one_missing_block_grows_with_its_readers(
     path = tmp_path / "graph.yaml"
     path.write_text("\n".join(["rate: 100 Hz", "blocks:", *lines]))
     assert len(check(path).problems) == count
-    assert 0 < calls["answers_of"] <= 6 * count  # not count ** 2
+    assert 0 < calls["inferred_outputs"] <= 6 * count  # not count ** 2
     assert 0 < calls["fits"] <= 6 * count
     assert calls["nearest"] == 1

@@ -6,7 +6,7 @@ from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.sinks import Note
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Waiver(Block):
@@ -42,7 +42,7 @@ class Listener:
 
 def test_a_caution_is_in_the_result_and_told_to_the_sinks() -> None:
     listener = Listener()
-    result = run(checked_graph({"b0": Use(Waiver, {})}, ticks=3), sinks=[listener])
+    result = run(checked_graph({"b0": BlockUse(Waiver, {})}, ticks=3), sinks=[listener])
     assert result.success
     assert result.cautions == ("b0: the check was waived",)
     assert result.to_json()["cautions"] == ["b0: the check was waived"]
@@ -59,5 +59,5 @@ class Finder(Waiver):
 
 
 def test_what_a_block_has_found_out_in_the_run_is_added_once() -> None:
-    result = run(checked_graph({"b0": Use(Finder, {})}, ticks=3))
+    result = run(checked_graph({"b0": BlockUse(Finder, {})}, ticks=3))
     assert result.cautions == ("b0: the check was waived", "b0: it ran")

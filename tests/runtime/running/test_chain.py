@@ -26,7 +26,7 @@ from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.pacing import WallTime
 from aloft.runtime.running.ticker import Ticker
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 GRAPHS = Path(__file__).parents[3] / "graphs"
 
@@ -93,12 +93,12 @@ def graph(**params: object):
     """Three filters in a row, the second at half the rate, with a block of Python in between."""
     return checked_graph(
         {
-            "wave": Use(SineWave, {"frequency": 10.0}),
-            "one": Use(Smooth, wires={"u": "wave.y"}),
-            "slow": Use(Smooth, params, {"u": "one.y"}, period_ticks=2, offset_ticks=1),
-            "two": Use(Smooth, wires={"u": "slow.y"}),
-            "gain": Use(Gain, wires={"u": "two.y"}),
-            "three": Use(Smooth, wires={"u": "gain.y"}),
+            "wave": BlockUse(SineWave, {"frequency": 10.0}),
+            "one": BlockUse(Smooth, wires={"u": "wave.y"}),
+            "slow": BlockUse(Smooth, params, {"u": "one.y"}, period_ticks=2, offset_ticks=1),
+            "two": BlockUse(Smooth, wires={"u": "slow.y"}),
+            "gain": BlockUse(Gain, wires={"u": "two.y"}),
+            "three": BlockUse(Smooth, wires={"u": "gain.y"}),
         }
     )
 
@@ -268,7 +268,8 @@ class Sometimes(KernelBlock):
 def test_a_call_is_left_out_where_it_is_not_its_turn(options: dict[str, bool]) -> None:
     """Also as the last one of a block, after which a time stamp is taken."""
     counters = {
-        name: Use(Sometimes, {"every": every}) for name, every in (("a", 3), ("b", 1), ("c", 100))
+        name: BlockUse(Sometimes, {"every": every})
+        for name, every in (("a", 3), ("b", 1), ("c", 100))
     }
     result = Executor(checked_graph(counters), **options).run(10)  # type: ignore[arg-type]
     found = [result.signal(f"{name}.y.value")[:, 0].tolist() for name in "abc"]

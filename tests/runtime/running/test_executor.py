@@ -23,7 +23,7 @@ from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.stages import CheckedGraph, Wire
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Filter(Block):
@@ -99,10 +99,10 @@ class Stopper(Block):
 
 
 def chain(block_type: type[Block], count: int = 20) -> CheckedGraph:
-    blocks = {"source": Use(Constant, {"value": [1.0]})}
+    blocks = {"source": BlockUse(Constant, {"value": [1.0]})}
     before = "source.y"
     for i in range(count):
-        blocks[f"b{i}"] = Use(block_type, {}, {"u": before})
+        blocks[f"b{i}"] = BlockUse(block_type, {}, {"u": before})
         before = f"b{i}.y"
     return checked_graph(blocks, ticks=30)
 
@@ -128,9 +128,9 @@ def test_a_chain_of_moore_blocks_shifts_by_one_block_a_tick() -> None:
 
 def test_the_order_in_the_file_does_not_matter() -> None:
     graph = chain(Filter)
-    names = {"source": Use(Constant, {"value": [1.0]})}
+    names = {"source": BlockUse(Constant, {"value": [1.0]})}
     backwards = {
-        f"b{i}": Use(Filter, {}, {"u": f"b{i - 1}.y" if i else "source.y"})
+        f"b{i}": BlockUse(Filter, {}, {"u": f"b{i - 1}.y" if i else "source.y"})
         for i in reversed(range(20))
     }
     other = checked_graph({**backwards, **names}, ticks=30)
@@ -141,8 +141,8 @@ def test_the_order_in_the_file_does_not_matter() -> None:
 def test_a_ring_with_two_delays() -> None:
     graph = checked_graph(
         {
-            "a": Use(Gain, {"gain": 2.0}, {"u": Wire("b.y", "a.u", 1, {"value": 1.0})}),
-            "b": Use(Gain, {"gain": 3.0}, {"u": Wire("a.y", "b.u", 2, {"value": 10.0})}),
+            "a": BlockUse(Gain, {"gain": 2.0}, {"u": Wire("b.y", "a.u", 1, {"value": 1.0})}),
+            "b": BlockUse(Gain, {"gain": 3.0}, {"u": Wire("a.y", "b.u", 2, {"value": 10.0})}),
         },
         ticks=8,
     )
@@ -159,8 +159,8 @@ def test_a_ring_with_two_delays() -> None:
 def test_a_ring_through_an_integrator() -> None:
     graph = checked_graph(
         {
-            "feedback": Use(Gain, {"gain": -1.0}, {"u": "level.y"}),
-            "level": Use(Integrator, {"initial": 1.0}, {"u": "feedback.y"}),
+            "feedback": BlockUse(Gain, {"gain": -1.0}, {"u": "level.y"}),
+            "level": BlockUse(Integrator, {"initial": 1.0}, {"u": "feedback.y"}),
         },
         rate=2.0,
         ticks=6,
@@ -177,9 +177,9 @@ def test_between_all_pairs_of_rates(source: tuple[int, int], reader: tuple[int, 
     ticks = 64
     graph = checked_graph(
         {
-            "a": Use(Ticks, {}, {}, *source),
-            "b": Use(Gain, {"gain": 2.0}, {"u": "a.y"}, *reader),
-            "c": Use(Sampler, {}, {"u": "a.y"}, *reader),
+            "a": BlockUse(Ticks, {}, {}, *source),
+            "b": BlockUse(Gain, {"gain": 2.0}, {"u": "a.y"}, *reader),
+            "c": BlockUse(Sampler, {}, {"u": "a.y"}, *reader),
         },
         ticks=ticks,
     )
@@ -207,8 +207,8 @@ def test_between_all_pairs_of_rates(source: tuple[int, int], reader: tuple[int, 
 def test_a_block_at_a_slower_rate_has_a_longer_period() -> None:
     graph = checked_graph(
         {
-            "one": Use(Constant, {"value": [1.0]}),
-            "slow": Use(Integrator, {}, {"u": "one.y"}, 5, 2),
+            "one": BlockUse(Constant, {"value": [1.0]}),
+            "slow": BlockUse(Integrator, {}, {"u": "one.y"}, 5, 2),
         },
         rate=100.0,
         ticks=20,
@@ -219,7 +219,7 @@ def test_a_block_at_a_slower_rate_has_a_longer_period() -> None:
 
 def test_the_result_of_a_run() -> None:
     graph = checked_graph(
-        {"a": Use(SineWave, {"n": 3}), "b": Use(Gain, {"n": 3}, {"u": "a.y"})}, ticks=300
+        {"a": BlockUse(SineWave, {"n": 3}), "b": BlockUse(Gain, {"n": 3}, {"u": "a.y"})}, ticks=300
     )
     result = run(graph)
     assert (result.success, result.reason) == (True, "ran to its end")
@@ -238,27 +238,27 @@ def test_the_result_of_a_run() -> None:
 
 
 def test_an_unknown_signal_names_the_nearest() -> None:
-    result = run(checked_graph({"a": Use(SineWave)}, ticks=1))
+    result = run(checked_graph({"a": BlockUse(SineWave)}, ticks=1))
     with pytest.raises(KeyError, match=r"no signal 'a.y.values'; the nearest is a.y.value"):
         result.signal("a.y.values")
     assert result.signals() == ("a.y.value",)
 
 
 def test_without_a_log_there_are_no_signals() -> None:
-    result = run(checked_graph({"a": Use(SineWave)}, ticks=1), log=False)
+    result = run(checked_graph({"a": BlockUse(SineWave)}, ticks=1), log=False)
     with pytest.raises(RuntimeError, match="this run kept no log; run it with log=True"):
         result.signal("a.y.value")
 
 
 def test_a_block_ends_the_run_after_its_tick() -> None:
-    result = run(checked_graph({"s": Use(Stopper), "t": Use(Ticks)}, ticks=100))
+    result = run(checked_graph({"s": BlockUse(Stopper), "t": BlockUse(Ticks)}, ticks=100))
     assert (result.success, result.reason, result.ticks) == (True, "seen enough", 4)
     assert result.signal("t.y.value")[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
     assert result.metrics == {"height_m": 0.5, "stopper_only": 2.0}
 
 
 def test_metrics_that_say_so_make_a_run_unsuccessful() -> None:
-    result = run(checked_graph({"s": Use(Stopper, {"good": False})}))
+    result = run(checked_graph({"s": BlockUse(Stopper, {"good": False})}))
     assert (result.success, result.reason) == (False, "it fell")
     assert result.exit_code is ExitCode.NOT_SUCCESSFUL
     assert result.error is None
@@ -266,16 +266,18 @@ def test_metrics_that_say_so_make_a_run_unsuccessful() -> None:
 
 
 def test_a_judge_that_is_content_gives_the_reason() -> None:
-    result = run(checked_graph({"s": Use(Stopper, {"good": True})}))
+    result = run(checked_graph({"s": BlockUse(Stopper, {"good": True})}))
     assert (result.success, result.reason) == (True, "it stands")
     both = run(
-        checked_graph({"s": Use(Stopper, {"good": True}), "t": Use(Stopper, {"good": False})})
+        checked_graph(
+            {"s": BlockUse(Stopper, {"good": True}), "t": BlockUse(Stopper, {"good": False})}
+        )
     )
     assert (both.success, both.reason) == (False, "it fell")
 
 
 def test_metrics_of_one_name_are_told_apart_by_block() -> None:
-    result = run(checked_graph({"s": Use(Stopper), "t": Use(Stopper, {"good": False})}))
+    result = run(checked_graph({"s": BlockUse(Stopper), "t": BlockUse(Stopper, {"good": False})}))
     assert set(result.metrics) == {
         "s.height_m", "t.height_m", "s.stopper_only", "t.stopper_only",
     }  # fmt: skip
@@ -294,11 +296,11 @@ def test_a_run_in_stretches_is_the_run_in_one() -> None:
 def test_a_run_restored_from_a_snapshot_goes_on_bit_for_bit() -> None:
     graph = checked_graph(
         {
-            "a": Use(SineWave, {"frequency": 13.0}),
-            "b": Use(Filter, {}, {"u": Wire("a.y", "b.u", delay=3)}, 2, 1),
-            "c": Use(Integrator, {}, {"u": "b.y"}),
-            "d": Use(UnitDelay, {}, {"u": "c.y"}, 3, 2),
-            "e": Use(Sum, {}, {"a": "c.y", "b": "d.y"}),
+            "a": BlockUse(SineWave, {"frequency": 13.0}),
+            "b": BlockUse(Filter, {}, {"u": Wire("a.y", "b.u", delay=3)}, 2, 1),
+            "c": BlockUse(Integrator, {}, {"u": "b.y"}),
+            "d": BlockUse(UnitDelay, {}, {"u": "c.y"}, 3, 2),
+            "e": BlockUse(Sum, {}, {"a": "c.y", "b": "d.y"}),
         },
         ticks=100,
     )
@@ -362,7 +364,7 @@ def test_the_collector_is_quiet_while_running_and_as_before_afterwards(frozen_be
     frozen = gc.get_freeze_count()
     assert (frozen > 0) == frozen_before
     try:
-        run(checked_graph({"w": Use(Witness)}, ticks=2))
+        run(checked_graph({"w": BlockUse(Witness)}, ticks=2))
         assert seen == [False, False]
         assert gc.isenabled() and gc.get_freeze_count() == frozen
     finally:

@@ -11,7 +11,7 @@ from aloft.runtime.language.errors import AloftError, BlockError, ExitCode, RunE
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.life_cycle import STOP_CYCLES, LifeCycle, LifeState
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 CALLS: list[str] = []
 
@@ -60,7 +60,9 @@ class Robot(Block):
 
 def run_robot(ticks: int = 900, **params: Any) -> Any:
     CALLS.clear()
-    graph = checked_graph({"arm/robot": Use(Robot, params), "other": Use(Robot)}, ticks=ticks)
+    graph = checked_graph(
+        {"arm/robot": BlockUse(Robot, params), "other": BlockUse(Robot)}, ticks=ticks
+    )
     return run(graph, log=False)
 
 
@@ -155,7 +157,9 @@ def test_a_failing_close_keeps_nobody_from_theirs() -> None:
 
 def test_the_tick_that_is_not_finite_is_recorded() -> None:
     CALLS.clear()
-    graph = checked_graph({"r": Use(Robot, {"fail_in": "emit", "fail_at": 4, "failure": "nan"})})
+    graph = checked_graph(
+        {"r": BlockUse(Robot, {"fail_in": "emit", "fail_at": 4, "failure": "nan"})}
+    )
     result = run(graph)
     values = result.signal("r.y.value")[:, 1]
     assert values.shape == (5,)
@@ -177,7 +181,9 @@ def test_a_failing_sink_ends_the_run_and_is_closed() -> None:
 
     CALLS.clear()
     sink = FullDisk()
-    result = run(checked_graph({"arm/robot": Use(Robot), "other": Use(Robot)}), sinks=[sink])
+    result = run(
+        checked_graph({"arm/robot": BlockUse(Robot), "other": BlockUse(Robot)}), sinks=[sink]
+    )
     assert (
         result.reason == "the runtime (FullDisk) failed at tick 2 (0.004 s): OSError: no space left"
     )
@@ -192,7 +198,7 @@ def test_failing_metrics_are_a_problem_but_hide_no_others() -> None:
                 raise ZeroDivisionError("no samples")
             return {"height_m": 1.0}
 
-    result = run(checked_graph({"arm/robot": Use(Scored), "other": Use(Scored)}, ticks=2))
+    result = run(checked_graph({"arm/robot": BlockUse(Scored), "other": BlockUse(Scored)}, ticks=2))
     assert result.reason == "block 'arm/robot' failed in metrics: ZeroDivisionError: no samples"
     assert result.metrics == {"height_m": 1.0}
     assert not result.success
@@ -220,7 +226,7 @@ def test_the_executor_goes_through_all_states() -> None:
         def _call(self, what: str) -> None:
             seen.append(executor.life.state)
 
-    executor = Executor(checked_graph({"w": Use(Witness)}, ticks=1))
+    executor = Executor(checked_graph({"w": BlockUse(Witness)}, ticks=1))
     executor.run()
     assert list(dict.fromkeys(seen)) == [LifeState.IDLE, LifeState.RUNNING, LifeState.STOPPING]
     assert executor.life.state is LifeState.STOPPED

@@ -16,7 +16,7 @@ from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 
 class Picky(Block):
@@ -45,9 +45,9 @@ def bound() -> BoundGraph:
     return BoundGraph(
         checked_graph(
             {
-                "wave": Use(SineWave, {"frequency": 10.0}),
-                "gain": Use(Gain, wires={"u": "wave.y"}),
-                "picky": Use(Picky),
+                "wave": BlockUse(SineWave, {"frequency": 10.0}),
+                "gain": BlockUse(Gain, wires={"u": "wave.y"}),
+                "picky": BlockUse(Picky),
             }
         )
     )

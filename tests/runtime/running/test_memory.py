@@ -11,7 +11,7 @@ from aloft.runtime.language.errors import BlockError, DeclarationError, RunError
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Pair(Signal):
@@ -67,7 +67,9 @@ class Modeller(Block):
 
 def test_a_wired_input_is_a_read_only_view_of_its_source() -> None:
     bound = BoundGraph(
-        checked_graph({"a": Use(Source), "b": Use(Reader, {}, {"u": "a.y"})}, dimensions={"n": 2})
+        checked_graph(
+            {"a": BlockUse(Source), "b": BlockUse(Reader, {}, {"u": "a.y"})}, dimensions={"n": 2}
+        )
     )
     a, b = bound.blocks["a"], bound.blocks["b"]
     assert np.shares_memory(a.y.value, b.u.value)
@@ -82,7 +84,7 @@ def test_a_wired_input_is_a_read_only_view_of_its_source() -> None:
 
 
 def test_an_unwired_input_reads_its_default_from_the_bus() -> None:
-    bound = BoundGraph(checked_graph({"b": Use(Reader)}))
+    bound = BoundGraph(checked_graph({"b": BlockUse(Reader)}))
     bound.blocks["b"].step()
     assert bound.blocks["b"].y.value.tolist() == [1.5, -2.0]
     assert bound.memory.bus.field("b.u.value").tolist() == [1.5, -2.0]
@@ -97,30 +99,33 @@ def test_defaults_of_wrong_name_or_shape_are_errors() -> None:
         u = Input(Vector, default={"value": [1.0, 2.0, 3.0]}, text="read")
 
     with pytest.raises(DeclarationError, match=r"default of b.u: Vector has no field 'values'"):
-        BoundGraph(checked_graph({"b": Use(Misnamed)}))
+        BoundGraph(checked_graph({"b": BlockUse(Misnamed)}))
     with pytest.raises(
         DeclarationError, match=r"default of b.u.value has shape \(3,\), expected \(2,\)"
     ):
-        BoundGraph(checked_graph({"b": Use(Misshaped)}))
+        BoundGraph(checked_graph({"b": BlockUse(Misshaped)}))
 
 
 def test_state_has_dimensions_of_its_own() -> None:
-    bound = BoundGraph(checked_graph({"m": Use(Modeller)}, dimensions={"n": 1}))
+    bound = BoundGraph(checked_graph({"m": BlockUse(Modeller)}, dimensions={"n": 1}))
     assert bound.memory.state.layout.slots["m.memory.many"].shape == (5,)
 
 
 def test_a_failing_setup_names_the_block() -> None:
     with pytest.raises(RunError) as caught:
-        BoundGraph(checked_graph({"d": Use(Cramped, {"value": [1.0]})}))
+        BoundGraph(checked_graph({"d": BlockUse(Cramped, {"value": [1.0]})}))
     assert str(caught.value) == "block 'd' failed in setup: no room for the model"
     assert caught.value.block == "d"
 
 
 def test_a_snapshot_of_another_graph_is_refused() -> None:
-    one = BoundGraph(checked_graph({"c": Use(Constant, {"value": [1.0]})}))
+    one = BoundGraph(checked_graph({"c": BlockUse(Constant, {"value": [1.0]})}))
     other = BoundGraph(
         checked_graph(
-            {"c": Use(Constant, {"value": [1.0] * 9}), "g": Use(Gain, {"n": 9}, {"u": "c.y"})}
+            {
+                "c": BlockUse(Constant, {"value": [1.0] * 9}),
+                "g": BlockUse(Gain, {"n": 9}, {"u": "c.y"}),
+            }
         )
     )
     with pytest.raises(ValueError, match="the snapshot has 64 bytes where this graph has 192"):

@@ -11,7 +11,7 @@ from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.pacing import Paced
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 MS = 1_000_000
 
@@ -65,7 +65,7 @@ def paced(clock: ClockSpec, slow: Sequence[int], takes: float, ticks: int = 8) -
     TIME = PollingTime()
     Worker.begun = []
     graph = checked_graph(
-        {"a": Use(Worker), "b": Use(Worker, {"slow_ticks": list(slow), "takes": takes})},
+        {"a": BlockUse(Worker), "b": BlockUse(Worker, {"slow_ticks": list(slow), "takes": takes})},
         rate=500.0,
         ticks=ticks,
         clock=clock,
@@ -150,7 +150,7 @@ class Driver(Block):
 
 def test_a_robot_drives_the_clock() -> None:
     Driver.waits = 0
-    graph = checked_graph({"robot": Use(Driver)}, clock=ClockSpec("robot"))
+    graph = checked_graph({"robot": BlockUse(Driver)}, clock=ClockSpec("robot"))
     result = run(graph, ticks=5)
     assert result.signal("robot.y.value")[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert (result.overruns, result.skipped_periods) == (1, 2)
@@ -158,14 +158,14 @@ def test_a_robot_drives_the_clock() -> None:
 
 def test_a_failing_wait_names_the_robot() -> None:
     Driver.waits = 0
-    result = run(checked_graph({"robot": Use(Driver)}, clock=ClockSpec("robot")))
+    result = run(checked_graph({"robot": BlockUse(Driver)}, clock=ClockSpec("robot")))
     assert result.reason == "block 'robot' failed at tick 6 (0.012 s): OSError: the bus is gone"
 
 
 def test_the_robot_clock_needs_one_driver() -> None:
     for blocks, found in (
-        ({"a": Use(Worker)}, "none"),
-        ({"a": Use(Driver), "b": Use(Driver)}, "a, b"),
+        ({"a": BlockUse(Worker)}, "none"),
+        ({"a": BlockUse(Driver), "b": BlockUse(Driver)}, "a, b"),
     ):
         with pytest.raises(AloftError) as caught:
             Executor(checked_graph(blocks, clock=ClockSpec("robot")))
@@ -175,7 +175,7 @@ def test_the_robot_clock_needs_one_driver() -> None:
 
 
 def test_wall_time_is_kept_to() -> None:
-    graph = checked_graph({"a": Use(Worker)}, rate=1000.0, ticks=101, clock=ClockSpec("paced"))
+    graph = checked_graph({"a": BlockUse(Worker)}, rate=1000.0, ticks=101, clock=ClockSpec("paced"))
     results = [run(graph) for _ in range(5)]
     assert all(result.wall_time_s >= 0.1 for result in results)
     # not later either, unless the machine had no time for it, which shows as skipped periods

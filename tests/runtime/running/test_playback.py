@@ -17,7 +17,7 @@ from aloft.runtime.running.playback import (
     playback_block_type,
     playback_graph,
 )
-from aloft.runtime.testing import Use, checked_graph
+from aloft.runtime.testing import BlockUse, checked_graph
 
 
 class Fragile(Block):
@@ -35,9 +35,9 @@ class Fragile(Block):
 
 GRAPH = checked_graph(
     {
-        "robot": Use(Fragile),
-        "double": Use(Gain, {"gain": 2.0}, {"u": "robot.y"}),
-        "late": Use(UnitDelay, {}, {"u": "double.y"}, period_ticks=2),
+        "robot": BlockUse(Fragile),
+        "double": BlockUse(Gain, {"gain": 2.0}, {"u": "robot.y"}),
+        "late": BlockUse(UnitDelay, {}, {"u": "double.y"}, period_ticks=2),
     },
     dimensions={"n": 1},
 )

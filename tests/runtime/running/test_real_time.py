@@ -14,7 +14,7 @@ from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running import real_time
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.real_time import RealTimeError, RealTimeOptions
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class Ticks(Block):
@@ -40,7 +40,7 @@ def test_the_processor_is_the_runs_own_only_while_it_ticks() -> None:
         def step(self) -> None:
             seen.append(os.sched_getaffinity(0))
 
-    run(checked_graph({"w": Use(Witness)}, ticks=1), real_time=RealTimeOptions(cpu=cpu))
+    run(checked_graph({"w": BlockUse(Witness)}, ticks=1), real_time=RealTimeOptions(cpu=cpu))
     assert seen == [before, {cpu}]
     assert os.sched_getaffinity(0) == before
 
@@ -76,7 +76,7 @@ def test_what_the_system_refuses_is_told_before_anything_moves(
         raise PermissionError
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    graph = checked_graph({"w": Use(Ticks)}, ticks=1)
+    graph = checked_graph({"w": BlockUse(Ticks)}, ticks=1)
     with pytest.raises(RealTimeError, match=r"--priority 50: .* `aloft doctor` says how"):
         run(graph, real_time=RealTimeOptions(priority=50))
 

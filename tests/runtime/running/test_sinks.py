@@ -9,12 +9,12 @@ from aloft.blocks.general.sine_wave import SineWave
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.sinks import MemoryLog, RunHash
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 @pytest.fixture
 def bound() -> BoundGraph:
-    return BoundGraph(checked_graph({"a": Use(SineWave, {"n": 3})}))
+    return BoundGraph(checked_graph({"a": BlockUse(SineWave, {"n": 3})}))
 
 
 @pytest.mark.parametrize("expected", [None, 1, 1000, 3000])

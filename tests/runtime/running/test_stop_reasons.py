@@ -4,7 +4,7 @@ from aloft.blocks.general.vector import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running.executor import run
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
 class EmptyTank(Block):
@@ -32,6 +32,6 @@ class Judge(EmptyTank):
 
 
 def test_a_score_does_not_hide_why_another_block_ended_the_run() -> None:
-    both = checked_graph({"stopper": Use(EmptyTank), "judge": Use(Judge)})
+    both = checked_graph({"stopper": BlockUse(EmptyTank), "judge": BlockUse(Judge)})
     assert run(both, 10).reason == "it flew; block 'stopper' ended the run: the tank is empty"
-    assert run(checked_graph({"judge": Use(Judge)}), 10).reason == "it flew"
+    assert run(checked_graph({"judge": BlockUse(Judge)}), 10).reason == "it flew"

@@ -26,7 +26,7 @@ from aloft.runtime.running.executor import run
 from aloft.runtime.running.life_cycle import LifeCycle
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.running.watchdog import Interrupts
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 LIMIT = 0.4
 """Seconds; a hanging call here ends by itself after 60 s, so that a failure does not hang."""
@@ -74,7 +74,7 @@ def stubborn() -> None:
 
 def hanging(work: Callable[[], None], **attributes: object) -> tuple[type[Robot], RunResult]:
     kind = type("Hanging", (Robot,), {"work": staticmethod(work), "rests": 0, **attributes})
-    graph = checked_graph({"arm.robot": Use(kind), "other": Use(Robot)})
+    graph = checked_graph({"arm.robot": BlockUse(kind), "other": BlockUse(Robot)})
     return kind, run(graph, 10, clock=ClockSpec(hangs_after=LIMIT))
 
 
@@ -127,7 +127,7 @@ def test_a_block_that_waits_for_others_has_a_limit_of_its_own() -> None:
 
 def test_many_slow_calls_in_a_tick_do_not_hang() -> None:
     slow = type("Slow", (Robot,), {"work": staticmethod(lambda: time.sleep(0.6 * LIMIT))})
-    graph = checked_graph({f"robot_{i}": Use(slow) for i in range(4)})
+    graph = checked_graph({f"robot_{i}": BlockUse(slow) for i in range(4)})
     assert run(graph, 5, clock=ClockSpec(hangs_after=LIMIT)).exit_code is ExitCode.SUCCESS
 
 

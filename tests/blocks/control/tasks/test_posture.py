@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from aloft.blocks.control.tasks.posture import (
-    Feedback,
-    JointTargets,
     Posture,
-    PostureChoice,
+    PostureJoints,
+    PostureParameters,
     chosen_joints,
-    posture_rows,
 )
+from aloft.blocks.control.tasks.task import RowGains, TaskError, TaskJacobian, feedback_rows
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.mathematics.whole_body_qp import TaskRows
 from aloft.robots.description import find_robot
@@ -23,35 +24,43 @@ BRUCE = find_robot("bruce")
 RANDOM = np.random.default_rng(7)
 
 
-def test_a_joint_accelerates_by_feedforward_and_feedback():
-    joints = np.array([1, 4])
+def test_a_joint_accelerates_by_feedforward_and_feedback_and_a_held_one_stands_still():
+    index = np.array([1, 4, 2])
     position, velocity = RANDOM.normal(size=5), RANDOM.normal(size=11)
-    reference = JointTargets(*RANDOM.normal(size=(3, 2)))
-    rows = TaskRows(np.ones((2, 11)), np.zeros(2), np.zeros(2))
-    gains = Feedback(np.array([2.0, 3.0]), 100.0, 20.0)
-    posture_rows(joints, position, velocity, reference, gains, rows)
-    assert (rows.jacobian == np.eye(11)[[7, 10]]).all()
-    assert rows.desired == pytest.approx(
-        reference.acceleration
-        + 100.0 * (reference.position - position[joints])
-        + 20.0 * (reference.velocity - velocity[[7, 10]])
+    reference = RANDOM.normal(size=(3, 5))
+    target = SimpleNamespace(
+        joint_position=reference[0], joint_velocity=reference[1], joint_acceleration=reference[2]
     )
-    assert rows.weights.tolist() == [2.0, 3.0]
+    terms, joints = SimpleNamespace(velocity=velocity), SimpleNamespace(position=position)
+    chosen = PostureJoints(index, np.array([False, False, True]), np.array([7.0, 8.0, 0.4]))
+    rows = TaskRows(np.ones((3, 11)), np.zeros(3), np.zeros(3))
+    gains = RowGains(np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
+    e, j = TaskError(*np.zeros((3, 3))), TaskJacobian(rows.jacobian, np.zeros(3))
+    Posture.error(terms, joints, target, chosen, e)
+    Posture.jacobian(joints, chosen, j)
+    feedback_rows(e, j.drift, gains, rows)
+    assert (rows.jacobian == np.eye(11)[[7, 10, 8]]).all()
+    angle, rate, feedforward = reference[:, index]
+    angle[2], rate[2], feedforward[2] = 0.4, 0.0, 0.0
+    assert rows.desired == pytest.approx(
+        feedforward + 100.0 * (angle - position[index]) + 20.0 * (rate - velocity[[7, 10, 8]])
+    )
+    assert rows.weights.tolist() == [2.0, 3.0, 4.0]
 
 
 def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
-    assert chosen_joints(BRUCE, PostureChoice()) == []
+    assert chosen_joints(BRUCE, PostureParameters()) == []
     held = BRUCE.changed(held={"left_hip_yaw": 0.1})
-    assert chosen_joints(held, PostureChoice()) == [5]
+    assert chosen_joints(held, PostureParameters()) == [5]
 
 
 def test_a_pattern_that_matches_no_joint_is_a_misfit():
     entry = {"task": "Posture", "gains": {"joints": ["*_ankle", "tail"]}}
     with pytest.raises(BlockError, match="task Posture: no joint of bruce is called 'tail'; there"):
         BlockBench(WholeBodyController, {"tasks": [entry]}, robot=BRUCE)
-    assert not list(Posture.misfits(BRUCE, PostureChoice(posture_weight={"*_knee": 1.0})))
+    assert not list(Posture.misfits(PostureParameters(posture_weight={"*_knee": 1.0}), BRUCE))
 
 
 def test_patterns_choose_joints_in_the_robots_order():
-    choice = PostureChoice(joints=["left_knee", "*_ankle"])
+    choice = PostureParameters(joints=["left_knee", "*_ankle"])
     assert chosen_joints(BRUCE, choice) == [4, 8, 9]

@@ -1,1 +1,0 @@
-"""Whether all methods for the whole-body program find the same minimum."""

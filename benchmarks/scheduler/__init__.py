@@ -1,1 +1,0 @@
-"""The cost of the runtime beside a hand-written loop and other frameworks."""

@@ -1,0 +1,319 @@
+"""Puts together wires that select fields and elements or join several sources.
+
+Each becomes a wire from a block that loading inserts beside the reader, called ``reader/input~parts``,
+so that all later checks see wires from output to input only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....robots.description import RobotDescription
+from ...language.parameters import Parameters
+from ...language.quantities import quantity_of
+from ...language.signals import Field, Signal
+from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
+from ..problems import Code, Problems, listing, nearest
+from ..reading.nodes import Entry, MapNode, text_of
+from ..reading.selection import Selection, runs, select
+from .block_check import BlockDraft
+from .inserted import GatherPiece, gather_block_type, part_signal, read_values
+from .wire_check import WireCheck
+
+JOINTS = "n_joints"
+"""The dimension whose elements have the names of the robot's joints."""
+
+
+def resolve_composite_wires(
+    graph: FlatGraph,
+    drafts: Mapping[str, BlockDraft],
+    robot: RobotDescription | None,
+    problems: Problems,
+) -> dict[str, BlockDraft]:
+    """The drafts with an inserted block in front of every input that is put together."""
+    found: dict[str, BlockDraft] = {}
+    check = WireCheck(graph, drafts, problems)
+    names = tuple(joint.name for joint in robot.joints) if robot is not None else ()
+    for path, draft in drafts.items():
+        wires = dict(draft.flat.wires)
+        excused = list(draft.flat.excused)
+        for name, wire in draft.flat.wires.items():
+            port = draft.inputs.get(name)
+            if not wire.parts or port is None:
+                continue
+            composer = _Composer(draft, name, wire, drafts, check, names, problems)
+            made = composer.compose()
+            if isinstance(made, BlockDraft):
+                found[made.flat.path] = made
+                source = f"{made.flat.path}.y"
+                delay = (wire.delay, wire.initial)
+                wires[name] = FlatWire(source, wire.where, *delay, shown=composer.wire_text)
+            elif isinstance(made, FlatWire):
+                wires[name] = made
+            else:
+                del wires[name]
+                excused.append(name)
+        if wires != dict(draft.flat.wires):
+            draft.flat = replace(draft.flat, wires=wires, excused=tuple(excused))
+        found[path] = draft
+    return found
+
+
+@dataclass
+class _Composer:
+    reader: BlockDraft
+    name: str
+    wire: FlatWire
+    drafts: Mapping[str, BlockDraft]
+    check: WireCheck
+    joints: tuple[str, ...]
+    problems: Problems
+
+    def __post_init__(self) -> None:
+        self.at = f"{self.reader.flat.path}.{self.name}"
+        self.signal: type[Signal] = self.reader.inputs[self.name].signal
+        self.inputs: dict[str, type[Signal]] = {}
+        self.wires: dict[str, FlatWire] = {}
+        self.pieces: list[GatherPiece] = []
+        self.fields: dict[str, tuple[tuple[int, ...], str]] = {}
+        self.wire_text = wire_text(replace(self.wire, delay=0, truth=False).plain())
+
+    def compose(self) -> BlockDraft | FlatWire | None:
+        """The inserted block, or a constant, or ``None`` after a problem."""
+        parts = self._by_field()
+        if parts is None:
+            return None
+        items = [item for part in parts.values() for item in part.items]
+        if all(item.literal is not None for item in items) and not any(
+            part.is_list for part in parts.values()
+        ):
+            return self._constant(parts)
+        before = len(self.problems)
+        for name, part in parts.items():
+            self._part(name, part)
+        if len(self.problems) > before or len(self.fields) < len(parts):
+            return None
+        return self._draft()
+
+    def _by_field(self) -> dict[str, WirePart] | None:
+        """The parts by the reader's fields."""
+        fields = self.signal.fields
+        found: dict[str, WirePart] = {}
+        for part in self.wire.parts:
+            name = part.field
+            if not name:
+                if len(fields) > 1:
+                    example = ", ".join(f"{f}: ..." for f in list(fields)[:2])
+                    self._report(
+                        f"{self.at} has several fields, and one source is given for it",
+                        part.where,
+                        expected=f"{{{example}}}, with a source for each of {listing(fields)}",
+                        found=text_of(part.plain()),
+                        fix=f"{self.name}: {{{next(iter(fields))}: {text_of(part.plain())}, ...}}",
+                    )
+                    return None
+                name = next(iter(fields))
+            if name not in fields:
+                similar = nearest(name, fields)
+                self._report(
+                    f"{self.signal.__name__} has no field {name!r}",
+                    part.where,
+                    expected=listing(fields),
+                    found=name,
+                    nearest=similar,
+                    fix=f"{similar[0]}: {text_of(part.plain())}" if similar else "",
+                )
+                return None
+            found[name] = part
+        missing = [name for name in fields if name not in found]
+        if missing:
+            self._report(
+                f"{self.at} is given no {listing(missing)}",
+                self.wire.where,
+                expected=listing(fields),
+                found=listing(found),
+                fix=f"{missing[0]}: block.port.field",
+            )
+            return None
+        return found
+
+    def _constant(self, parts: Mapping[str, WirePart]) -> FlatWire | None:
+        """The wire of numbers alone."""
+        if self.wire.delay:
+            self._report(
+                f"the wire to {self.at} delays a constant", self.wire.where, fix="remove 'delay'"
+            )
+            return None
+        entries = tuple(
+            Entry(name, part.where, part.items[0].literal)  # type: ignore[arg-type]  # a constant
+            for name, part in parts.items()
+        )
+        return FlatWire("", self.wire.where, constant=MapNode(entries, self.wire.where))
+
+    def _part(self, name: str, part: WirePart) -> None:
+        """Add the pieces of one of the reader's fields."""
+        field = self.signal.fields[name]
+        shape: tuple[int, ...] = ()
+        start = 0
+        types: dict[str, WireElement] = {}
+        for item in part.items:
+            if item.literal is not None:
+                values = self._numbers(name, field, item)
+                if values is None:
+                    return
+                self.pieces.append(GatherPiece(name, numbers=values, start=start))
+                shape, count = (len(values),), len(values)
+            else:
+                taken = self._source(item)
+                if taken is None:
+                    return
+                port, source, places = taken
+                types.setdefault(source.dtype_name, item)
+                copies = tuple((a, start + b, n) for a, b, n in runs(places))
+                self.pieces.append(GatherPiece(name, port, source.name, copies))
+                shape, count = places.shape, int(places.size)
+            start += count
+        if len(types) > 1:
+            (first, a), (second, b) = list(types.items())[:2]
+            self._report(
+                f"{wire_text(a.plain())} is {first} and {wire_text(b.plain())} is {second}",
+                part.where,
+                expected=field.dtype_name,
+                found=listing(types),
+            )
+            return
+        wanted = self.reader.shape(field)
+        if part.is_list or (shape == () and wanted == (1,)) or (shape == (1,) and wanted == ()):
+            shape = wanted if wanted == () and start == 1 else (start,)
+        self.fields[name] = (shape, next(iter(types), field.dtype_name))
+
+    def _numbers(self, name: str, field: Field, item: WireElement) -> tuple[float, ...] | None:
+        """Numbers between sources, as those of a constant."""
+        assert item.literal is not None
+        alone = type("One", (Signal,), {name: _of_one(field)})
+        entry = Entry(name, item.where, item.literal)
+        node = MapNode((entry,), item.where)
+        before = len(self.problems)
+        values = read_values(node, alone, self.reader, self.at, self.problems)
+        if len(self.problems) > before:
+            return None
+        return tuple(np.atleast_1d(np.asarray(values[name], np.float64)).tolist())
+
+    def _source(self, item: WireElement) -> tuple[str, Field, NDArray[np.int64]] | None:
+        """The inserted block's input for a source, the field, and the places selected in it."""
+        assert item.wire is not None
+        wire = replace(item.wire, where=item.where, shown=wire_text(item.plain()))
+        ends = self.check.source(self.at, wire, self.reader, None)
+        if ends is None:
+            return None
+        draft, output = ends
+        fields = output.signal.fields
+        name = item.selection.field or (next(iter(fields)) if len(fields) == 1 else "")
+        if not name and len(self.signal.fields) == 1 and next(iter(self.signal.fields)) in fields:
+            name = next(iter(self.signal.fields))
+        if name not in fields:
+            self._unknown_field(item, name, fields, draft)
+            return None
+        field = fields[name]
+        shape = draft.shape(field)
+        if shape is None:
+            return None  # a dimension is not known, which is reported
+        names = self.joints if field.shape and field.shape[0] == JOINTS else ()
+        try:
+            places = select(Selection("", item.selection.indices), shape, names)
+        except ValueError as error:
+            self._report(
+                f"{wire_text(item.plain())}: {error}",
+                item.where,
+                other=wire.source,
+                other_where=draft.flat.where,
+                expected=f"elements of {field.describe()} = {list(shape)}",
+            )
+            return None
+        port = f"u{len(self.inputs)}"
+        self.inputs[port] = part_signal("Selected", {name: (shape, field.dtype_name)})
+        self.wires[port] = wire
+        return port, field, places
+
+    def _unknown_field(
+        self, item: WireElement, name: str, fields: Mapping[str, Field], draft: BlockDraft
+    ) -> None:
+        assert item.wire is not None
+        source = item.wire.source
+        similar = nearest(name, fields) or (tuple(fields)[:1] if not name else ())
+        indices = "".join(f"[{index}]" for index in item.selection.indices)
+        self._report(
+            f"{source} has no field {name!r}"
+            if name
+            else f"{source} has several fields, and none is selected",
+            item.where,
+            other=source,
+            other_where=draft.flat.where,
+            expected=listing(f"{source}.{each}" for each in fields),
+            found=wire_text(item.plain()),
+            nearest=tuple(f"{source}.{each}" for each in similar),
+            fix=f"{self.name}: {source}.{similar[0]}{indices}" if similar else "",
+        )
+
+    def _draft(self) -> BlockDraft | None:
+        """The inserted block: in the ticks of its reader, or of its sources where it is delayed."""
+        reader = self.reader
+        clock = (reader.period_ticks, reader.offset_ticks)
+        if self.wire.delay:
+            clocks = [
+                (source.period_ticks, source.offset_ticks)
+                for source in (self.drafts[wire.source_block] for wire in self.wires.values())
+            ]
+            if any(a != b for a, b in pairwise(clocks)):
+                self._report(
+                    f"the wire to {self.at} is delayed by periods of its sources, which differ",
+                    self.wire.where,
+                    expected="sources of one rate and offset",
+                    fix="delay each source by a block blocks.Delay",
+                )
+                return None
+            clock = clocks[0]
+        path = f"{reader.flat.path}/{self.name}~parts"
+        flat = FlatBlock(
+            path,
+            self.wire.where,
+            "",
+            self.wire.where,
+            reader.flat.folder,
+            MapNode((), self.wire.where),
+            self.wires,
+        )
+        wanted = {name: quantity_of(self.signal.fields[name]) for name in self.fields}
+        block_type = gather_block_type(
+            tuple(self.pieces),
+            self.inputs,
+            part_signal(self.signal.__name__, self.fields),
+            {
+                name: q if q is not None and q.unit is not None else None
+                for name, q in wanted.items()
+            },
+            wire_text=self.wire_text,
+            reads_truth=reader.inputs[self.name].reads_truth,
+        )
+        draft = BlockDraft(flat, block_type, Parameters(), {}, complete=True, stands_for=self.at)
+        draft.period_ticks, draft.offset_ticks = clock
+        return draft
+
+    def _report(self, message: str, where: object, **details: object) -> None:
+        self.problems.add(Code.SELECTION, message, where, **{"at": self.at, **details})  # type: ignore[arg-type]  # texts
+
+
+def wire_text(plain: object) -> str:
+    """What a graph says, in one line; the text of one source without the quotes of YAML."""
+    return plain if isinstance(plain, str) else text_of(plain)
+
+
+def _of_one(field: Field) -> Field:
+    """A field like this one for a single number."""
+    unit = None if field.unit is None else field.unit.text
+    return Field((), unit=unit, dtype=field.dtype_name, carried=field.carried)

@@ -1,0 +1,270 @@
+"""Carries units and frames from block to block, through those that take any."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+
+from ...language.block import Block
+from ...language.quantities import UNCHECKED, Given, Quantity, quantity_of
+from ...language.unit_algebra import over
+from ..problems import Code, Problems
+from .block_check import BlockDraft
+from .inserted import own_unit
+
+
+def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
+    """Fill in the quantities of all drafts, and report inputs that do not go together.
+
+    A block is asked when all its wired inputs are known. Where blocks wait for each other in a
+    ring, the first that can answer with what is known does; where none can, the first output that
+    is missing is taken for a plain number. Every block is asked again at the end, so that a ring
+    whose quantities contradict each other is found.
+    """
+    inference = _QuantityInference(drafts)
+    inference.run()
+    for draft in drafts.values():
+        if draft.block_type is not None and draft.params is not None:
+            _check(draft, inference.given(draft), problems)
+
+
+class _QuantityInference:
+    def __init__(self, drafts: Mapping[str, BlockDraft]) -> None:
+        self.drafts = drafts
+        self.readers: dict[str, list[str]] = {}
+        for path, draft in drafts.items():
+            for wire in draft.flat.wires.values():
+                self.readers.setdefault(wire.source_block, []).append(path)
+            for name, output in draft.outputs.items():
+                for field_name, field in output.signal.fields.items():
+                    declared = quantity_of(field)
+                    if declared is not None:
+                        draft.quantities[f"{name}.{field_name}"] = declared
+        self.waiting = {path: None for path, draft in drafts.items() if self._missing(draft)}
+        self.unanswered: dict[str, None] = {}
+        """Blocks that had no answer to what has arrived so far."""
+
+    def run(self) -> None:
+        """Ask all blocks until every output is known."""
+        self._settle(self.waiting)
+        while self.waiting:
+            asked = (path for path in self.waiting if path not in self.unanswered)
+            changed = next((path for path in asked if self._ask(path)), None)
+            if changed is None:
+                changed = next(iter(self.waiting))
+                draft = self.drafts[changed]
+                draft.quantities[next(self._missing(draft))] = Quantity()
+                self._tell_readers(changed)
+            self._settle([changed, *self.readers.get(changed, ())])
+
+    def _settle(self, paths: Mapping[str, None] | list[str]) -> None:
+        """Ask these blocks, and those behind them, wherever all inputs are known."""
+        queue = deque(paths)
+        while queue:
+            path = queue.popleft()
+            if path not in self.waiting:
+                continue
+            draft = self.drafts[path]
+            if next(self._missing(draft), None) is None:
+                del self.waiting[path]
+                queue.extend(self.readers.get(path, ()))
+            elif self._complete(draft) and self._ask(path):
+                queue.extend([path, *self.readers.get(path, ())])
+
+    def _ask(self, path: str) -> bool:
+        """Whether the block could say any further quantity."""
+        draft = self.drafts[path]
+        answers = inferred_outputs(draft, self.given(draft)) or {}
+        found = False
+        for name in list(self._missing(draft)):
+            if answers.get(name) is not None:
+                draft.quantities[name] = answers[name]  # type: ignore[assignment]  # answers were checked above
+                found = True
+        if found:
+            self._tell_readers(path)
+        else:
+            self.unanswered[path] = None
+        return found
+
+    def _tell_readers(self, path: str) -> None:
+        """Something new arrives at the blocks that read this one: they may be asked again."""
+        for reader in self.readers.get(path, ()):
+            self.unanswered.pop(reader, None)
+
+    def _missing(self, draft: BlockDraft) -> Iterator[str]:
+        """The output fields that are not known yet."""
+        for name, output in draft.outputs.items():
+            for field_name in output.signal.fields:
+                if f"{name}.{field_name}" not in draft.quantities:
+                    yield f"{name}.{field_name}"
+
+    def _complete(self, draft: BlockDraft) -> bool:
+        """Whether the quantities of all wired inputs are known."""
+        for name, wire in draft.flat.wires.items():
+            port = draft.inputs.get(name)
+            source = self.drafts.get(wire.source_block)
+            if port is None or source is None or wire.source_port not in source.outputs:
+                continue
+            fields = source.outputs[wire.source_port].signal.fields
+            for field_name in port.signal.fields:
+                if (
+                    field_name in fields
+                    and quantity_at_input(self.drafts, draft, name, field_name) is None
+                ):
+                    return False
+        return True
+
+    def given(self, draft: BlockDraft) -> Given:
+        """The quantities at a block's inputs."""
+        found = {}
+        for name, port in draft.inputs.items():
+            for field_name in port.signal.fields:
+                quantity = quantity_at_input(self.drafts, draft, name, field_name)
+                if quantity is not None:
+                    found[f"{name}.{field_name}"] = quantity
+        return Given(found)
+
+
+def quantity_at_input(
+    drafts: Mapping[str, BlockDraft], draft: BlockDraft, name: str, field_name: str
+) -> Quantity | None:
+    """What arrives at an input's field; ``None`` where nothing is wired, or it is not known yet."""
+    wire = draft.flat.wires.get(name)
+    if wire is None:
+        return None
+    if wire.constant is not None:
+        return constant_quantity(draft, name, field_name)
+    source = drafts.get(wire.source_block)
+    return source.quantities.get(f"{wire.source_port}.{field_name}") if source else None
+
+
+def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity:
+    """The quantity of a constant: that of the input's field; a plain number if it takes any."""
+    field = draft.inputs[name].signal.fields[field_name]
+    declared = quantity_of(field)
+    node = draft.flat.wires[name].constant
+    entry = node.get(field_name) if node is not None else None
+    if declared is not None or entry is None:
+        return declared or UNCHECKED  # what is not named is zero, which is zero in every unit
+    return Quantity(own_unit(entry.value))
+
+
+def inferred_quantities(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> dict[str, Quantity]:
+    """What a block's carried fields are in this graph, by ``port.field``."""
+    found = {}
+    for name, output in draft.outputs.items():
+        for field_name, field in output.signal.fields.items():
+            if field.carried:
+                found[f"{name}.{field_name}"] = draft.quantity(name, field_name)
+    for name, port in draft.inputs.items():
+        for field_name, field in port.signal.fields.items():
+            arrives = quantity_at_input(drafts, draft, name, field_name) if field.carried else None
+            if arrives is not None:
+                found[f"{name}.{field_name}"] = arrives
+    return found
+
+
+def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
+    """A text for every wire whose reader has a unit and whose source does not say its own."""
+    for path, draft in drafts.items():
+        for name, wire in draft.flat.wires.items():
+            if wire.constant is not None or name not in draft.inputs or draft.stands_for:
+                continue
+            for field_name, field in draft.inputs[name].signal.fields.items():
+                arrives = quantity_at_input(drafts, draft, name, field_name)
+                if field.unit is not None and arrives is not None and arrives.unit is None:
+                    yield (
+                        f"{wire.shown or wire.source} does not say its unit, and {path}.{name} reads "
+                        f"{field_name} in {Quantity(field.unit)}"
+                    )
+
+
+def inferred_outputs(draft: BlockDraft, given: Given) -> dict[str, Quantity | None] | None:
+    """What the block says about its carried outputs, by ``port.field``; ``None`` if it fails."""
+    block_type = draft.block_type
+    carried = [
+        (name, field_name)
+        for name, output in draft.outputs.items()
+        for field_name, field in output.signal.fields.items()
+        if field.carried
+    ]
+    if block_type is None or draft.params is None:
+        return {f"{name}.{field_name}": UNCHECKED for name, field_name in carried}
+    answers_by_name = {}
+    silent = block_type.carried.__func__ is Block.carried.__func__  # type: ignore[attr-defined]  # a class method
+    if not silent:
+        try:
+            answers_by_name = dict(block_type.carried(draft.params, given))
+        except Exception:  # noqa: BLE001  wrong parameters, which are reported; or a user's mistake
+            silent = True
+    return {
+        f"{name}.{field_name}": UNCHECKED
+        if silent
+        else answers_by_name.get(f"{name}.{field_name}", answers_by_name.get(name))
+        for name, field_name in carried
+    }
+
+
+def _check(draft: BlockDraft, given: Given, problems: Problems) -> None:
+    """Report where a block's inputs disagree, or an output contradicts what a ring said before."""
+    flat = draft.flat
+    answers = inferred_outputs(draft, given) or {}
+    for item in given.disagreements:
+        name = item.port.partition(".")[0]
+        wire = flat.wires.get(name)
+        other = item.other.partition(".")[0]
+        reason = item.reason or f"{other} and {name} must be the same quantity"
+        differ = item.expected is None or _units_differ(item.expected, item.found)
+        reader = f"{flat.path}.{name}"
+        if draft.stands_for and wire is not None:
+            reader = wire.shown
+        problems.add(
+            Code.UNIT if differ else Code.FRAME,
+            f"{reader} is in {_named(item.found)}: {reason}",
+            wire.where if wire else flat.where,
+            at=draft.stands_for or reader,
+            other=f"{flat.path}.{other}" if other else "",
+            other_where=flat.wires[other].where if other in flat.wires else None,
+            expected=_named(item.expected) if item.expected else "",
+            found=_named(item.found),
+            fix=_conversion(item.found, item.expected) if item.expected else "",
+        )
+    for name, answer in answers.items():
+        known = draft.quantities.get(name)
+        if answer is None or known is None or answer.agrees(known):
+            continue
+        fix = ""
+        if answer.unit is not None and known.unit is not None:
+            fix = f"a gain with unit: {over(known.unit, answer.unit)} in the ring"
+        problems.add(
+            Code.UNIT if _units_differ(known, answer) else Code.FRAME,
+            f"{flat.path}.{name.partition('.')[0]} is in a ring of blocks that makes "
+            f"{_named(answer)} of {_named(known)}",
+            flat.where,
+            at=f"{flat.path}.{name}",
+            expected=_named(known),
+            found=_named(answer),
+            fix=fix,
+        )
+
+
+def _units_differ(a: Quantity, b: Quantity) -> bool:
+    return a.unit is not None and b.unit is not None and not a.unit.matches(b.unit)
+
+
+def _named(quantity: Quantity) -> str:
+    """The quantity in words that also name a plain number."""
+    if quantity.unit is not None and str(quantity.unit) == "1":
+        return f"plain numbers in {quantity.frame}" if quantity.frame else "plain numbers"
+    return str(quantity)
+
+
+def _conversion(found: Quantity, expected: Quantity) -> str:
+    if found.unit is None or expected.unit is None or found.unit.matches(expected.unit):
+        return f"turn it into {expected.frame} with blocks.RotateVector" if expected.frame else ""
+    if found.unit.same_dimension(expected.unit):
+        factor = found.unit.factor_to(expected.unit)
+        unit = over(expected.unit, found.unit)
+        return f"blocks.Gain with {{gain: {factor:.9g}, unit: {unit}}} between"
+    unit = over(expected.unit, found.unit)
+    return f"where that is meant, a gain of that unit: blocks.Gain with {{unit: {unit}}} between"
