@@ -65,4 +65,4 @@ OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -
     tests/blocks/general/test_pid.py tests/blocks/general/test_transfer_function.py \
     tests/blocks/control tests/blocks/jumping tests/test_kernels_compile.py tests/mathematics/compiling \
     tests/studies/batch/test_jobs.py tests/planner/solving \
-    tests/logs/file tests/logs/recording/test_finished_run.py tests/cli/test_view.py tests/cli/test_run.py
+    tests/logs/file tests/logs/recording/test_writer.py tests/cli/test_view.py tests/cli/test_run.py
