@@ -84,7 +84,7 @@ def replay(
         written = write(output, opened, done) if output is not None else None
     for kept in opened.restored.said:
         print_warning(kept)
-    other = opened.what_is_other_now() if done.first is not None else []
+    other = opened.changed_dependencies() if done.first is not None else []
     verdict = describe(opened, done)
     print_differences(out, done)
     for note in done.notes:
@@ -184,7 +184,10 @@ def describe(opened: OpenedRun, done: Replayed) -> str:
     if done.notes:
         return f"equal where it can be compared, but: {done.notes[0]}"
     also = f", and the state at {states} keyframe{'s' * (states != 1)}" if states else ""
-    return f"identical: every byte of {what}{also} ({ran})"
+    cut = ""
+    if opened.file.outcome is None:
+        cut = f"; the recording was cut off after tick {int(opened.ticks[-1])}"
+    return f"identical: every byte of {what}{also} ({ran}){cut}"
 
 
 def print_differences(out: Console, done: Replayed) -> None:

@@ -199,7 +199,7 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
 
     if viewer.kind != "web":
         return
-    if wait and viewer.lives():
+    if wait and viewer.is_alive():
         keep_open(viewer)
     else:
         viewer.stop()

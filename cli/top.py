@@ -157,7 +157,7 @@ def watch(
             )
             shown = WatchedPart(observer, machine, viewer.source)
             with suppress(KeyboardInterrupt):
-                while viewer.lives() and not shown.problem:
+                while viewer.is_alive() and not shown.problem:
                     time.sleep(0.1)
             shown.close()
             if shown.problem:

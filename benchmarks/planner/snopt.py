@@ -120,6 +120,7 @@ class SnoptProgram:
     def __init__(self, problem: Problem) -> None:
         from pydrake.solvers import MathematicalProgram
 
+        self.is_out_of_time = False
         self.problem, self.callback_cpu, self.until = problem, 0.0, np.inf
         self.program: Any = MathematicalProgram()
         assembly = problem.assembly
@@ -186,6 +187,7 @@ class SnoptProgram:
         """The CPU time now. Raises ``_OutOfTime`` where the limit is past."""
         now = time.process_time()
         if now > self.until:
+            self.is_out_of_time = True
             raise _OutOfTime
         return now
 
@@ -201,10 +203,12 @@ class SnoptProgram:
             options.SetOption(solver.solver_id(), key, value)
         self.callback_cpu = 0.0
         started = time.process_time()
-        self.until = started + time_limit
+        self.until, self.is_out_of_time = started + time_limit, False
         try:
             result = solver.Solve(self.program, guess, options)
-        except _OutOfTime:
+        except (_OutOfTime, RuntimeError):  # Drake wraps what a callback raises
+            if not self.is_out_of_time:
+                raise
             cpu = time.process_time() - started
             return SnoptResult(guess, np.nan, np.inf, 34, cpu, self.callback_cpu)
         cpu = time.process_time() - started

@@ -183,7 +183,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, str]:
-    """What the bytes of a run may depend on beside versions: processor, system, BLAS and its kernel."""
+    """What the bytes of a run may depend on beside versions: processor, system, C library, BLAS."""
     import numpy as np
 
     try:
@@ -195,9 +195,22 @@ def machine() -> dict[str, str]:
         "architecture": platform.machine(),
         "processor": _processor(),
         "system": platform.system(),
+        "C library": _c_library(),
         "blas": library,
         "blas kernel": _blas_kernel(),
     }
+
+
+def _c_library() -> str:
+    """The C library, whose functions round otherwise in other versions: ``glibc 2.31``; empty where
+    that cannot be found out."""
+    found = " ".join(platform.libc_ver()).strip()
+    if found:
+        return found
+    try:
+        return "musl" if "musl" in Path("/proc/self/maps").read_text(encoding="utf-8") else ""
+    except OSError:
+        return ""
 
 
 def _blas_kernel() -> str:

@@ -29,7 +29,7 @@ from .run_stream import RunStream
 
 WAITING = 64
 """Pieces of work that may wait for the viewer."""
-PATIENCE = 10.0
+TIMEOUT = 10.0
 """Seconds without any progress, though there is work, after which the viewer is given up."""
 LAST_WAIT = 3.0
 """Seconds without progress after which the end of the run no longer waits for the viewer."""
@@ -86,8 +86,8 @@ class LiveFeed:
             self._work.put_nowait(work)
         except Full:
             self.left_out += 1
-            if time.monotonic() - self._stirred > PATIENCE:
-                self.problem = f"the viewer has taken nothing for {PATIENCE:g} s"
+            if time.monotonic() - self._stirred > TIMEOUT:
+                self.problem = f"the viewer has taken nothing for {TIMEOUT:g} s"
 
     def _run(self) -> None:
         import rerun as rr

@@ -2,7 +2,8 @@
 
 While ``jump.rrd`` is written it is called ``jump.part.rrd``, and whoever writes it holds an
 exclusive lock on it. Anybody may read it meanwhile. What was called ``jump.rrd`` before stays there
-until the new recording is complete.
+until the new recording is complete. A symbolic link stays: the file that it names is replaced. What
+is no file, such as a device or a FIFO, is refused.
 """
 
 from __future__ import annotations
@@ -144,8 +145,12 @@ def take_place(path: Path, keep: int = 0) -> Place:
     Raises:
         OSError: the file cannot be written.
     """
+    if path.is_symlink():
+        path = Path(os.path.realpath(path))
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, f"it is no file but {_kind_of(path)}", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     for number in range(1, _MOST_NAMES):
         target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
@@ -156,6 +161,13 @@ def take_place(path: Path, keep: int = 0) -> Place:
                 place.said = (text, *place.said)
             return place
     raise OSError(errno.EBUSY, f"{_MOST_NAMES} runs are being recorded under this name", str(path))
+
+
+def _kind_of(path: Path) -> str:
+    """What ``path`` is, which is no file, in words."""
+    if path.is_fifo():
+        return "a FIFO"
+    return "a socket" if path.is_socket() else "a device"
 
 
 def _take(target: Path, keep: int) -> Place | None:

@@ -119,12 +119,12 @@ class RecorderLink:
         """The process's number."""
         return self._process.pid
 
-    def lives(self) -> bool:
+    def is_alive(self) -> bool:
         """Whether the process is running."""
         return self._process.poll() is None
 
     def stalled_for(self) -> float:
-        """The seconds since the process last made progress, or since ``stirs`` was called.
+        """The seconds since the process last made progress, or since ``reset_stall_timer`` was called.
 
         It makes progress when it takes something out of the ring, and, where the system tells,
         when it reads or writes a file, as it does while it starts and while it ends.
@@ -142,7 +142,7 @@ class RecorderLink:
         except (OSError, ValueError, IndexError):
             return 0
 
-    def stirs(self) -> None:
+    def reset_stall_timer(self) -> None:
         """Restart the clock of ``stalled_for``, because the process had nothing to read until now."""
         self._since = time.monotonic()
 
@@ -167,10 +167,10 @@ class RecorderLink:
             self._input.flush()
         with suppress(BrokenPipeError):
             self._input.close()
-        self.stirs()
+        self.reset_stall_timer()
         while self._listen(0.05):
             # In this order: the process may end just now, and then ``goes_on`` says no as well.
-            if not goes_on() and self.lives():
+            if not goes_on() and self.is_alive():
                 return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
         self._output.close()
         code = self._process.wait()
@@ -357,7 +357,7 @@ class Recorder:
 
     def _wait_for_room(self, tick: int) -> bool:
         assert self.link is not None
-        self.link.stirs()
+        self.link.reset_stall_timer()
         self.waits_for_others = True
         try:
             while self._waiting_helps():
@@ -373,7 +373,7 @@ class Recorder:
         """Whether to go on waiting for the process. It warns once that the process is slow."""
         assert self.link is not None
         stalled = self.link.stalled_for()
-        if not self.link.lives() or stalled > GIVE_UP_TIME:
+        if not self.link.is_alive() or stalled > GIVE_UP_TIME:
             return False
         if stalled > STALL_TIME:
             if not self._waits:
@@ -429,7 +429,7 @@ class Recorder:
         if self.link is None:
             return self.warnings
         if self._gap is not None:
-            self.link.stirs()
+            self.link.reset_stall_timer()
             while not self._note_gap(self._gap[1]) and self._waiting_helps():
                 time.sleep(1e-3)
         self.report, problem = self.link.finish(result.to_json(), self._waiting_helps)

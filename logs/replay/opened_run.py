@@ -224,7 +224,7 @@ class OpenedRun:
         """What the graph remembered before ``tick``. Raises ``KeyError``."""
         return self.file.snapshot(tick)
 
-    def what_is_other_now(self) -> list[str]:
+    def changed_dependencies(self) -> list[str]:
         """The versions, the processor, BLAS and its kernel, and the files and plans that computed the run
         and are different here."""
         header = self.file.header

@@ -65,7 +65,7 @@ class Viewer:
         source = f"rerun%2Bhttp://{ADDRESS}:{self.port}/proxy"
         return f"http://{ADDRESS}:{self.web_port}/?url={source}&renderer=webgl"
 
-    def lives(self) -> bool:
+    def is_alive(self) -> bool:
         """Whether the viewer is running."""
         return self.process.poll() is None
 
@@ -137,14 +137,14 @@ def _wait_until_it_listens(viewer: Viewer) -> None:
         _wait_for(viewer, port, end)
     if viewer.kind == "window":
         time.sleep(0.5)  # it listens before it opens its window, which may end it
-        if not viewer.lives():
+        if not viewer.is_alive():
             raise ViewerError(f"it ended with code {viewer.process.returncode}")
 
 
 def _wait_for(viewer: Viewer, port: int, end: float) -> None:
     """Wait until the viewer listens on a port, at most until the instant ``end``."""
     while not _listens(port):
-        if not viewer.lives():
+        if not viewer.is_alive():
             raise ViewerError(f"it ended with code {viewer.process.returncode}")
         if time.monotonic() > end:
             raise ViewerError(f"it did not listen within {START_TIME:g} s")

@@ -79,7 +79,7 @@ def attempt(function: Callable[[Any], Any], job: Any) -> tuple[Any, str]:
 
 ATTEMPTS = 2
 """How often a job is tried whose process dies; if it dies twice, the job is taken for the cause."""
-PATIENCE = 10.0
+TIMEOUT = 10.0
 """How long processes may take to stop before they are killed [s]."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -200,7 +200,7 @@ def _exit_reason(worker: _Worker) -> str:
         AloftError: the process could not even start, so no other one would either.
     """
     worker.pipe.close()
-    worker.process.join(PATIENCE)
+    worker.process.join(TIMEOUT)
     code = worker.process.exitcode
     if not worker.ready and code is not None and code > 0:
         raise AloftError(
@@ -218,7 +218,7 @@ def _stop(workers: list[_Worker]) -> None:
         worker.pipe.close()
         if worker.job is not None:
             worker.process.terminate()
-    end = monotonic() + PATIENCE
+    end = monotonic() + TIMEOUT
     for worker in workers:
         worker.process.join(max(0.0, end - monotonic()))
         if worker.process.is_alive():

@@ -75,6 +75,18 @@ def test_the_same_bytes(recording: Path, call: Call, call_json: CallJson) -> Non
     assert answer["ticks"] == 50 and answer["success"]
 
 
+def test_a_recording_that_was_cut_off_is_said_to_be(recording: Path, call: Call) -> None:
+    from aloft.logs.file.messages import Content
+    from aloft.logs.file.reader import read
+
+    rows = read(recording).scan.of(Content.ROWS)
+    recording.write_bytes(recording.read_bytes()[: rows[-1].end])
+    last = rows[-1].last
+    text = call("replay", str(recording), "--check").stdout
+    assert f"every byte of {last + 1} ticks" in text.replace("\n", " ")
+    assert f"the recording was cut off after tick {last}" in text.replace("\n", " ")
+
+
 def test_code_that_changed_by_one_ulp(recording: Path, call: Call, start: Start) -> None:
     source = recording.parent.parent / "gains.py"
     swapped = GAINS.replace("class Gain", "class Base").replace("(Gain)", "(Base)")

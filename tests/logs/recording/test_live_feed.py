@@ -75,7 +75,7 @@ def test_a_viewer_that_fails_is_a_warning(
             reasons = ("the viewer has been closed", "the viewer did not take the end of the run")
             assert warning.endswith(reasons) or any(f"{reason};" in warning for reason in reasons)
     finally:
-        os.kill(viewer.process.pid, signal.SIGCONT) if viewer.lives() else None
+        os.kill(viewer.process.pid, signal.SIGCONT) if viewer.is_alive() else None
         viewer.stop()
 
 

@@ -349,3 +349,29 @@ def test_a_slow_simulation_writes_larger_batches(filled: int, waited: float, due
     recorder._header = SimpleNamespace(base_rate=500.0)  # type: ignore[assignment]
     recorder._filled = filled
     assert recorder._flush_is_due(waited) is due
+
+
+def test_a_symbolic_link_stays_and_its_file_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    link = tmp_path / "a.rrd"
+    link.symlink_to(tmp_path / "there" / "b.rrd")
+    for ticks in (10, 20):
+        assert run(graph(ticks), sinks=[Recorder(link)]).success
+        assert link.is_symlink() and len(read(link).ticks) == ticks
+    assert sorted(path.name for path in tmp_path.rglob("*.rrd")) == ["a.rrd", "b.rrd"]
+
+
+def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:
+    pipe = tmp_path / "a.rrd"
+    os.mkfifo(pipe)
+    (tmp_path / "null.rrd").symlink_to("/dev/null")
+    for path, kind in (
+        (pipe, "FIFO"),
+        (tmp_path / "null.rrd", "device"),
+        (Path("/dev/null"), "device"),
+    ):
+        recorder = Recorder(path)
+        (warning,) = run(graph(10), sinks=[recorder]).warnings
+        assert f"cannot be written (it is no file but a {kind})" in warning
+        assert recorder.recording is None
+    assert pipe.is_fifo() and Path("/dev/null").is_char_device()

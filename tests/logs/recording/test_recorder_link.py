@@ -34,7 +34,7 @@ class SlowProcess:
         self.link.ring = SimpleNamespace(read_back=0)
         self.link._seen, self.link._since = (0, 0), 0.0
         monkeypatch.setattr(self.link, "_bytes_moved", lambda: self.moved)
-        monkeypatch.setattr(self.link, "lives", lambda: True)
+        monkeypatch.setattr(self.link, "is_alive", lambda: True)
         self.told: list[str] = []
         self.recorder: Any = Recorder(None, on_warning=self.told.append)
         self.recorder.link, self.recorder._waits = self.link, True
@@ -181,15 +181,15 @@ def test_a_sink_that_hangs_without_waiting_ends_the_run() -> None:
 def test_a_recorder_that_ends_between_two_looks_is_not_stuck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lives, finish = RecorderLink.lives, RecorderLink.finish
+    is_alive, finish = RecorderLink.is_alive, RecorderLink.finish
 
     def ends_then(link: RecorderLink) -> bool:
-        alive = lives(link)
+        alive = is_alive(link)
         link._process.wait(60.0)
         return alive
 
     def finish_so(link: RecorderLink, *arguments: Any) -> Any:
-        monkeypatch.setattr(RecorderLink, "lives", ends_then)
+        monkeypatch.setattr(RecorderLink, "is_alive", ends_then)
         return finish(link, *arguments)
 
     monkeypatch.setattr(RecorderLink, "finish", finish_so)

@@ -116,7 +116,7 @@ def test_changed_files_are_taken_from_the_recording(project: Path, gone: bool) -
         f"the file of table.file: numbers.txt {why}; the recorded one is used",
         "the file one.txt of found is taken from the recording",
     )
-    assert opened.what_is_other_now() == []
+    assert opened.changed_dependencies() == []
 
 
 def test_without_restoring_the_present_files_are_used(project: Path) -> None:
@@ -124,7 +124,9 @@ def test_without_restoring_the_present_files_are_used(project: Path) -> None:
     opened = OpenedRun.of(project / "run.rrd", restore=False)
     done = replay(opened)
     assert done.first is not None and done.first.tick == 0
-    assert opened.what_is_other_now() == ["the file of table.file: numbers.txt has other content"]
+    assert opened.changed_dependencies() == [
+        "the file of table.file: numbers.txt has other content"
+    ]
 
 
 def test_a_large_file_is_named_and_not_carried(

@@ -112,7 +112,7 @@ def test_keyframes_and_live_changes(made: tuple[Path, RunResult], opened: Opened
         assert part.identical
         assert part.rows.tobytes() == whole.rows[part.first_tick :].tobytes()
     assert replay(opened, run=["total"], first_tick=250).identical
-    assert opened.what_is_other_now() == []
+    assert opened.changed_dependencies() == []
 
 
 def test_a_failure_happens_again(tmp_path: Path) -> None:
@@ -141,9 +141,16 @@ def test_where_the_graphs_own_files_are(
 
 def test_other_versions_are_named(opened: OpenedRun, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("aloft.logs.replay.opened_run.versions", lambda: {"numpy": "0.1"})
-    other = opened.what_is_other_now()
+    other = opened.changed_dependencies()
     assert any(line.startswith("numpy was ") and line.endswith(" and is 0.1") for line in other)
     assert any(line.startswith("python was ") and "not installed" in line for line in other)
+
+
+def test_another_c_library_is_named(opened: OpenedRun, monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = machine()["C library"]
+    assert ours
+    monkeypatch.setattr("platform.libc_ver", lambda: ("glibc", "2.5"))
+    assert opened.changed_dependencies() == [f"C library was {ours} and is glibc 2.5"]
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names kernels of x86-64 processors")

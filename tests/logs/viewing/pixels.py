@@ -18,7 +18,7 @@ from aloft.logs.file.reader import RecordedRun
 
 Pixels = NDArray[np.int64]
 DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("lvp*"), *Path("/etc/vulkan/icd.d").glob("lvp*")]
-PATIENCE = 300.0
+TIMEOUT = 300.0
 """Seconds that anything may take on a machine with much else to do."""
 SCENE = (0.07, 0.57, 0.0, 0.395)
 """Top, bottom, left and right of the robot in 3D."""
@@ -99,21 +99,21 @@ def settled(
     still: bool = True,
 ) -> Pixels:
     """The picture when ``good`` is content with it and, if it is ``still``, it changes no more."""
-    end, before = time.monotonic() + PATIENCE, picture()
+    end, before = time.monotonic() + TIMEOUT, picture()
     while time.monotonic() < end:
         time.sleep(0.5)
         now = picture()
         if good(now) and not (still and (now != before).any(axis=-1).mean() > 1e-3):
             return now
         before = now
-    pytest.fail(f"the picture is not as it should be within {PATIENCE:g} s")
+    pytest.fail(f"the picture is not as it should be within {TIMEOUT:g} s")
 
 
 def wait_until_shown(client: Any, last: float) -> Any:
     """The state of the viewer when it has all of a recording that ends at ``last`` [s]."""
     if not hasattr(client, "get_state"):
         pytest.skip("a viewer before Rerun 0.41 cannot be asked what it shows")
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while time.monotonic() < end:
         state = client.get_state()
         shown = [r for r in state.recordings if r.store_id == state.active_recording]
@@ -121,7 +121,7 @@ def wait_until_shown(client: Any, last: float) -> Any:
         if state.views and not state.loading and ends and (ends[0] or 0) >= 0.9e9 * last:
             return state
         time.sleep(0.2)
-    pytest.fail(f"not shown within {PATIENCE:g} s: {state}")
+    pytest.fail(f"not shown within {TIMEOUT:g} s: {state}")
 
 
 def photograph(client: Any, instant: float, path: Path) -> Pixels:

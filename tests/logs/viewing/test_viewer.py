@@ -16,7 +16,7 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.page_server import OUTSIDE, policy
 from aloft.logs.viewing.viewer import ViewerError, find_program, free_ports, start_viewer
 
-from .pixels import PATIENCE, needs_vulkan, wait_until_shown
+from .pixels import TIMEOUT, needs_vulkan, wait_until_shown
 
 ROOT = Path(__file__).parents[3]
 
@@ -47,7 +47,7 @@ def test_the_viewer_finds_no_fault(recording: Path, tmp_path: Path) -> None:
                 client.open(str(source))
             check_views(client, ticks)
         picture = tmp_path / "viewer.png"
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while not picture.is_file() and time.monotonic() < end:
             try:
                 client.save_screenshot(str(picture))
@@ -101,7 +101,7 @@ def test_the_viewer_listens_on_the_loopback_only() -> None:
         assert addresses == {"0100007F"}  # 127.0.0.1
     finally:
         viewer.stop()
-    assert not viewer.lives()
+    assert not viewer.is_alive()
 
 
 def test_a_window_without_a_screen_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
