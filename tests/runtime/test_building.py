@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.arithmetic import Gain
 from aloft.runtime.building import GraphBuilder, Source
 from aloft.runtime.language.errors import AloftError
 
