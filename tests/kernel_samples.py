@@ -12,7 +12,6 @@ from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
-from aloft.mathematics.pid import PidGains, PidMemory
 from aloft.robots.contact_kinematics import body_tree
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
@@ -28,9 +27,6 @@ TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0,
 POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
 CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
 COEFFICIENTS = np.array([0.2, 0.1, 0.05, -0.5, 0.1])
-GAINS = PidGains(
-    *np.linspace(-0.5, 2.0, 15).reshape(5, 3), -np.ones(3), np.ones(3), 0.01, 0.3, 0.002
-)
 NORMAL = np.random.default_rng(3).standard_normal
 
 
@@ -387,7 +383,7 @@ UNUSED = {
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
     "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
-    "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
+    "aloft.blocks.general.sources.first_tick": (0.5, 0.002),
     "aloft.mathematics.linear_algebra.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear_algebra.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.linear_systems.matrix_exponential": (
@@ -399,10 +395,6 @@ UNUSED = {
     "aloft.mathematics.linear_systems.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
     "aloft.mathematics.linear_systems.advance": (
         COEFFICIENTS, POSE[0], np.ones((3, 2)), np.zeros(3),
-    ),
-    "aloft.mathematics.pid.start_pid": (GAINS, POSE[0], POSE[2], PidMemory(*np.ones((3, 3)))),
-    "aloft.mathematics.pid.step_pid": (
-        GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
     ),
     "aloft.mathematics.interpolation.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
     "aloft.mathematics.interpolation.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),
