@@ -9,10 +9,10 @@ import pytest
 PROGRAM = """
 import sys
 from aloft.runtime.running.executor import run
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.integrator import Integrator
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.sum import Sum
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.integrators_and_delays import Integrator
+from aloft.blocks.general.sources import SineWave
+from aloft.blocks.general.arithmetic import Sum
 from aloft.runtime.language.stages import Wire
 from aloft.runtime.testing.graphs import Use, checked_graph
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Clock, Output
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.parameters import Parameters
@@ -135,7 +135,7 @@ ABANDONED = """
 import threading
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.language.block import Block, Output
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.graphs import Use, checked_graph
 
@@ -176,7 +176,7 @@ PROGRAM = """
 import signal, sys, time
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.testing.graphs import Use, checked_graph
 
