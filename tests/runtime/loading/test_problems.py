@@ -9,7 +9,7 @@ from aloft.runtime.loading.problems import (
     LoadError,
     Problem,
     Problems,
-    instead,
+    fix_for_key,
     listing,
     nearest,
 )
@@ -49,7 +49,7 @@ def test_of_many_problems_of_a_kind_the_first_are_printed(more: int) -> None:
         problems.add(Code.UNIT, "another unit", at(line + 1))
     problems.add(Code.FRAME, "another frame", at(1))
     report = problems.report("g")
-    kept, lines = report.shown()
+    kept, lines = report.printed()
     assert len(kept) == 1 + min(MOST_SHOWN, MOST_SHOWN + more)
     assert lines == (
         [f"{more} more problems of the kind unit; --json has all of them"] if more > 0 else []
@@ -98,10 +98,10 @@ def test_names_in_one_line(count: int, text: str) -> None:
 
 
 def test_the_fix_of_a_misspelt_key() -> None:
-    assert instead("raet", "500 Hz", at(3), "rate") == "rate: 500 Hz"
-    assert instead("raet", "x" * 60, at(3), "rate") == f"rate: {'x' * 60}"
-    assert instead("raet", "x" * 61, at(3), "rate") == "rate: ..."
+    assert fix_for_key("raet", "500 Hz", at(3), "rate") == "rate: 500 Hz"
+    assert fix_for_key("raet", "x" * 60, at(3), "rate") == f"rate: {'x' * 60}"
+    assert fix_for_key("raet", "x" * 61, at(3), "rate") == "rate: ..."
     override = Position("blocks.a.with.raet=5", 0, 0)
-    assert instead("raet", "5", override, "rate") == "blocks.a.with.rate=5"
+    assert fix_for_key("raet", "5", override, "rate") == "blocks.a.with.rate=5"
     whole = Position("raet=5", 0, 0)
-    assert instead("raet", "5", whole, "rate") == "raet=5"
+    assert fix_for_key("raet", "5", whole, "rate") == "raet=5"
