@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..blocks.general.vector import Vector
+from ..blocks.general.vectors import Vector
 from ..runtime.language.block import Block, Input, Output, State
 from ..runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec, Wire
 from ..runtime.running.memory import BoundGraph

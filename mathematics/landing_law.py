@@ -130,7 +130,7 @@ def swing(
 
 
 @kernel
-def hasten(
+def apply_lead(
     swing_velocity: Array1D, lead: float, rate: float, place: Array1D, speed: Array1D
 ) -> None:
     """Bring a foot forward on its planned way by the time ``lead``, ahead and aside.

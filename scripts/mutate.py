@@ -44,6 +44,7 @@ MOST_TESTS = 6
 """At most so many test files are run for one change, the nearest first."""
 ROOM_TESTS = {
     "runtime/loading/": "tests/graphs/test_wrong_graphs.py",
+    "robots/validation/": "tests/robots/validation/test_find_faults.py",
     "blocks/general/": "tests/blocks/general/test_units.py",
 }
 """What tests a folder as a whole, without importing its files."""
@@ -382,8 +383,9 @@ class Copy:
             latest = {i for each in latest for i in self.importers.get(each, ())} - reached
             reached |= latest
             found = [test for each in sorted(latest) for test in self._own_tests(each)]
+            found.sort(key=lambda test: -len(os.path.commonpath([test, f"tests/{file}"])))
         room = [test for folder, test in ROOM_TESTS.items() if file.startswith(folder)]
-        return [*list(dict.fromkeys(found))[:MOST_TESTS], *room]
+        return list(dict.fromkeys([*list(dict.fromkeys(found))[:MOST_TESTS], *room]))
 
     def _own_tests(self, file: str) -> list[str]:
         folder, _, name = file.removesuffix(".py").rpartition("/")
@@ -450,6 +452,10 @@ def importers_of(root: Path) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for path in files:
         for node in ast.walk(ast.parse((root / path).read_text("utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                program = (path.parent / node.value).as_posix()  # one that is started, not imported
+                if program in known and program != path.as_posix():
+                    found.setdefault(program, set()).add(path.as_posix())
             if isinstance(node, ast.ImportFrom) and node.level:
                 start = path.parent.parts[: len(path.parent.parts) - node.level + 1]
                 module = "/".join((*start, *(node.module.split(".") if node.module else ())))

@@ -61,8 +61,8 @@ fi
 echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
     --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
-    tests/runtime/language tests/runtime/running tests/runtime/loading/test_examine.py \
+    tests/runtime/language tests/runtime/running tests/runtime/loading/test_check_graph.py \
     tests/blocks/general/test_pid.py tests/blocks/general/test_transfer_function.py \
     tests/blocks/control tests/blocks/jumping tests/test_kernels_compile.py tests/mathematics/compiling \
     tests/studies/batch/test_jobs.py tests/planner/solving \
-    tests/logs/file tests/logs/recording/test_finished_run.py tests/cli/test_view.py tests/cli/test_run.py
+    tests/logs/file tests/logs/recording/test_writer.py tests/cli/test_view.py tests/cli/test_run.py

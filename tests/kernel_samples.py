@@ -2,15 +2,17 @@
 
 import numpy as np
 
-from aloft.blocks.control import balance_law, followed_plan
+from aloft.blocks.control import followed_plan, frames
+from aloft.blocks.control.tasks import TaskError, TaskJacobian
 from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
-from aloft.mathematics.body_dynamics import BodyMotion
+from aloft.mathematics.body_dynamics import BodyMotion, body_motion
+from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
-from aloft.mathematics.pid import PidGains, PidMemory
+from aloft.robots.contact_kinematics import body_tree
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
@@ -25,10 +27,17 @@ TARGET = np.array([[0.05, -0.08, -0.3], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0,
 POSE = np.array([[0.02, -0.06, -0.3], [1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
 CHAIN = (LIMB.links, LIMB.tip, LIMB.limits, TARGET, np.array([1.0, 0.9, 0.3]))
 COEFFICIENTS = np.array([0.2, 0.1, 0.05, -0.5, 0.1])
-GAINS = PidGains(
-    *np.linspace(-0.5, 2.0, 15).reshape(5, 3), -np.ones(3), np.ones(3), 0.01, 0.3, 0.002
-)
 NORMAL = np.random.default_rng(3).standard_normal
+
+
+def records(*fields):
+    """Named tuples of arrays, as kernels get them of signals and parameters."""
+    return tuple(
+        record_type("Record", tuple(each))(*(np.array(value) for value in each.values()))
+        for each in fields
+    )
+
+
 FLIGHT = flight_map(10, 4)._replace(
     drift=NORMAL((3, 3)), carried=NORMAL((12, 3)), turn=NORMAL((2, 12))
 )
@@ -73,18 +82,13 @@ STEP_PHASE = capture_law.PhaseFields(
     np.array(4), np.array(0.1), np.array(0.0), np.array(0.2), np.array([False, False, True, True]),
     np.zeros(4, bool), np.zeros((4, 3)),
 )  # fmt: skip
-PLACE = (
-    balance_law.Plan(
-        np.array(0.4), np.array(0.5), np.array(0.8), *NORMAL((5, 3)), np.array([0.0, 0.0, 0.0, 1.0]),
-        NORMAL(3), NORMAL((2, 3)), NORMAL(2), *NORMAL((3, 10)),
-    ),
-    balance_law.Gains._make([*np.full((7, 1), 0.3), np.zeros((2, 3))]),
-    balance_law.Memory(
-        np.array(0.3), np.array(True), np.zeros(3), NORMAL(3), np.array(0.1), 0.02 * NORMAL(3)
-    ),
-    balance_law.Aim(*NORMAL((5, 3)), np.ones(4), NORMAL(3), *NORMAL((3, 10))),
-    balance_law.Scratch(*np.zeros((2, 4)), *NORMAL((3, 3))),
-)  # fmt: skip
+PLACE = records(
+    {"time": 0.4, "lift_off_time": 0.5, "touchdown_time": 0.8},
+    {"heading": 0.1, "origin": NORMAL(3), "off_place": 0.02 * NORMAL(3)},
+    {"com": NORMAL(3), "com_velocity": NORMAL(3), "com_acceleration": NORMAL(3)},
+    {"vector": NORMAL(3), "middle": NORMAL(3), "planned_middle": NORMAL(3)},
+    {"place_gain": 0.3, "place_limit": 0.3, "place_time": 0.3},
+)
 LIMB_GEOMETRY = limb_geometry(find_robot("bruce"), 0, 0.05)
 FOOT = FootMotion(np.array([0.03, -0.07, -0.28]), np.array([0.5, -0.2, 0.9]), np.eye(3))
 FOLLOWING = (
@@ -178,7 +182,37 @@ TURNING = (
     turn_timing.TurnSettings(50.0, 0.04, 0.005, -0.04, 0.002),
     turn_timing.TurnProgress(np.array(0.001), np.array(1.01)),
 )  # fmt: skip
+MODEL = records(
+    {"base_position": NORMAL(3), "base_rotation": np.eye(3), "velocity": NORMAL(16)},
+    {"position": 0.3 * NORMAL(10)},
+)
+FRAME = frames.Frame(NORMAL(3), np.eye(3), NORMAL(6), NORMAL((6, 16)), NORMAL(6))
+POINT = records({"position": NORMAL(3), "velocity": NORMAL(3), "acceleration": NORMAL(3)})
+TREE = body_tree(find_robot("bruce"))
 UNUSED = {
+    "aloft.blocks.control.frames.move_model": (*MODEL, TREE, body_motion(10)),
+    "aloft.blocks.control.frames.update_frame": (
+        MODEL[0], TREE, body_motion(10), 5, np.array([0.1, -0.2, 0.3]), FRAME,
+    ),
+    "aloft.blocks.control.frames.write_rotation_jacobian": (
+        TREE, body_motion(10), 5, np.zeros((3, 16)),
+    ),
+    "aloft.blocks.control.tasks.frame_position.FramePosition.error": (
+        FRAME, *POINT, TaskError(*np.zeros((3, 3))),
+    ),
+    "aloft.blocks.control.tasks.frame_position.FramePosition.jacobian": (
+        FRAME, TaskJacobian(np.zeros((3, 16)), np.zeros(3)),
+    ),
+    "aloft.blocks.control.circle_target.CircleTarget.step": (
+        *POINT,
+        *records(
+            {
+                "centre": POSE[0], "radius": 0.05, "axis": 1, "turn_time": 2.0, "start": 0.5,
+                "growth": 1.0,
+            },
+            {"tick": 400, "base_period": 0.002},
+        ),
+    ),
     "aloft.blocks.jumping.plan_progress.follow_fall": FALLING,
     "aloft.blocks.jumping.plan_progress.time_to_fall": (0.35, -0.8),
     "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
@@ -191,7 +225,7 @@ UNUSED = {
     "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],
     "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
     "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),
-    "aloft.blocks.control.balance_law.correct_place": PLACE,
+    "aloft.blocks.control.balance_target.correct_place": PLACE,
     "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
     "aloft.blocks.jumping.capture_law.swing_foot": (
@@ -265,7 +299,7 @@ UNUSED = {
     "aloft.mathematics.linear_algebra.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
-    "aloft.blocks.control.balance_law.pattern_turn": (
+    "aloft.blocks.control.balance_target.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
     ),
     "aloft.mathematics.landing_law.landing_place": (
@@ -309,7 +343,7 @@ UNUSED = {
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
-    "aloft.blocks.control.balance_law.lengthen": (
+    "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
     "aloft.blocks.control.dynamics.lowest_point": (
@@ -331,14 +365,14 @@ UNUSED = {
     "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
-    "aloft.mathematics.inertial_filter.right_up": (
+    "aloft.mathematics.inertial_filter.correct_tilt_from_gravity": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
     "aloft.mathematics.invariant_filter.remove_contact": (1, np.full((37, 37), 0.5)),
     "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),
-    "aloft.mathematics.extended_pose.unbend": (
+    "aloft.mathematics.extended_pose.inv_left_jacobian_so3": (
         np.array([0.1, -0.4, 0.3]), np.array([0.5, 0.2, -0.3]), np.zeros(3),
     ),
     "aloft.mathematics.extended_pose.logarithm": (
@@ -348,8 +382,8 @@ UNUSED = {
         np.array([0.1, 0.2, 0.3, 0.92]), np.ones((3, 3)), np.array([0.6, 0.0, 0.0, 0.8]),
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
-    "aloft.blocks.control.balance_law.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
-    "aloft.blocks.general.periods.first_tick": (0.5, 0.002),
+    "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
+    "aloft.blocks.general.sources.first_tick": (0.5, 0.002),
     "aloft.mathematics.linear_algebra.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear_algebra.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.linear_systems.matrix_exponential": (
@@ -361,10 +395,6 @@ UNUSED = {
     "aloft.mathematics.linear_systems.settle": (COEFFICIENTS, POSE[0], np.ones((3, 2))),
     "aloft.mathematics.linear_systems.advance": (
         COEFFICIENTS, POSE[0], np.ones((3, 2)), np.zeros(3),
-    ),
-    "aloft.mathematics.pid.start_pid": (GAINS, POSE[0], POSE[2], PidMemory(*np.ones((3, 3)))),
-    "aloft.mathematics.pid.step_pid": (
-        GAINS, POSE[0], POSE[2], POSE[3], PidMemory(*np.ones((3, 3))), np.zeros(3),
     ),
     "aloft.mathematics.interpolation.interval": (np.linspace(-1.0, 1.0, 9), 0, 9, 0.3),
     "aloft.mathematics.interpolation.interpolate": (np.linspace(-1.0, 1.0, 4), POSE[:, 2], 0.3, True),

@@ -26,7 +26,7 @@ packages = ["springs"]
 BLOCK = '''
 from aloft.runtime.language.block import Block, Input, Output
 from aloft.runtime.language.parameters import Parameters, parameter
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 
 
 class Spring(Block):

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
+import math
+from enum import IntEnum
+
 import numpy as np
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array, Array1D, Array2D, Rows3, Vector3
+from ...mathematics.interpolation import minimum_jerk
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import (
+    conjugate,
+    exponential,
+    from_matrix,
+    logarithm,
+    mean_heading,
+    multiply,
+)
 from ...robots.limb import FootKind, foot_shape
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, JumpReference, PhaseState, WholeBodyTarget
-from .balance_law import (
-    BY_BASE,
-    BY_FEET,
-    BY_PATTERN,
-    Aim,
-    Gains,
-    Memory,
-    Plan,
-    Present,
-    Scratch,
-    Stand,
-    aim,
-)
+from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState, WholeBodyTarget
 
 Vector = tuple[float, float, float]
 
@@ -39,7 +38,76 @@ class BalanceMemory(Signal):
     off_place = Field(3, unit="m", frame="world", text="the feet's offset from their planned place")
 
 
-class BalanceTarget(KernelBlock):
+class HeadingSource(IntEnum):
+    """What the robot's heading is measured by."""
+
+    FEET = 0
+    """The feet's own directions."""
+    PATTERN = 1
+    """The pattern in which the feet stand."""
+    BASE = 2
+    """The base."""
+
+
+class BalanceConstants(Signal):
+    """What the robot's description says."""
+
+    heading_source = Field(dtype="int64", values=HeadingSource, text="what tells the heading")
+    counted = Field("n_feet", dtype="bool", text="whether each foot counts in the heading")
+    nominal_mass = Field(unit="kg", text="mass by the description")
+
+
+class BalanceScratch(Signal):
+    """Room for a step of ``BalanceTarget``."""
+
+    turn = Field(4, text="quaternion of a heading")
+    quaternion = Field(4, text="a quaternion")
+    vector = Field(3, text="a vector")
+    middle = Field(3, unit="m", frame="world", text="mean of the feet's places")
+    planned_middle = Field(3, unit="m", frame="world", text="mean of their planned places")
+
+
+class BalanceParameters(Parameters):
+    """The parameters of ``BalanceTarget``."""
+
+    landing_depth: float = live_parameter(
+        0.06, unit="m", ge=0.0, le=0.5, text="depth below standing held after touchdown"
+    )
+    rise_time: float = live_parameter(
+        0.6, unit="s", gt=0.0, text="time to rise from there to standing height"
+    )
+    trim_rate: float = live_parameter(
+        3.0, unit="1/s", ge=0.0, le=20.0, text="integral gain on a steady tilt"
+    )
+    trim_limit: float = live_parameter(
+        0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
+    )
+    velocity_correction: Vector = live_parameter(
+        (0.0, 0.0, 0.0),
+        unit="m/s",
+        text="added to the planned velocity of the centre of mass at lift-off, in the plan's axes",
+    )
+    momentum_correction: Vector = live_parameter(
+        (0.0, 0.0, 0.0),
+        unit="N m s",
+        text="added to the planned angular momentum at lift-off, in the plan's axes",
+    )
+
+    place_gain: float = live_parameter(
+        0.0,
+        ge=0.0,
+        le=1.0,
+        text="share of the feet's position error that the next jump corrects",
+    )
+    place_limit: float = live_parameter(
+        0.03, unit="m", ge=0.0, le=0.2, text="largest change of a jump's length"
+    )
+    place_time: float = live_parameter(
+        0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins"
+    )
+
+
+class BalanceTarget(Block):
     """Follows the plan until its last touchdown, then balances over the middle of the feet.
 
     It serves any number of feet. Their middle is the mean of the sole centres, and their heading
@@ -84,45 +152,11 @@ class BalanceTarget(KernelBlock):
     The block does not plan steps: the feet stay where they are.
     """
 
-    class Params(Parameters):
-        landing_depth: float = live_parameter(
-            0.06, unit="m", ge=0.0, le=0.5, text="depth below standing held after touchdown"
-        )
-        rise_time: float = live_parameter(
-            0.6, unit="s", gt=0.0, text="time to rise from there to standing height"
-        )
-        trim_rate: float = live_parameter(
-            3.0, unit="1/s", ge=0.0, le=20.0, text="integral gain on a steady tilt"
-        )
-        trim_limit: float = live_parameter(
-            0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
-        )
-        velocity_correction: Vector = live_parameter(
-            (0.0, 0.0, 0.0),
-            unit="m/s",
-            text="added to the planned velocity of the centre of mass at lift-off, in the plan's axes",
-        )
-        momentum_correction: Vector = live_parameter(
-            (0.0, 0.0, 0.0),
-            unit="N m s",
-            text="added to the planned angular momentum at lift-off, in the plan's axes",
-        )
-
-        place_gain: float = live_parameter(
-            0.0,
-            ge=0.0,
-            le=1.0,
-            text="share of the feet's position error that the next jump corrects",
-        )
-        place_limit: float = live_parameter(
-            0.03, unit="m", ge=0.0, le=0.2, text="largest change of a jump's length"
-        )
-        place_time: float = live_parameter(
-            0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins"
-        )
-
     needs = ("floating base", "feet")
-    params: Params
+    Params = BalanceParameters
+    Constants = BalanceConstants
+    Scratch = BalanceScratch
+    params: BalanceParameters
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase the robot is in")
     terms = Input(DynamicsTerms, text="the present state")
@@ -133,29 +167,297 @@ class BalanceTarget(KernelBlock):
         robot = self.robot
         feet = range(len(robot.feet))
         heads = np.array([foot_shape(robot, foot)[0] != FootKind.POINT for foot in feet])
-        kind = BY_FEET if heads.any() else BY_BASE if len(feet) == 1 else BY_PATTERN
-        counted = heads if heads.any() else np.ones(len(feet), np.bool_)
-        self._gains = Gains._make([*np.zeros((7, 1)), np.zeros((2, 3))])
-        self.on_parameters()
-        phase, terms = self.phase, self.terms
-        present = Present(
-            phase.phase, phase.time_in_phase, terms.foot_position, terms.foot_rotation,
-            terms.base_rotation, terms.mass_matrix,
-        )  # fmt: skip
-        aiming = KernelCall(
-            aim,
-            Plan(*(getattr(self.reference, name) for name in Plan._fields)),
-            present,
-            Stand(kind, counted, robot.total_mass, self.period),
-            self._gains,
-            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
-            Aim(*(getattr(self.target, name) for name in Aim._fields)),
-            Scratch(np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(3)),
-        )
-        self.kernel_calls = (aiming,)
+        source = HeadingSource.BASE if len(feet) == 1 else HeadingSource.PATTERN
+        self.constants.heading_source = HeadingSource.FEET if heads.any() else source
+        self.constants.counted[:] = heads if heads.any() else True
+        self.constants.nominal_mass = robot.total_mass
 
-    def on_parameters(self) -> None:
-        p, gains = self.params, self._gains
-        for name in Gains._fields[:-1]:
-            getattr(gains, name)[0] = getattr(p, name)
-        gains.corrections[:] = p.velocity_correction, p.momentum_correction
+    @kernel
+    @staticmethod
+    def step(
+        reference: JumpReference,
+        phase: PhaseState,
+        terms: DynamicsTerms,
+        target: WholeBodyTarget,
+        memory: BalanceMemory,
+        constants: BalanceConstants,
+        scratch: BalanceScratch,
+        params: BalanceParameters,
+        period: float,
+    ) -> None:
+        middle_point(terms.foot_position, scratch.middle)
+        middle_point(reference.foot_position, scratch.planned_middle)
+        planned = planned_heading(reference, constants)
+        heading = measured_heading(reference, terms, planned, constants, scratch)
+        if not memory.started:
+            memory.standing_height = reference.com[2]
+            memory.heading = heading - planned
+            turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
+            memory.origin[:] = scratch.middle - scratch.vector
+            memory.started = True
+        goes_on = reference.lift_off_time > reference.time
+        if phase.phase < Phase.LANDING or (phase.phase == Phase.LANDING and goes_on):
+            turn = heading - planned
+            follow_reference(reference, terms, turn, target, constants, scratch)
+            if params.place_gain > 0.0:
+                correct_place(reference, memory, target, scratch, params)
+            if phase.phase == Phase.THRUST:
+                correct_lift_off(reference, phase, turn, target, scratch, params, period)
+        else:
+            balance(phase, terms, heading, memory, target, scratch, params, period)
+        target.joint_position[:] = reference.joint_position
+        target.joint_velocity[:] = reference.joint_velocity
+        target.joint_acceleration[:] = reference.joint_acceleration
+
+
+@kernel
+def planned_heading(reference: JumpReference, constants: BalanceConstants) -> float:
+    """The mean of the planned headings [rad] of the feet that count."""
+    count, planned = 0, 0.0
+    for foot in range(constants.counted.shape[0]):
+        count += 1 if constants.counted[foot] else 0
+    for foot in range(constants.counted.shape[0]):
+        if constants.counted[foot]:
+            planned += reference.foot_yaw[foot] / count
+    return planned
+
+
+@kernel
+def measured_heading(
+    reference: JumpReference,
+    terms: DynamicsTerms,
+    planned: float,
+    constants: BalanceConstants,
+    scratch: BalanceScratch,
+) -> float:
+    """The feet's heading [rad], by their own directions or by the pattern they stand in."""
+    if constants.heading_source == HeadingSource.FEET:
+        return mean_heading(terms.foot_rotation, constants.counted)
+    if constants.heading_source == HeadingSource.BASE:
+        return math.atan2(terms.base_rotation[1, 0], terms.base_rotation[0, 0])
+    return planned + pattern_turn(
+        reference.foot_position, scratch.planned_middle, terms.foot_position, scratch.middle
+    )
+
+
+@kernel
+def set_heading(angle: float, quaternion: Array1D) -> None:
+    """The unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
+    quaternion[0], quaternion[1] = 0.0, 0.0
+    quaternion[2], quaternion[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+
+
+@kernel
+def follow_reference(
+    reference: JumpReference,
+    terms: DynamicsTerms,
+    turn: float,
+    target: WholeBodyTarget,
+    constants: BalanceConstants,
+    scratch: BalanceScratch,
+) -> None:
+    """Write the plan relative to the measured feet; ``turn`` is the angle of its rotation [rad].
+
+    The plan's momenta are those of the description's mass.
+    """
+    scratch.vector[:] = reference.com - scratch.planned_middle
+    turn_about_vertical(scratch.vector, turn, target.com)
+    target.com[:] = target.com + scratch.middle
+    turn_about_vertical(reference.com_velocity, turn, target.com_velocity)
+    turn_about_vertical(reference.com_acceleration, turn, target.com_acceleration)
+    turn_about_vertical(reference.angular_momentum, turn, target.angular_momentum)
+    turn_about_vertical(reference.angular_momentum_rate, turn, target.angular_momentum_rate)
+    mass = terms.mass_matrix[0, 0]
+    if mass == 0.0:
+        mass = constants.nominal_mass
+    heavier = mass / constants.nominal_mass
+    target.angular_momentum[:] = target.angular_momentum * heavier
+    target.angular_momentum_rate[:] = target.angular_momentum_rate * heavier
+    target.angular_velocity[:] = reference.angular_velocity
+    set_heading(turn, scratch.turn)
+    multiply(scratch.turn, reference.orientation, target.orientation)
+
+
+@kernel
+def correct_place(
+    reference: JumpReference,
+    memory: BalanceMemory,
+    target: WholeBodyTarget,
+    scratch: BalanceScratch,
+    params: BalanceParameters,
+) -> None:
+    """Change the length of the next jump to correct the feet's position error."""
+    lift_off, duration = reference.lift_off_time, params.place_time
+    flight = reference.touchdown_time - lift_off
+    share = 1.0 - (lift_off - reference.time) / duration
+    if share <= 0.0:
+        turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
+        scratch.vector[:] = memory.origin + scratch.vector
+        memory.off_place[:] = scratch.middle - scratch.vector
+        return
+    lengthen(
+        memory.off_place, params.place_gain, params.place_limit, flight,
+        duration, share, target.com, target.com_velocity, target.com_acceleration,
+    )  # fmt: skip
+
+
+@kernel
+def correct_lift_off(
+    reference: JumpReference,
+    phase: PhaseState,
+    turn: float,
+    target: WholeBodyTarget,
+    scratch: BalanceScratch,
+    params: BalanceParameters,
+    period: float,
+) -> None:
+    """Add the known corrections of velocity and momentum during the thrust."""
+    largest = 0.0
+    for k in range(3):
+        velocity, momentum = params.velocity_correction[k], params.momentum_correction[k]
+        largest = max(largest, abs(velocity), abs(momentum))
+    if largest == 0.0:
+        return
+    elapsed = phase.time_in_phase
+    left = reference.lift_off_time - reference.time
+    duration = max(elapsed + left, period)
+    share = min(elapsed / duration, 1.0)
+    vector = scratch.vector
+    turn_about_vertical(params.momentum_correction, turn, vector)
+    add_quadratic_growth(
+        vector, share, duration, target.angular_momentum, target.angular_momentum_rate
+    )
+    turn_about_vertical(params.velocity_correction, turn, vector)
+    add_quadratic_growth(vector, share, duration, target.com_velocity, target.com_acceleration)
+    target.com[:] = target.com + vector * (duration * share * share * share / 3.0)
+
+
+@kernel
+def balance(
+    phase: PhaseState,
+    terms: DynamicsTerms,
+    heading: float,
+    memory: BalanceMemory,
+    target: WholeBodyTarget,
+    scratch: BalanceScratch,
+    params: BalanceParameters,
+    period: float,
+) -> None:
+    """Aim at the middle of the feet and a level base, and rise when the phase is RECOVER."""
+    depth, duration = params.landing_depth, params.rise_time
+    share, rate, second = 0.0, 0.0, 0.0
+    if phase.phase == Phase.RECOVER:
+        share, rate, second = minimum_jerk(phase.time_in_phase / duration)
+    for k in range(3):
+        target.com[k] = scratch.middle[k]
+        target.com_velocity[k], target.com_acceleration[k] = 0.0, 0.0
+        target.angular_velocity[k], target.angular_momentum[k] = 0.0, 0.0
+        target.angular_momentum_rate[k] = 0.0
+    low = memory.standing_height - depth
+    target.com[2] = target.com[2] + (low + share * depth)
+    target.com_velocity[2] = rate * depth / duration
+    target.com_acceleration[2] = second * depth / (duration * duration)
+    set_heading(heading, scratch.turn)
+    quaternion, trim = scratch.quaternion, memory.trim
+    from_matrix(terms.base_rotation, quaternion)
+    conjugate(quaternion, quaternion)
+    multiply(quaternion, scratch.turn, quaternion)
+    logarithm(quaternion, scratch.vector)
+    gain = params.trim_rate * period
+    integrate_trim(scratch.vector, gain, params.trim_limit, trim)
+    exponential(trim, quaternion)
+    multiply(scratch.turn, quaternion, target.orientation)
+
+
+@kernel
+def middle_point(points: Rows3, out: Vector3) -> None:
+    """The mean of points (n, 3)."""
+    out[:] = 0.0
+    for i in range(points.shape[0]):
+        out[:] += points[i] / points.shape[0]
+
+
+@kernel
+def pattern_turn(
+    planned: Array2D, planned_middle: Array1D, points: Array2D, middle: Array1D
+) -> float:
+    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
+
+    Args:
+        planned, planned_middle: the pattern before the rotation, and its middle (3,).
+        points, middle: the same points now, and their middle.
+    """
+    sine = cosine = 0.0
+    for i in range(planned.shape[0]):
+        ax, ay = float(planned[i, 0] - planned_middle[0]), float(planned[i, 1] - planned_middle[1])
+        bx, by = float(points[i, 0] - middle[0]), float(points[i, 1] - middle[1])
+        sine += ax * by - ay * bx
+        cosine += ax * bx + ay * by
+    return math.atan2(sine, cosine)
+
+
+@kernel
+def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
+    """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = vector[0], vector[1]
+    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
+def lengthen(
+    off_place: Array,
+    gain: float,
+    limit: float,
+    flight: float,
+    duration: float,
+    share: float,
+    place: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> None:
+    """Add the correction of the feet's position error to a jump's motion; see ``BalanceTarget``.
+
+    Args:
+        off_place: the horizontal position error of the feet, (3,) [m].
+        gain: the share of the error that is corrected.
+        limit: the largest change of the jump's length [m].
+        flight: the duration of the planned flight [s].
+        duration, share: how long before lift-off the correction begins [s], and the share of that
+            time which is over, 0 to 1.
+        place, velocity, acceleration: of the centre of mass, (3,) each; they are changed.
+    """
+    u = min(max(share, 0.0), 1.0)
+    grown, rate, _ = minimum_jerk(u)
+    square = float(off_place[0]) ** 2 + float(off_place[1]) ** 2
+    size = gain * math.sqrt(square)
+    kept = 1.0 if size <= limit else limit / size
+    for k in range(2):
+        speed = -kept * gain * float(off_place[k]) / (flight + 0.5 * duration)
+        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
+        velocity[k] += speed * grown
+        acceleration[k] += speed * rate / duration
+
+
+@kernel
+def add_quadratic_growth(
+    goal: Array, share: float, duration: float, value: Array, rate: Array
+) -> None:
+    """Add to ``value`` (3,) a term that grows with the square of time to ``goal`` (3,).
+
+    Args:
+        share: the share of ``duration`` [s] that is over, 0 to 1.
+        value, rate: a quantity and its time derivative; share^2 goal is added to the one, and the
+            derivative of that to the other.
+    """
+    for k in range(3):
+        value[k] += share * share * float(goal[k])
+        rate[k] += 2.0 * share / duration * float(goal[k])
+
+
+@kernel
+def integrate_trim(error: Array1D, gain: float, limit: float, trim: Array1D) -> None:
+    """One step of the integral of the tilt about x and y, within the limit; z stays zero."""
+    for k in range(2):
+        trim[k] = min(max(trim[k] + gain * error[k], -limit), limit)
+    trim[2] = 0.0

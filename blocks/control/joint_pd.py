@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
 from typing import Literal
 
 import numpy as np
@@ -63,8 +64,8 @@ class JointPD(KernelBlock):
     Gains, targets and torques change linearly from one set to the other within ``blend``.
 
     **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
-    gains towards their held angle. Joints that belong to no leg and are not held follow the
-    whole-body controller while any leg stands; while all legs swing they have the flight gains
+    gains towards their held angle. Joints that belong to no leg and are not held, or that are
+    ``released``, follow the whole-body controller while any leg stands; while all legs swing they have the flight gains
     towards the planned angles, or towards the standing pose if no plan is wired.
 
     **Stance gains** are zero by default, so that the feedforward alone carries the robot. Otherwise
@@ -112,6 +113,10 @@ class JointPD(KernelBlock):
         leak: float = live_parameter(
             0.02, unit="s", gt=0.0, text="time constant of the leak of integrated targets"
         )
+        released: list[str] = parameter(
+            [],
+            text="names or patterns of held joints that follow the whole-body controller instead",
+        )
         stop_margin: float = live_parameter(
             0.05, unit="rad", gt=0.0, le=0.3, text="distance of a soft stop from the joint's limit"
         )
@@ -142,7 +147,7 @@ class JointPD(KernelBlock):
     def setup(self) -> None:
         robot, n = self.robot, len(self.robot.joints)
         self._default_gains = default_gains(robot)
-        self._legs = _legs(robot)
+        self._legs = _legs(robot, self.params.released)
         reference, command, follower = self.reference, self.command, self.follower
         planned = Motion(reference.joint_position, reference.joint_velocity)
         if "reference" not in self.context.wired:
@@ -200,13 +205,13 @@ class JointPD(KernelBlock):
         self._stops.margin[0], self._stops.gain[0] = p.stop_margin, p.stop_gain
 
 
-def _legs(robot: RobotDescription) -> Legs:
+def _legs(robot: RobotDescription, released: list[str]) -> Legs:
     """Which joint belongs to which leg, is held, or is free."""
     n = len(robot.joints)
     foot_of_joint, in_leg = np.full(n, -1), np.zeros(n, np.bool_)
     held, angle = np.zeros(n, np.bool_), np.zeros(n)
     for k, joint in enumerate(robot.joints):
-        if joint.name in robot.held:
+        if joint.name in robot.held and not any(fnmatchcase(joint.name, p) for p in released):
             held[k], angle[k] = True, robot.held[joint.name]
     for foot in range(len(robot.feet)):
         for k in chain_to(robot, robot.feet[foot].link):

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...mathematics.pid import PidGains, PidMemory, start_pid, step_pid
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
-from .bounds import Bounded
-from .elements import Elements, PerElement, spread, spread_bound
-from .flags import NEVER, Flag
-from .quantity_parameters import InUnit
-from .vector import Vector
+from .vectors import (
+    NEVER,
+    Bounded,
+    Bounds,
+    Flag,
+    InUnit,
+    ScalarOrVector,
+    Vector,
+    VectorParameters,
+)
 
 
-class Memory(Signal):
+class PidState(Signal):
     """What a PID controller remembers."""
 
     integral = Field("n", text="the integral part")
@@ -44,20 +47,29 @@ class PID(Bounded, Block):
     second, and kd in it times seconds.
     """
 
-    class Params(Elements, InUnit):
-        kp: PerElement = live_parameter(1.0, text="proportional gain")
-        ki: PerElement = live_parameter(0.0, text="integral gain, per second")
-        kd: PerElement = live_parameter(0.0, text="derivative gain, in seconds")
-        b: PerElement = live_parameter(1.0, text="the setpoint's weight in the proportional part")
-        c: PerElement = live_parameter(0.0, text="the setpoint's weight in the derivative part")
+    class Params(VectorParameters, InUnit):
+        kp: ScalarOrVector = live_parameter(1.0, text="proportional gain")
+        ki: ScalarOrVector = live_parameter(0.0, text="integral gain, per second")
+        kd: ScalarOrVector = live_parameter(0.0, text="derivative gain, in seconds")
+        b: ScalarOrVector = live_parameter(
+            1.0, text="the setpoint's weight in the proportional part"
+        )
+        c: ScalarOrVector = live_parameter(0.0, text="the setpoint's weight in the derivative part")
         derivative_time_constant: float = live_parameter(
             0.01, unit="s", ge=0.0, text="tau, of the derivative's filter"
         )
         tracking_time: float = live_parameter(
             0.1, unit="s", gt=0.0, text="how fast the integral gives way to a bound"
         )
-        lower: PerElement | None = live_parameter(None, text="the least output")
-        upper: PerElement | None = live_parameter(None, text="the greatest output")
+        lower: ScalarOrVector | None = live_parameter(None, text="the least output")
+        upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
+
+    class Constants(Bounds):
+        """The bounds, and what follows from the other parameters."""
+
+        tracking = Field(
+            text="the share of what a bound cut off that the integral takes back in a run"
+        )
 
     params: Params
     setpoint = Input(Vector, text="r, what is wanted")
@@ -65,7 +77,7 @@ class PID(Bounded, Block):
     feedforward = Input(Vector, text="f, added before the bounds", default={"value": 0.0})
     reset = Input(Flag, text="whether to forget what was", default=NEVER)
     u = Output(Vector, text="the control, within the bounds")
-    x = State(Memory, text="the integral and the derivative")
+    x = State(PidState, text="the integral and the derivative")
 
     @classmethod
     def carried(cls, params: Parameters, given: Given) -> Carried:
@@ -76,32 +88,42 @@ class PID(Bounded, Block):
         given.agree("feedforward", u, "it is added to the control")
         return {"u": u}
 
-    def setup(self) -> None:
-        """Keep gains and memory at hand."""
-        x = self.x
-        self._memory = PidMemory(x.integral, x.derivative, x.before)
-        self.on_parameters()
+    def prepare(self) -> None:
+        super().prepare()
+        self.constants.tracking = min(self.period / self.params.tracking_time, 1.0)
 
-    def on_parameters(self) -> None:
-        """Keep the gains as arrays."""
-        p = self.params
-        self._gains = PidGains(
-            spread(p.kp, p.n),
-            spread(p.ki, p.n),
-            spread(p.kd, p.n),
-            spread(p.b, p.n),
-            spread(p.c, p.n),
-            spread_bound(p.lower, p.n, -np.inf),
-            spread_bound(p.upper, p.n, np.inf),
-            p.derivative_time_constant,
-            min(self.period / p.tracking_time, 1.0),
-            self.period,
-        )
-
-    def step(self) -> None:
-        """Control."""
-        r, y = self.setpoint.value, self.measured.value
-        if self.reset.value or not self.x.started:
-            start_pid(self._gains, r, y, self._memory)
-            self.x.started[...] = True
-        step_pid(self._gains, r, y, self.feedforward.value, self._memory, self.u.value)
+    @kernel
+    @staticmethod
+    def step(
+        setpoint: Vector,
+        measured: Vector,
+        feedforward: Vector,
+        reset: Flag,
+        u: Vector,
+        x: PidState,
+        params: Params,
+        constants: Constants,
+        period: float,
+    ) -> None:
+        tau = params.derivative_time_constant
+        starts = reset.value or not x.started
+        x.started = True
+        for i in range(u.value.shape[0]):
+            r, y = setpoint.value[i], measured.value[i]
+            d = params.c[i] * r - y
+            if starts:
+                x.integral[i] = 0.0
+                x.derivative[i] = 0.0
+                x.before[i] = d
+            x.derivative[i] = (tau * x.derivative[i] + params.kd[i] * (d - x.before[i])) / (
+                tau + period
+            )
+            x.before[i] = d
+            p = params.kp[i] * (params.b[i] * r - y)
+            v = p + x.integral[i] + x.derivative[i] + feedforward.value[i]
+            u.value[i] = min(max(v, constants.lower[i]), constants.upper[i])
+            x.integral[i] = (
+                x.integral[i]
+                + period * params.ki[i] * (r - y)
+                + constants.tracking * (u.value[i] - v)
+            )

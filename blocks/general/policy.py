@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from .quantity_parameters import Says, SourceParameters
+from .vectors import SourceParameters, UnitFromParameters
 
 EXAMPLE = Path(__file__).with_name("example_policy.onnx")
 """y = tanh(A u) of two inputs and one output, made by the test of this block."""
@@ -38,7 +38,7 @@ class Memory(Signal):
     value = Field("size", text="all of its states, one after the other")
 
 
-class Policy(Says, Block):
+class Policy(UnitFromParameters, Block):
     """The output of a neural network, y = f(u), from an ONNX file, run by ONNX Runtime.
 
     The network has one input beside its states, of n elements, and ``output`` names the one of its

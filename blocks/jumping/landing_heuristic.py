@@ -2,22 +2,53 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Annotated, Literal
 
-import numpy as np
 import pydantic
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Vector3
+from ...mathematics.compiling.expressions import cross
+from ...mathematics.constants import GRAVITY
+from ...mathematics.interpolation import minimum_jerk
+from ...mathematics.kernel import kernel
+from ...mathematics.landing_law import (
+    apply_lead,
+    heading_matrix,
+    keep_within,
+    landing_place,
+    lowest_height,
+    retraction,
+    swing,
+    turn_places,
+)
+from ...mathematics.rotations import (
+    conjugate,
+    exponential,
+    from_matrix,
+    logarithm,
+    multiply,
+    to_matrix,
+    yaw,
+)
 from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
-from ...runtime.language.block import Input, Misfit, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, FootTarget, JumpReference, PhaseState
-from .landing_prediction import PredictionGains, Terms, landing_prediction, scale_gains
-from .landing_targets import Law, Memory, Now, Plan, Scratch, Settings, Targets, aim_feet
+from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
+from .landing_prediction import (
+    LAST,
+    Prediction,
+    PredictionGains,
+    choose_shift_of_feet,
+    landing_prediction,
+    scale_gains,
+)
+
+SLOWEST_DESCENT = 0.3
+"""The least speed of descent [m/s] by which a change of the legs' length changes the time."""
 
 
 def _three(value: object) -> object:
@@ -27,6 +58,47 @@ def _three(value: object) -> object:
 
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
+
+
+class LandingParams(PredictionGains):
+    """The parameters of ``LandingHeuristic``."""
+
+    law: Literal["paper", "deviation", "predicted"] = parameter(
+        "deviation",
+        text="feed back the measured momentum, or its deviation from the plan; or predict",
+    )
+    w_l: tuple[float, float] = live_parameter(
+        (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
+    )
+    w_k: tuple[float, float] = live_parameter(
+        (0.0, 0.0), unit="s/(kg m)", text="W_k: metres per angular momentum about y and x"
+    )
+    w_c: float = live_parameter(
+        0.04, unit="s/kg", ge=0.0, text="W_c: sideways clearance per lateral momentum"
+    )
+    p_max: tuple[float, float] = live_parameter(
+        (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
+    )
+    limits_about: Literal["com", "stance"] = parameter(
+        "com", text="the centre of the limits p_max: the centre of mass, or each foot's stance"
+    )
+    alpha: Shares = live_parameter(
+        (1.0, 1.0, 1.0),
+        text="share of the torso's rotation about x, y and z that the legs compensate",
+    )
+    toes_alpha: Shares = live_parameter(
+        (0.8, 0.8, 0.8),
+        text="the same share where the plan lands on the toes first",
+    )
+    reach_share: float = live_parameter(
+        0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
+    )
+    retraction: float = live_parameter(
+        0.3, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
+    )
+    retraction_time: float = live_parameter(
+        0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
+    )
 
 
 class LandingMemory(Signal):
@@ -46,11 +118,37 @@ class LandingMemory(Signal):
     started = Field(dtype="bool", text="whether the plan's place in the world is known")
     origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or next")
-    wished = Field(3, unit="m", frame="world", text="planned place of the com at touchdown")
-    due = Field(unit="s", text="touchdown with the planned length of the legs, from lift-off")
+    planned_touchdown = Field(3, unit="m", frame="world", text="planned com at touchdown")
+    flight_time = Field(unit="s", text="lift-off to touchdown with the planned length of the legs")
 
 
-class LandingHeuristic(KernelBlock):
+class LandingConstants(Signal):
+    """What the law knows of the robot."""
+
+    side = Field("n_feet", unit="", text="1: the foot is on the left, -1: right, 0: in the middle")
+    stance = Field(("n_feet", 3), unit="m", frame="body", text="feet from the com in standing")
+    mass = Field(unit="kg", text="that of the description")
+
+
+class LandingScratch(Signal):
+    """What the law computes on its way."""
+
+    place = Field(("n_feet", 3), unit="m", frame="world", text="of each foot from the com")
+    centre = Field(("n_feet", 3), unit="m", frame="world", text="of the limits p_max, from the com")
+    speed = Field(3, unit="m/s", frame="world", text="of the foot in hand from the com")
+    linear = Field(3, unit="kg m/s", frame="world", text="the linear momentum that is fed back")
+    angular = Field(3, unit="N m s", frame="world", text="the angular momentum that is fed back")
+    miss = Field(3, unit="m", frame="world", text="by which unshifted feet miss their place")
+    quaternion = Field(4, unit="", text="the base's orientation")
+    turn = Field(4, unit="", text="of the frame in which the targets are fixed")
+    rotation = Field((3, 3), unit="", text="the same as a matrix")
+    rate = Field(3, unit="rad/s", text="angular velocity of that frame")
+    heading = Field((3, 3), unit="", text="of a sole")
+    com_body = Field(3, unit="m", frame="body", text="the com from the base")
+    vector = Field(3, text="for a moment")
+
+
+class LandingHeuristic(Block):
     """Foot targets in flight from momentum feedback (paper, IV).
 
     All places are relative to the centre of mass, in world axes. The law, for each of any number
@@ -71,39 +169,10 @@ class LandingHeuristic(KernelBlock):
     measured momenta minus the planned ones: the planned footholds already fit the planned momentum,
     so feeding back the whole momentum of a forward jump would count it twice.
 
-    With ``law: predicted`` the landing place is chosen anew in every tick, from the momenta that
-    were not planned, by what it does to the torso. Feet that keep their place in the world turn a
-    torso that tilts even further; drawn up they turn BRUCE's forward, by 5 to 8 deg per cm
-    (``mathematics/landing_law``). All feet are shifted ahead, to the left, apart and upwards
-    by the s that costs least::
-
-        (s_x - g_x)^2 + (s_y - g_y)^2 + (apart_cost (s_a - g_a))^2 + (height_cost s_z)^2
-            + sum over roll and pitch of (tilt_cost h (tilt - free))^2
-
-    where tilt is the deviation from the planned orientation at touchdown, linear in s, of which up
-    to ``free_tilt`` costs nothing. Drawn up legs touch down later, by s_z over the speed of the
-    fall, and the base turns until then. s_z is within ``height_range`` h, but drawn up legs must
-    keep the stroke in which ``stop_acceleration`` g stops the fall, and stretched legs touch down early
-    by at most the share ``early`` of the flight. The goal g is the capture point of the linear
-    inverted pendulum of the standing height h, w^2 = g / h, times the gains::
-
-        g_x = capture l^x / (m w) + capture_turn k^y w / (m g),
-        g_y = capture l^y / (m w) - capture_turn k^x w / (m g),    g_a = clearance |l^y| / (m w)
-
-    These gains have no unit, so they are the same for robots of any size. p_max applies as above.
-    They are less than 1, aside even more, because two feet that stand apart hold a capture point that
-    is off their middle, and a long way with drawn up legs is at the end of the hips' reach.
-
-    A robot that lifts off with a slightly wrong velocity lands beside its place, and feet that go to
-    the capture point land even further off. Let e be by how much unshifted feet would miss their
-    planned place in the world, by the measured motion, and d = g + e the way from that place to the
-    capture point, both horizontal. Then g is replaced by
-
-        g - place_gain / (1 + (|d| / (place_range h))^4) d
-
-    so a small miss, within which standing feet keep the balance, is partly made good; after a push
-    the feet go to the capture point. Touchdown comes some milliseconds before its prediction, and in
-    a long jump the feet still swing then. So they are ahead of their planned way by ``lead_time``.
+    With ``law: predicted`` the landing place is chosen anew in every tick: all feet are shifted ahead,
+    to the left, apart and upwards by what costs least, counting the distance from the capture point,
+    the change of the legs' length, and the tilt of the torso at touchdown that the momenta lead to.
+    ``docs/landing.md`` has this law in full. p_max applies as above.
 
     The foot moves there from its position at lift-off, along x and y with minimum jerk over
     ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
@@ -125,46 +194,12 @@ class LandingHeuristic(KernelBlock):
     touchdown. Whether a leg can reach the target is left to its inverse kinematics.
     """
 
-    class Params(PredictionGains):
-        law: Literal["paper", "deviation", "predicted"] = parameter(
-            "deviation",
-            text="feed back the measured momentum, or its deviation from the plan; or predict",
-        )
-        w_l: tuple[float, float] = live_parameter(
-            (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
-        )
-        w_k: tuple[float, float] = live_parameter(
-            (0.0, 0.0), unit="s/(kg m)", text="W_k: metres per angular momentum about y and x"
-        )
-        w_c: float = live_parameter(
-            0.04, unit="s/kg", ge=0.0, text="W_c: sideways clearance per lateral momentum"
-        )
-        p_max: tuple[float, float] = live_parameter(
-            (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
-        )
-        limits_about: Literal["com", "stance"] = parameter(
-            "com", text="the centre of the limits p_max: the centre of mass, or each foot's stance"
-        )
-        alpha: Shares = live_parameter(
-            (1.0, 1.0, 1.0),
-            text="share of the torso's rotation about x, y and z that the legs compensate",
-        )
-        toes_alpha: Shares = live_parameter(
-            (0.8, 0.8, 0.8),
-            text="the same share where the plan lands on the toes first",
-        )
-        reach_share: float = live_parameter(
-            0.7, gt=0.0, le=1.0, text="share of the predicted flight by which the feet are there"
-        )
-        retraction: float = live_parameter(
-            0.3, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
-        )
-        retraction_time: float = live_parameter(
-            0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
-        )
-
+    Params = LandingParams
+    Constants = LandingConstants
+    Scratch = LandingScratch
     needs = ("feet",)
-    params: Params
+    params: LandingParams
+    constants: LandingConstants
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase and the time to touchdown")
     terms = Input(DynamicsTerms, text="the present state")
@@ -174,7 +209,7 @@ class LandingHeuristic(KernelBlock):
     @classmethod
     def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
         """Report limits within which the robot cannot stand."""
-        assert isinstance(params, cls.Params) and robot is not None
+        assert isinstance(params, LandingParams) and robot is not None
         if params.limits_about == "stance":
             return
         for foot, place in zip(robot.feet, standing_feet(robot), strict=True):
@@ -191,34 +226,244 @@ class LandingHeuristic(KernelBlock):
                 return
 
     def setup(self) -> None:
-        robot, p = self.robot, self.params
-        stance = standing_feet(robot)
-        self._mass, self._height = robot.total_mass, -float(stance[:, 2].mean())
-        sides, n = foot_sides(stance), len(robot.feet)
-        turned = p.limits_about == "stance"
-        law = Law(
-            p.law == "predicted", p.law != "paper", turned, np.array(sides), stance, self._mass,
-            self.period,
-        )  # fmt: skip
-        self._prediction = landing_prediction(robot, sides)
-        self._settings = Settings(*(np.zeros(size) for size in (2, 2, 2, 3, 3, 1, 1, 1, 1, 1)))
-        self.on_parameters()
-        shapes = (n, 3), (n, 3), 4, 4, (3, 3), (3, 3), 3, 3, 3, 3, 3, 3, 3, 3
-        aiming = KernelCall(
-            aim_feet,
-            Now(*(getattr(self.phase, name) for name in Now._fields)),
-            Plan(*(getattr(self.reference, name) for name in Plan._fields)),
-            Terms(*(getattr(self.terms, name) for name in Terms._fields)),
-            law,
-            self._settings,
-            self._prediction,
-            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
-            Targets(*(getattr(self.feet, name) for name in Targets._fields)),
-            Scratch(*(np.zeros(shape) for shape in shapes)),
-        )
-        self.kernel_calls = (aiming,)
+        robot, stance = self.robot, standing_feet(self.robot)
+        sides = foot_sides(stance)
+        self.constants.side[:], self.constants.stance[:] = sides, stance
+        self.constants.mass = robot.total_mass
+        self._height = -float(stance[:, 2].mean())
+        self.prediction = landing_prediction(robot, sides)
 
-    def on_parameters(self) -> None:
-        for name in Settings._fields:
-            getattr(self._settings, name)[:] = getattr(self.params, name)
-        scale_gains(self.params, self._mass, self._height, self._prediction.gains)
+    def prepare(self) -> None:
+        scale_gains(self.params, self.robot.total_mass, self._height, self.prediction.gains)
+
+    @kernel
+    @staticmethod
+    def step(
+        phase: PhaseState,
+        reference: JumpReference,
+        terms: DynamicsTerms,
+        feet: FootTarget,
+        memory: LandingMemory,
+        params: LandingParams,
+        constants: LandingConstants,
+        scratch: LandingScratch,
+        prediction: Prediction,
+        period: float,
+    ) -> None:
+        flying, landing = phase.phase == Phase.FLIGHT, phase.phase == Phase.LANDING
+        if not memory.started:
+            find_origin(reference, terms, memory)
+        remember_touchdown(reference, flying, memory)
+        overdue = flying and reference.phase > Phase.FLIGHT
+        if not overdue:
+            remember_plan(reference, terms, constants, memory)
+        feed_back(terms, params, memory, scratch)
+        if flying and not memory.flying:
+            lift_off(terms, memory)
+        memory.flying = flying
+        elapsed, left = phase.time_in_phase, phase.time_to_touchdown
+        if flying and params.law == "predicted":
+            left = predict(reference, terms, elapsed, left, prediction, memory, scratch)
+        reach = params.reach_share * max(elapsed + left, period)
+        share, rate, _ = minimum_jerk(elapsed / reach)
+        drawn_in = params.retraction
+        if reference.toes_first:
+            drawn_in = 0.0  # the plan itself draws the feet in
+        lift, lift_rate = retraction(left, drawn_in, params.retraction_time)
+        lowest, lead = lowest_height(terms.foot_position), params.lead_time
+        turn_frame(reference, terms, params, overdue, memory, scratch)
+        if params.limits_about == "stance":
+            turn_places(constants.stance, yaw(memory.orientation), scratch.centre)
+        for foot in range(constants.side.shape[0]):
+            place, speed = scratch.place[foot], scratch.speed
+            choose_place(foot, params, constants, memory, feet.landing[foot], scratch)
+            speed[:] = reference.foot_velocity[foot] - reference.com_velocity
+            if overdue:
+                speed[:] = 0.0
+            else:
+                memory.swing[foot, :] = speed
+            if flying:
+                swing(
+                    memory.planned[foot], feet.landing[foot], memory.offset[foot], share,
+                    rate / reach, place, speed,
+                )  # fmt: skip
+                if params.law == "predicted":
+                    apply_lead(memory.swing[foot], lead * share, lead * rate / reach, place, speed)
+                place[2] += lift
+                speed[2] += lift_rate
+                memory.goal[foot, :] = terms.com + feet.landing[foot]
+            elif landing:
+                place[:2] = memory.goal[foot, :2] - terms.com[:2]
+                place[2] = lowest - terms.com[2]
+                speed[:] = -terms.com_velocity
+            else:
+                place[:] = memory.planned[foot]
+            convert_to_body(foot, reference.foot_yaw[foot], terms, feet, scratch)
+
+
+@kernel
+def find_origin(plan: JumpReference, terms: DynamicsTerms, memory: LandingMemory) -> None:
+    """Note the place of the plan in the world, by the middle of the feet."""
+    n = memory.offset.shape[0]
+    for foot in range(n):
+        memory.origin[:] += (terms.foot_position[foot] - plan.foot_position[foot]) / n
+    memory.started = True
+
+
+@kernel
+def remember_touchdown(plan: JumpReference, flying: bool, memory: LandingMemory) -> None:
+    """Keep where the centre of mass should touch down, before the plan names the next jump."""
+    if not flying:
+        memory.lift_off_time = plan.lift_off_time
+    elif plan.lift_off_time != memory.lift_off_time:
+        return
+    fall = plan.touchdown_time - plan.time
+    if flying and fall < 0.0:
+        return
+    memory.planned_touchdown[:] = plan.com_velocity * fall + plan.com + memory.origin
+
+
+@kernel
+def remember_plan(
+    plan: JumpReference, terms: DynamicsTerms, constants: LandingConstants, memory: LandingMemory
+) -> None:
+    """Keep the plan of this instant."""
+    mass = terms.mass_matrix[0, 0]
+    if mass == 0.0:
+        mass = constants.mass
+    memory.linear[:] = plan.com_velocity * mass
+    memory.angular[:] = plan.angular_momentum * (mass / constants.mass)
+    memory.planned[:] = plan.foot_position - plan.com
+    memory.orientation[:] = plan.orientation
+
+
+@kernel
+def feed_back(
+    terms: DynamicsTerms, params: LandingParams, memory: LandingMemory, scratch: LandingScratch
+) -> None:
+    """Compute the momenta that the law feeds back."""
+    scratch.linear[:] = terms.linear_momentum
+    scratch.angular[:] = terms.angular_momentum
+    if params.law != "paper":
+        scratch.linear[:] -= memory.linear
+        scratch.angular[:] -= memory.angular
+
+
+@kernel
+def lift_off(terms: DynamicsTerms, memory: LandingMemory) -> None:
+    """Begin a flight: note how far the feet are from their plan."""
+    memory.flight_time = 0.0
+    memory.shift[:] = 0.0
+    memory.offset[:] = terms.foot_position - terms.com - memory.planned
+
+
+@kernel
+def predict(
+    plan: JumpReference,
+    terms: DynamicsTerms,
+    elapsed: float,
+    left: float,
+    prediction: Prediction,
+    memory: LandingMemory,
+    scratch: LandingScratch,
+) -> float:
+    """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter.
+
+    ``left`` is the time to touchdown with the planned legs, which ends at zero. Shorter legs fall on.
+    """
+    if left > 0.0:
+        memory.flight_time = elapsed + left
+    left = memory.flight_time - elapsed
+    scratch.miss[:] = terms.com_velocity * left + terms.com - memory.planned_touchdown
+    speed = max(GRAVITY * left - terms.com_velocity[2], SLOWEST_DESCENT)
+    later = fall_time(speed, memory.shift[3])
+    if left + later >= LAST:
+        choose_shift_of_feet(
+            terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear,
+            scratch.angular, scratch.miss, left, memory.flight_time, speed, prediction,
+            memory.shift,
+        )  # fmt: skip
+        later = fall_time(speed, memory.shift[3])
+    return max(left + later, 0.0)
+
+
+@kernel
+def fall_time(speed: float, height: float) -> float:
+    """The time [s] in which a body falls by ``height`` [m] from the downward ``speed`` [m/s].
+
+    For a negative height it is that since the body was so much higher, at the latest its apex.
+    """
+    square = speed * speed + 2.0 * GRAVITY * height
+    return (math.sqrt(max(square, 0.0)) - speed) / GRAVITY
+
+
+@kernel
+def choose_place(
+    foot: int,
+    params: LandingParams,
+    constants: LandingConstants,
+    memory: LandingMemory,
+    place: Vector3,
+    scratch: LandingScratch,
+) -> None:
+    """The landing ``place`` (3,) of a foot from the centre of mass, by the law."""
+    planned, side = memory.planned[foot], constants.side[foot]
+    if params.law == "predicted":
+        shift = memory.shift
+        place[0] = planned[0] + shift[0]
+        place[1] = planned[1] + (shift[1] + side * shift[2])
+        place[2] = planned[2] + shift[3]
+        keep_within(params.p_max, scratch.centre[foot], place)
+        return
+    landing_place(
+        planned, side, scratch.linear, scratch.angular, params.w_l, params.w_k,
+        params.w_c, params.p_max, scratch.centre[foot], place,
+    )  # fmt: skip
+
+
+@kernel
+def turn_frame(
+    plan: JumpReference,
+    terms: DynamicsTerms,
+    params: LandingParams,
+    overdue: bool,
+    memory: LandingMemory,
+    scratch: LandingScratch,
+) -> None:
+    """Compute the frame that the targets are fixed in, its rate, and the CoM in the body."""
+    alpha = params.alpha
+    if plan.toes_first:
+        alpha = params.toes_alpha
+    planned, turn, vector = memory.orientation, scratch.turn, scratch.vector
+    from_matrix(terms.base_rotation, scratch.quaternion)
+    conjugate(planned, turn)
+    multiply(turn, scratch.quaternion, turn)
+    logarithm(turn, vector)
+    vector[:] = vector * alpha
+    exponential(vector, turn)
+    multiply(planned, turn, turn)
+    to_matrix(turn, scratch.rotation)
+    scratch.rate[:] = terms.velocity[3:6] * alpha
+    if not overdue:
+        scratch.rate[:] += plan.angular_velocity * (1.0 - alpha)
+    vector[:] = terms.com - terms.base_position
+    scratch.com_body[:] = terms.base_rotation.T @ vector
+
+
+@kernel
+def convert_to_body(
+    foot: int, heading: float, terms: DynamicsTerms, feet: FootTarget, scratch: LandingScratch
+) -> None:
+    """Convert place and speed relative to the CoM into those relative to the base; turn the sole."""
+    turn, vector = scratch.rotation.T, scratch.vector
+    vector[:] = turn @ scratch.place[foot]
+    feet.position[foot, :] = scratch.com_body + vector
+    feet.velocity[foot, :] = (
+        turn @ scratch.speed
+        - cross(scratch.rate, vector)
+        + terms.base_rotation.T @ terms.com_velocity
+        - terms.velocity[:3]
+        - cross(terms.velocity[3:6], scratch.com_body)
+    )
+    heading_matrix(heading, scratch.heading)
+    feet.rotation[foot, :, :] = turn @ scratch.heading

@@ -11,7 +11,6 @@ import numpy as np
 from ...mathematics.arrays import (
     Array1D,
     Array2D,
-    Array3D,
     Indices1D,
     Matrix3,
     Rows3,
@@ -29,10 +28,10 @@ from ...mathematics.landing_law import (
     predict_tilt,
     pull_to_place,
 )
-from ...mathematics.linear_algebra import multiply_vector
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
+from ..signals import DynamicsTerms
 
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
@@ -95,23 +94,6 @@ class PredictionGains(Parameters):
     stretch_damping: float = live_parameter(
         0.06, gt=0.0, text="damping where a leg is nearly stretched, in standing heights"
     )
-
-
-class Terms(NamedTuple):
-    """The fields of ``DynamicsTerms`` that the landing law takes."""
-
-    velocity: Array1D
-    mass_matrix: Array2D
-    contact_position: Rows3
-    contact_jacobian: Array3D
-    com: Vector3
-    com_velocity: Vector3
-    linear_momentum: Vector3
-    angular_momentum: Vector3
-    centroidal_matrix: Array2D
-    base_position: Vector3
-    base_rotation: Matrix3
-    foot_position: Rows3
 
 
 class Soles(NamedTuple):
@@ -222,7 +204,7 @@ def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) ->
 
 @kernel
 def choose_shift_of_feet(
-    terms: Terms,
+    terms: DynamicsTerms,
     foot_yaw: Array1D,
     planned: Array2D,
     orientation: Array1D,
@@ -275,13 +257,17 @@ def choose_shift_of_feet(
 
 @kernel
 def find_ways(
-    terms: Terms, foot_yaw: Array1D, planned: Rows3, soles: Soles, scratch: PredictionScratch
+    terms: DynamicsTerms,
+    foot_yaw: Array1D,
+    planned: Rows3,
+    soles: Soles,
+    scratch: PredictionScratch,
 ) -> None:
     """How far every contact point is from its planned place, with flat soles."""
     for point in range(soles.foot_of_point.shape[0]):
         foot = soles.foot_of_point[point]
         heading_matrix(foot_yaw[foot], scratch.heading)
-        multiply_vector(scratch.heading, soles.offset[point], scratch.vector)
-        for k in range(3):
-            place = scratch.vector[k] + planned[foot, k] + terms.com[k]
-            scratch.way[3 * point + k] = place - terms.contact_position[point, k]
+        scratch.vector[:] = scratch.heading @ soles.offset[point]
+        scratch.way[3 * point : 3 * point + 3] = (
+            scratch.vector + planned[foot] + terms.com - terms.contact_position[point]
+        )

@@ -120,6 +120,14 @@ class WholeBodyTarget(Signal):
     joint_acceleration = Field("n_joints", unit="rad/s^2", text="their accelerations")
 
 
+class PointTarget(Signal):
+    """Where a point of the robot should be at the present instant."""
+
+    position = Field(3, unit="m", frame="world", text="place of the point")
+    velocity = Field(3, unit="m/s", frame="world", text="its velocity")
+    acceleration = Field(3, unit="m/s^2", frame="world", text="its acceleration")
+
+
 class WholeBodyCommand(Signal):
     """The whole-body controller's solution: torques, accelerations and contact forces."""
 

@@ -233,7 +233,7 @@ def drive_loops(
 ) -> None:
     """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
-    active = commands.active[()]
+    active = int(commands.active[()])
     if commands.mode[active] == _ACTIVE:
         close_loops(
             loops, commands.targets, active, bool(joints.arrived[0]), joints.position,

@@ -133,7 +133,7 @@ def close_loops(
         loops.following[()] = True
     if not loops.following[()]:
         return False
-    age = loops.age[()]
+    age = int(loops.age[()])
     if arrived or age >= loops.steps:
         multiply_vector(gears.to_motor, seen.joint_position, seen.position)
         multiply_vector(gears.to_motor, seen.joint_velocity, seen.velocity)

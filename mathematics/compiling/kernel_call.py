@@ -92,4 +92,4 @@ def collect_calls() -> Iterator[list[KernelCall]]:
     try:
         yield calls
     finally:
-        _collecting.remove(calls)
+        _collecting[:] = [each for each in _collecting if each is not calls]

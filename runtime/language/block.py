@@ -156,6 +156,8 @@ class Block:
     """Room for what a step computes on its way, in ``scratch``. No value lasts until the next step."""
     named_steps: ClassVar[Mapping[str, Any]] = {}
     """The steps that name what they take, by the name of the method; see ``steps``."""
+    overridden_steps: ClassVar[frozenset[str]] = frozenset()
+    """Named steps of a base that a step in Python replaces: their calls are made by ``super().step()``."""
     inputs: ClassVar[Mapping[str, Input[Any]]] = {}
     outputs: ClassVar[Mapping[str, Output[Any]]] = {}
     states: ClassVar[Mapping[str, State[Any]]] = {}

@@ -78,6 +78,11 @@ def _convert(value: Any, unit: str) -> Any:
     return value
 
 
+ScalarOrVector = float | list[float]
+"""One number for all elements of a vector, or a list with one number for each of its ``n`` elements.
+A kernel sees a vector of ``n`` elements."""
+
+
 class Parameters(BaseModel):
     """The base of every block's parameters: unknown keys are errors, values cannot be changed."""
 
@@ -105,7 +110,7 @@ class Parameters(BaseModel):
 
 
 def parameter_kinds(params: type[Parameters]) -> dict[str, Kind]:
-    """What a kernel sees of each parameter: numbers, rows of numbers, and words."""
+    """What a kernel sees of each parameter: numbers, vectors and matrices of numbers, and words."""
     scope = vars(sys.modules[params.__module__])
     return {
         name: kind
@@ -117,6 +122,8 @@ def parameter_kinds(params: type[Parameters]) -> dict[str, Kind]:
 def _parameter_kind(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     if annotation in (float, int, bool):
         return ArrayKind((), annotation)
+    if annotation == ScalarOrVector:
+        return ArrayKind((None,))
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Literal and all(isinstance(word, str) for word in inner):
         return ArrayKind((), int, inner)
@@ -124,8 +131,10 @@ def _parameter_kind(annotation: Any, scope: Mapping[str, Any]) -> Kind:
         kinds = [_parameter_kind(_bare(each), scope) for each in inner]
         if all(isinstance(kind, ArrayKind) and not kind.shape for kind in kinds):
             return ArrayKind((len(inner),))
-    if origin in (tuple, list) and inner and _parameter_kind(_bare(inner[0]), scope) is not None:
-        return ArrayKind((None,))
+    if origin in (tuple, list) and inner:
+        kind = _parameter_kind(_bare(inner[0]), scope)
+        if isinstance(kind, ArrayKind) and not kind.words:
+            return ArrayKind((None, *kind.shape), kind.element)
     return None
 
 

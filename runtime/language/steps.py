@@ -63,21 +63,23 @@ def declare_steps(cls: type[Any]) -> None:
     Raises:
         DeclarationError: an argument is not declared, or with another type.
     """
-    own = dict(cls.named_steps)
+    own, overridden = dict(cls.named_steps), set(cls.overridden_steps)
     for name in METHODS:
         value = vars(cls).get(name)
         function = value.__func__ if isinstance(value, staticmethod) else value
         if not isinstance(function, FunctionType) or hasattr(function, "binds"):
             continue
-        own.pop(name, None)
         names = arguments_of(function)
+        if name in own:
+            overridden.add(name)  # a step in Python, which may call that of its base
         if is_kernel(function) or isinstance(value, staticmethod) or "self" not in names[:1]:
             declare(cls, function)
             own[name] = function
+            overridden.discard(name)
             made = step_in_file_of(cls, name, written_code(function))
             made.__doc__, made.binds = function.__doc__, function
             setattr(cls, name, made)
-    cls.named_steps = own
+    cls.named_steps, cls.overridden_steps = own, frozenset(overridden)
 
 
 def declare(cls: type[Any], function: FunctionType) -> None:
@@ -293,7 +295,10 @@ def _parameter_array(params: Parameters, name: str, kind: Kind) -> NDArray[Any]:
     value = getattr(params, name)
     if kind.words:
         return np.array(kind.words.index(value), np.int64)
-    return np.array(value, {int: np.int64, bool: np.bool_, float: np.float64}[kind.element])
+    array = np.array(value, {int: np.int64, bool: np.bool_, float: np.float64}[kind.element])
+    if array.ndim < kind.rank:  # one number for all elements of a vector
+        return np.full(getattr(params, "n"), value, array.dtype)  # noqa: B009  declared by subclasses
+    return array
 
 
 def refresh_parameters(block: Block) -> None:

@@ -110,7 +110,7 @@ class DistributedParameters(LiveParameters):
         for path, params in adjustment.params.items():
             self.blocks[path].params = params
             try:
-                self.blocks[path].on_parameters()
+                self._take_over(self.blocks[path])
             except Exception as error:  # noqa: BLE001  # the block's reason goes to whoever asked
                 self.undo()
                 return f"block '{path}' refuses the change: {describe(error)}"
@@ -120,7 +120,7 @@ class DistributedParameters(LiveParameters):
         """Go back to the parameters before what was tried, if anything was."""
         for path, params in self._before.items():
             self.blocks[path].params = params
-            self.blocks[path].on_parameters()
+            self._take_over(self.blocks[path])
         self._before, self._tried = {}, None
 
     def keep(self, tick: int) -> None:

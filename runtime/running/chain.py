@@ -34,6 +34,9 @@ Calls = Literal["kernel_calls", "update_calls"]
 def can_be_chained(block: Block, which: Calls = "kernel_calls") -> bool:
     """Whether a block's step, or its update, is nothing but compiled kernels."""
     calls = getattr(block, which)
+    names = {"update"} if which == "update_calls" else {"step", "emit"}
+    if names & type(block).overridden_steps:
+        return False  # there is Python around the calls
     return bool(calls) and all(call.compiled is not None for call in calls)
 
 

@@ -95,6 +95,19 @@ class Executor:
         self._fuse = fuse and not plain
         self._cautions: list[str] = []
 
+    def start(self, ticks: int | None = None) -> None:
+        """Compile the kernels, open the sinks and start all blocks: idle -> ready.
+
+        A run that Python steps calls this, too; ``ticks`` is how many there will be, if known.
+
+        Raises:
+            RunError: a block failed in its start.
+        """
+        self._compile_kernels()
+        self._open_sinks(ticks)
+        self.life.start()
+        self._note("life", "ready: every block has started")
+
     def run(self, ticks: int | None = None) -> RunResult:
         """Take the graph once through its whole life: start, ticks, stop cycles, close.
 
@@ -126,10 +139,7 @@ class Executor:
             try:
                 try:
                     interrupts.armed = True
-                    self._compile_kernels()
-                    self._open_sinks(limit)
-                    self.life.start()
-                    self._note("life", "ready: every block has started")
+                    self.start(limit)
                     self._ask_for_cautions()
                     if self._on_ready is not None:
                         self._on_ready()

@@ -17,15 +17,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Block
 from ..language.errors import AloftError, RunError
 from ..language.signals import Signal
 from ..language.stages import CheckedGraph, ClockSpec
-from .life_cycle import LifeCycle, LifeState
-from .memory import BoundGraph, Snapshot
-from .pacing import WallTime
-from .ticker import Ticker
+from .executor import Executor
+from .life_cycle import LifeState
+from .memory import Snapshot
 
 
 class SteppedRun:
@@ -39,15 +37,12 @@ class SteppedRun:
 
     def __init__(self, graph: CheckedGraph, *, plain: bool = False) -> None:
         self.graph = graph
-        self._bound = BoundGraph(graph)
-        self._bound.clock.kind = "free"
-        self._life = LifeCycle(self._bound.blocks)
-        self._ticker = Ticker(self._bound, ClockSpec(), WallTime(), timing=False)
-        if not plain:
-            compile_calls(self._bound.kernel_calls)
-            self._ticker.fuse()
+        executor = Executor(
+            graph, clock=ClockSpec(), log=False, run_hash=False, timing=False, plain=plain
+        )
+        self._bound, self._life, self._ticker = executor.bound, executor.life, executor.ticker
         try:
-            self._life.start()
+            executor.start()
         except BaseException:
             self._life.stop()
             raise

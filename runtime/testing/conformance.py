@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, RootModel, ValidationError
 
 from ...mathematics.compiling.compile_calls import compile_calls
+from ...mathematics.compiling.kernel_registry import arguments_of
 from ...robots.description import find_robot
 from ...robots.robot_description import RobotDescription
 from ..language.block import Block, Clock, Context
@@ -119,7 +120,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _ports_used(subject: Subject) -> None:
-    """Every declared port is named somewhere in the code of the class."""
+    """Every declared port is named somewhere in the code of the class, or taken by a step."""
     kind = subject.block_type
     fits = kind.fitted.__func__ is not Block.fitted.__func__  # type: ignore[attr-defined]  # a class method
     if fits and getattr(sys.modules[kind.__module__], kind.__name__, None) is not kind:
@@ -130,6 +131,8 @@ def _ports_used(subject: Subject) -> None:
             function = getattr(value, "__func__", value)
             if isinstance(function, FunctionType):
                 used.update(dict.fromkeys(_names(function.__code__)))
+    for function in kind.named_steps.values():
+        used.update(dict.fromkeys(arguments_of(function)))
     for name in {**kind.inputs, **kind.outputs, **kind.states}:
         subject.expect(name in used, f"port {name!r} is declared, but no method uses it")
 

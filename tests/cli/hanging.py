@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
 from aloft.runtime.language.block import Block, Output

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.blocks.general.constant import Constant
+from aloft.blocks.general.sources import Constant
 from aloft.runtime.loading import check
 from aloft.runtime.testing import BlockBench
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from aloft.blocks.jumping.landing_heuristic import LandingHeuristic
 from aloft.blocks.signals import Phase
 from aloft.mathematics.landing_law import (
-    hasten,
+    apply_lead,
     landing_place,
     retraction,
     swing,
@@ -383,7 +383,7 @@ def test_hastened_feet_are_ahead_of_their_planned_way():
 
     def at(time):
         out, speed = time * swings, swings.copy()
-        hasten(swings, 0.02 * time / 0.1, 0.02 / 0.1, out, speed)
+        apply_lead(swings, 0.02 * time / 0.1, 0.02 / 0.1, out, speed)
         return out, speed
 
     place, speed = at(0.1)

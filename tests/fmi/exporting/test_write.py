@@ -187,7 +187,7 @@ def test_modules_and_files_travel_in_the_fmu(folder: Path, tmp_path_factory: Any
     (folder / "helper.py").write_text("FACTOR = 3.0\n")
     (folder / "tripler.py").write_text(
         "from helper import FACTOR\n"
-        "from aloft.blocks.general.gain import Gain\n\n\n"
+        "from aloft.blocks.general.arithmetic import Gain\n\n\n"
         "class Tripler(Gain):\n"
         '    """Three times the input."""\n\n'
         "    def step(self):\n"

@@ -111,7 +111,13 @@ def test_jog_moves_one_motor_there_and_back(wire: Wire, bus: BearBus, hardware: 
     assert states(wire) == [3] + [0] * 9, "it ends in damping, and the others were never on"
     config = wire.bus.actuators[1].config
     assert config["limit_i_max"] == 8.0 and config["watchdog_timeout"] == 100_000
-    assert config["p_gain_direct_force"] * 0.2 <= 8.0 + 1e-6
+    # the whole current if the motor did not move at all
+    assert config["p_gain_direct_force"] * 0.2 == pytest.approx(8.0)
+    assert config["d_gain_direct_force"] == pytest.approx(0.05 * config["p_gain_direct_force"])
+    assert config["mode"] == 3 and config["i_gain_direct_force"] == 0.0
+    half = len(goals) // 2
+    np.testing.assert_allclose(goals[:half], goals[::-1][1 : half + 1], atol=1e-9)
+    assert goals[half // 2 - 1] == pytest.approx(0.4, abs=1e-3), "half-way after a quarter"
 
 
 def test_jog_ends_in_damping_whatever_happens(wire: Wire, bus: BearBus, hardware: Hardware) -> None:

@@ -10,7 +10,7 @@ import pytest
 from aloft.hal.random_streams import Purpose
 from aloft.hal.simulated import plant
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
-from aloft.hal.simulated.plant import Plant
+from aloft.hal.simulated.plant import Plant, PushPoints, apply_push, clear_wrenches
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices
@@ -130,3 +130,28 @@ def test_a_simulation_that_diverges_is_noticed() -> None:
     robot.step()
     robot.block.emit()
     assert np.isnan(robot.get("truth").base_angular_velocity).any()
+
+
+def test_a_push_beside_the_centre_of_mass_turns_its_body_by_the_lever() -> None:
+    random = np.random.default_rng(2)
+    places, centres = random.normal(size=(4, 3)), random.normal(size=(3, 3))
+    points = PushPoints(
+        sites=np.array([3, 1]), bodies=np.array([2, 0]), places=places, centres=centres,
+        wrenches=np.full((3, 6), 7.0), missing=np.zeros(1, dtype=np.bool_),
+    )  # fmt: skip
+    clear_wrenches(points.wrenches)
+    assert not points.wrenches.any()
+    apply_push(np.zeros(3), np.array(9), points)
+    assert not points.wrenches.any() and not points.missing[0], "no force acts at no point"
+    for number, (site, body) in enumerate(((3, 2), (1, 0))):
+        force = random.normal(size=3)
+        apply_push(force, np.array(number), points)
+        np.testing.assert_allclose(points.wrenches[body, :3], force)
+        lever = places[site] - centres[body]
+        np.testing.assert_allclose(points.wrenches[body, 3:], np.cross(lever, force), atol=1e-12)
+    assert not points.wrenches[1].any()
+    for force in np.eye(3):
+        for number in (-1, 2):
+            points.missing[0] = False
+            apply_push(force, np.array(number), points)
+            assert points.missing[0]

@@ -6,7 +6,7 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-from aloft.blocks.general.constant import Constant
+from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordingError, read
 from aloft.logs.file.header import header_of
 from aloft.logs.file.messages import (

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.constant import Constant
+from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.file.header import make_header
 from aloft.logs.file.repair import RepairError, repair

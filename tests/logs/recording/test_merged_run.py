@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.constant import Constant
+from aloft.blocks.general.sources import Constant
 from aloft.logs.file.reader import RecordedRun, read
 from aloft.logs.recording.merged_run import (
     machine_of,

@@ -29,7 +29,7 @@ blocks:
 ADDER = """
 import numpy as np
 from aloft import Block, Input, Output, Parameters, State, live_parameter, parameter
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 
 
 class Adder(Block):

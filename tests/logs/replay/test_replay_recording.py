@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.sources import SineWave
 from aloft.logs.file.messages import all_tables
 from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay

@@ -174,3 +174,20 @@ def test_published_robots_have_a_mesh_on_every_link(name: str) -> None:
         for mesh in look.meshes:
             assert mesh.file.startswith("package://")
             assert find_file(mesh.file, Path()) is not None
+
+
+@pytest.mark.parametrize("corner", ["nan 0 0", "0 inf 0"])
+def test_a_mesh_with_a_corner_that_is_nowhere_is_refused(tmp_path: Path, corner: str) -> None:
+    file = tmp_path / "part.obj"
+    faces = "f 1 2 3\nf 2 3 4\n"
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 2\n{faces}")
+    triangles = mesh_triangles(file)
+    assert triangles.tolist() == [
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [0, 1, 0], [0, 0, 2]],
+    ]  # fmt: skip
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv {corner}\n{faces}")
+    with pytest.raises(ValueError, match="a mesh of 2 triangles, or not all are finite"):
+        mesh_triangles(file)
+    file.write_text("v 0 0 0\n")
+    with pytest.raises(ValueError, match="a mesh of 0 triangles"):
+        mesh_triangles(file)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.delay import delay_block_type, initial_problems
 from aloft.runtime.language.errors import RunError

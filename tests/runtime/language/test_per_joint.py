@@ -83,6 +83,11 @@ def test_what_a_list_may_have_meant() -> None:
     }  # fmt: skip
     assert by_name(range(10), BRUCE) == dict(zip(NAMES, range(10), strict=True))
     assert by_name([1, 2], BRUCE) == {}
+    assert by_name([1, 2, 3, 4, 5], BRUCE.model_copy(update={"feet": ()})) == {}
+    # a leg of four joints beside one of five: neither length is that of all
+    shorter = BRUCE.feet[0].model_copy(update={"link": "right_calf"})
+    uneven = BRUCE.model_copy(update={"feet": (shorter, *BRUCE.feet[1:])})
+    assert by_name([1, 2, 3, 4, 5], uneven) == {} and by_name([1, 2, 3, 4], uneven) == {}
 
 
 def test_a_pattern_that_would_match_more_is_not_proposed() -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aloft.blocks.general.white_noise import WhiteNoise
+from aloft.blocks.general.noise import WhiteNoise
 from aloft.runtime.language.block import Clock, Context
 from aloft.runtime.language.random_stream import RandomStream, StreamState
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.blocks.general.gain import Gain
+from aloft.blocks.general.arithmetic import Gain
 from aloft.runtime.language import registry
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.errors import UnknownBlockError
@@ -22,7 +22,7 @@ from aloft.runtime.language.registry import (
 
 BLOCK = """
 from aloft.runtime.language.block import Block, Output
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 class Mine(Block):
     y = Output(Vector)
     mark = "{mark}"
@@ -171,7 +171,7 @@ def test_what_is_not_there(name: str) -> None:
 
 
 def test_blocks_of_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    point = EntryPoint("theirs.Gain", "aloft.blocks.general.gain:Gain", "aloft.blocks")
+    point = EntryPoint("theirs.Gain", "aloft.blocks.general.arithmetic:Gain", "aloft.blocks")
     monkeypatch.setattr(registry.metadata, "entry_points", lambda group: [point])
     registry._entry_points.cache_clear()
     try:

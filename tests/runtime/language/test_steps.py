@@ -12,6 +12,7 @@ from aloft.runtime.language.errors import BlockError, DeclarationError
 from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.running.chain import can_be_chained
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.testing.bench import BlockBench
 
@@ -177,3 +178,20 @@ def test_what_setup_forgot_is_named() -> None:
 
     with pytest.raises(BlockError, match="takes 'gain', which is no port or state, and setup"):
         BlockBench(Forgetful, dimensions={"n": 2})
+
+
+class Doubled(LowPass):
+    """A step in Python around a kernel."""
+
+    def step(self) -> None:  # type: ignore[override]  # the kernel's arguments are bound by name
+        super().step()
+        self.y.value[...] *= 2.0
+
+
+def test_a_step_in_python_may_call_the_kernel_that_it_replaces() -> None:
+    whole, base = BlockBench(Doubled), BlockBench(LowPass)
+    for bench in (whole, base):
+        bench.set("u", value=[1.0, 2.0])
+        bench.step()
+    assert whole.get("y").value.tolist() == (2.0 * base.get("y").value).tolist()
+    assert not can_be_chained(whole.block) and can_be_chained(base.block)

@@ -5,10 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from aloft import Block, BlockError, Field, Input, Output, Parameters, Signal, State, parameter
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.integrator import Integrator
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.sum import Sum
+from aloft.blocks.general.arithmetic import Gain, Sum
+from aloft.blocks.general.integrators_and_delays import Integrator
+from aloft.blocks.general.sources import SineWave
 from aloft.runtime.language.stages import CheckedGraph, Wire
 from aloft.runtime.placement.placed import spread
 from aloft.runtime.testing.graphs import BlockUse, checked_graph

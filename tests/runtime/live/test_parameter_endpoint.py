@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.sources import SineWave
 from aloft.runtime.live.parameter_endpoint import (
     EndpointError,
     ParameterEndpoint,

@@ -9,8 +9,8 @@ import os
 import random
 from typing import Any
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.sources import SineWave
 from aloft.runtime.live.parameter_endpoint import _answer
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing import BlockUse, checked_graph

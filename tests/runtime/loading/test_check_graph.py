@@ -215,7 +215,7 @@ def test_a_crash_in_a_users_own_check_is_a_problem(tmp_path: Path) -> None:
     (tmp_path / "crashes.py").write_text(
         "from aloft.runtime.language.block import Block, Output\n"
         "from aloft.runtime.language.parameters import Parameters\n"
-        "from aloft.blocks.general.vector import Vector\n"
+        "from aloft.blocks.general.vectors import Vector\n"
         "from pydantic import model_validator\n"
         "class Validator(Block):\n"
         "    class Params(Parameters):\n"

@@ -165,7 +165,7 @@ def test_an_override_inside_a_nested_parameter(tmp_path: Path) -> None:
     (tmp_path / "nested.py").write_text(
         "from aloft.runtime.language.block import Block, Output\n"
         "from aloft.runtime.language.parameters import Parameters, parameter\n"
-        "from aloft.blocks.general.vector import Vector\n"
+        "from aloft.blocks.general.vectors import Vector\n"
         "class Nested(Block):\n"
         "    class Params(Parameters):\n"
         "        class Noise(Parameters):\n"
@@ -246,7 +246,7 @@ blocks:
 DEFAULTS_PARTS = """
 from aloft.runtime.language.block import Block, Input, Output
 from aloft.runtime.language.parameters import Parameters
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 class Optional(Block):
     class Params(Parameters):
         n: int = 2
@@ -304,7 +304,7 @@ def test_dollars_in_texts_survive_the_flat_text(tmp_path: Path) -> None:
     (tmp_path / "texts.py").write_text(
         "from aloft.runtime.language.block import Block, Output\n"
         "from aloft.runtime.language.parameters import Parameters\n"
-        "from aloft.blocks.general.vector import Vector\n"
+        "from aloft.blocks.general.vectors import Vector\n"
         "class Text(Block):\n"
         "    class Params(Parameters):\n"
         "        n: int = 1\n"

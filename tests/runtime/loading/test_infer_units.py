@@ -11,7 +11,7 @@ from aloft.runtime.loading.problems import Problem
 
 SENSOR = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 
 class Millimetres(Signal):
     value = Field("n", unit="mm", frame="body", text="a position")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.sinks import Note

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.sources import SineWave
+from aloft.blocks.general.user_code import Function
+from aloft.blocks.general.vectors import Vector
 from aloft.mathematics.compiling import chain_code
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
@@ -97,7 +97,7 @@ def graph(**params: object):
             "one": BlockUse(Smooth, wires={"u": "wave.y"}),
             "slow": BlockUse(Smooth, params, {"u": "one.y"}, period_ticks=2, offset_ticks=1),
             "two": BlockUse(Smooth, wires={"u": "slow.y"}),
-            "gain": BlockUse(Gain, wires={"u": "two.y"}),
+            "gain": BlockUse(Function, wires={"u": "two.y"}),
             "three": BlockUse(Smooth, wires={"u": "gain.y"}),
         }
     )
@@ -120,7 +120,12 @@ def chains(made: Ticker) -> list[tuple[str, ...]]:
 
 def test_consecutive_blocks_of_a_phase_are_one_call_with_the_same_bytes() -> None:
     fused, single = ticker(fuse=True), ticker(fuse=False)
-    assert chains(fused) == [("one", "two"), ("three",), ("one", "slow", "two"), ("three",)]
+    assert chains(fused) == [
+        ("wave", "one", "two"),
+        ("three",),
+        ("wave", "one", "slow", "two"),
+        ("three",),
+    ]
     assert chains(single) == []
     for _ in range(40):
         fused.advance(1)

@@ -9,13 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.constant import Constant
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.integrator import Integrator
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.sum import Sum
-from aloft.blocks.general.unit_delay import UnitDelay
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain, Sum
+from aloft.blocks.general.integrators_and_delays import Integrator, UnitDelay
+from aloft.blocks.general.sources import Constant, SineWave
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.graph import load
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.errors import AloftError, ExitCode
@@ -386,7 +383,7 @@ def test_an_empty_graph_runs() -> None:
 
 def test_a_block_that_writes_its_input_is_told_so(tmp_path: Path) -> None:
     (tmp_path / "writes_input.py").write_text(
-        "from aloft.blocks.general.gain import Gain\n\n\n"
+        "from aloft.blocks.general.arithmetic import Gain\n\n\n"
         "class WritesInput(Gain):\n"
         "    def step(self):\n"
         "        self.u.value[0] = 1.0\n"

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Input, Output
 from aloft.runtime.language.errors import AloftError, BlockError, ExitCode, RunError
 from aloft.runtime.language.parameters import Parameters

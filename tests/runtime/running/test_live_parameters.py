@@ -5,9 +5,9 @@ import threading
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.sources import SineWave
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.language.parameter_change import ParameterChange

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.constant import Constant
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.sources import Constant
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.errors import BlockError, DeclarationError, RunError
 from aloft.runtime.language.parameters import Parameters

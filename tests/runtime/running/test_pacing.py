@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.parameters import Parameters

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.sine_wave import SineWave
-from aloft.blocks.general.unit_delay import UnitDelay
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.integrators_and_delays import UnitDelay
+from aloft.blocks.general.sources import SineWave
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Input, Output
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.running.executor import Executor

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running import real_time

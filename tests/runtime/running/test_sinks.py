@@ -5,7 +5,7 @@ from hashlib import blake2b
 import numpy as np
 import pytest
 
-from aloft.blocks.general.sine_wave import SineWave
+from aloft.blocks.general.sources import SineWave
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.sinks import MemoryLog, RunHash

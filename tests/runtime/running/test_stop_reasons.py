@@ -1,6 +1,6 @@
 """Why a run ended is told, whoever asked for its end."""
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running.executor import run

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.unit_delay import UnitDelay
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.integrators_and_delays import UnitDelay
+from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.testing import BlockBench

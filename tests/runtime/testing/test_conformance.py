@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.general.vector import Vector
+from aloft.blocks.general.vectors import Vector
 from aloft.blocks.signals import Phase
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.general.gain import Gain
-from aloft.blocks.general.unit_delay import UnitDelay
+from aloft.blocks.general.arithmetic import Gain
+from aloft.blocks.general.integrators_and_delays import UnitDelay
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.testing.stretch import Setting, Stretch, StretchError

@@ -1,0 +1,229 @@
+"""Integrators, delays, and what holds a sample."""
+
+from __future__ import annotations
+
+from ...mathematics.kernel import kernel
+from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import SECOND
+from .vectors import (
+    NEVER,
+    Bounded,
+    Bounds,
+    Flag,
+    InitialValueParameters,
+    ScalarOrVector,
+    UnitOfInput,
+    Vector,
+    VectorParameters,
+)
+
+
+class Integrator(Bounded, Block):
+    """The time integral by forward Euler: y[n] = x[n], x[n+1] = x[n] + T u[n], x[0] = initial.
+
+    T is the block's period. With bounds x[n+1] is kept within them, so nothing winds up beyond.
+    Where ``reset`` holds in tick n, x[n+1] = initial. A Moore block, so it breaks a loop;
+    ``TrapezoidalIntegrator`` is more exact and does not.
+    """
+
+    class Params(InitialValueParameters):
+        lower: ScalarOrVector | None = parameter(None, text="the least integral")
+        upper: ScalarOrVector | None = parameter(None, text="the greatest integral")
+
+    params: Params
+    u = Input(Vector, text="the rate")
+    reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
+    y = Output(Vector, text="its integral")
+    x = State(Vector, text="the integral")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the rate times a second."""
+        u = given["u"]
+        return {"y": u and u.times(SECOND)}
+
+    def setup(self) -> None:
+        self.x.value[...] = self.params.initial
+
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: Vector) -> None:
+        y.value[:] = x.value
+
+    @kernel
+    @staticmethod
+    def update(
+        u: Vector, reset: Flag, x: Vector, params: Params, constants: Bounds, period: float
+    ) -> None:
+        if reset.value:
+            x.value[:] = params.initial
+        else:
+            x.value[:] += u.value * period
+            x.value[:] = min(constants.upper, max(constants.lower, x.value))
+
+
+class TrapezoidalState(Signal):
+    """What the trapezoidal integrator remembers."""
+
+    integral = Field("n", text="the integral so far")
+    rate = Field("n", text="the input before")
+    started = Field((), dtype="bool", text="whether there was an input since the start or a reset")
+
+
+class TrapezoidalIntegrator(Block):
+    """The time integral by trapezoids: y[n] = y[n-1] + T (u[n-1] + u[n]) / 2, y[0] = initial.
+
+    T is the block's period. Where ``reset`` holds it starts anew: y = initial. The output follows
+    from the input of the same tick, so it breaks no loop; ``Integrator`` does.
+    """
+
+    Params = InitialValueParameters
+    params: InitialValueParameters
+    u = Input(Vector, text="the rate")
+    reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
+    y = Output(Vector, text="its integral")
+    x = State(TrapezoidalState, text="the integral and the rate before")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the rate times a second."""
+        u = given["u"]
+        return {"y": u and u.times(SECOND)}
+
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector,
+        reset: Flag,
+        y: Vector,
+        x: TrapezoidalState,
+        params: InitialValueParameters,
+        period: float,
+    ) -> None:
+        if reset.value or not x.started:
+            x.integral[:] = params.initial
+            x.started = True
+        else:
+            x.integral[:] += (x.rate + u.value) * (0.5 * period)
+        x.rate[:] = u.value
+        y.value[:] = x.integral
+
+
+class UnitDelay(UnitOfInput, Block):
+    """The input of the run before: y[n] = x[n], x[n+1] = u[n], x[0] = initial.
+
+    A Moore block, so it breaks a loop.
+    """
+
+    Params = InitialValueParameters
+    params: InitialValueParameters
+    u = Input(Vector, text="what is delayed")
+    y = Output(Vector, text="u one run ago")
+    x = State(Vector, text="u of the last run")
+
+    def setup(self) -> None:
+        self.x.value[...] = self.params.initial
+
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: Vector) -> None:
+        y.value[:] = x.value
+
+    @kernel
+    @staticmethod
+    def update(u: Vector, x: Vector) -> None:
+        x.value[:] = u.value
+
+
+class DelayLine(Signal):
+    """A delay line."""
+
+    values = Field(("samples", "n"), text="the last inputs, each in the place of its turn")
+    next = Field((), dtype="int64", text="the place of the oldest, which is the next to be written")
+
+
+class Delay(UnitOfInput, Block):
+    """The input of k runs before: y[n] = u[n-k] with k = ``samples``, and initial for n < k.
+
+    A Moore block, so it breaks a loop. A wire delays as well: ``{from: a.y, delay: 3}``.
+    """
+
+    class Params(InitialValueParameters):
+        samples: int = parameter(1, ge=1, text="k, by how many runs of the block")
+
+    params: Params
+    u = Input(Vector, text="what is delayed")
+    y = Output(Vector, text="u, k runs ago")
+    x = State(DelayLine, text="the last k inputs")
+
+    def setup(self) -> None:
+        self.x.values[...] = self.params.initial
+
+    @kernel
+    @staticmethod
+    def emit(y: Vector, x: DelayLine) -> None:
+        y.value[:] = x.values[x.next, :]
+
+    @kernel
+    @staticmethod
+    def update(u: Vector, x: DelayLine, params: Params) -> None:
+        x.values[x.next, :] = u.value
+        x.next = (x.next + 1) % params.samples
+
+
+class SampleHold(UnitOfInput, Block):
+    """The input where ``trigger`` holds, and its last such value where it does not.
+
+    Before the first sample y = initial.
+    """
+
+    Params = InitialValueParameters
+    params: InitialValueParameters
+    u = Input(Vector, text="what is sampled")
+    trigger = Input(Flag, text="whether to sample")
+    y = Output(Vector, text="the last sample")
+    x = State(Vector, text="the last sample")
+
+    def setup(self) -> None:
+        self.x.value[...] = self.params.initial
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, trigger: Flag, y: Vector, x: Vector) -> None:
+        if trigger.value:
+            x.value[:] = u.value
+        y.value[:] = x.value
+
+
+class HeldSample(Signal):
+    """A held sample."""
+
+    value = Field("n", text="the last sample")
+    age = Field((), dtype="int64", text="runs since it was taken")
+
+
+class ZeroOrderHold(UnitOfInput, Block):
+    """A sample of the input in every k-th run, held in between: y[n] = u[k floor(n / k)].
+
+    Between blocks of different rates none is needed: there a slower reader samples and a faster
+    one holds by itself.
+    """
+
+    class Params(VectorParameters):
+        samples: int = parameter(2, ge=1, text="k, from one sample to the next in runs")
+
+    params: Params
+    u = Input(Vector, text="what is sampled")
+    y = Output(Vector, text="the last sample")
+    x = State(HeldSample, text="the last sample")
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector, x: HeldSample, params: Params) -> None:
+        if x.age == 0:
+            x.value[:] = u.value
+        x.age = (x.age + 1) % params.samples
+        y.value[:] = x.value

@@ -1,0 +1,259 @@
+"""Finite-state machines, and assertions that a run must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field as Key
+
+from ...mathematics.arrays import Flags1D, Indices1D
+from ...mathematics.kernel import kernel
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Clock, Input, Metric, Misfit, Output, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from .vectors import (
+    Bounded,
+    Bounds,
+    Flag,
+    Flags,
+    ScalarOrVector,
+    Seconds,
+    Vector,
+    VectorParameters,
+)
+
+
+class Transition(Parameters):
+    """One way from a state to another."""
+
+    source: str = Key(alias="from", description="the state it leaves")
+    to: str = parameter(text="the state it enters")
+    when: str | None = parameter(
+        None, text="the condition that must hold, or `not` and the condition that must not"
+    )
+    after: float = parameter(
+        0.0, unit="s", ge=0.0, text="how long the state must have lasted at least"
+    )
+
+
+class StateName(Signal):
+    """Which state is present."""
+
+    index = Field((), dtype="int64", text="its place in the list of states, from 0")
+    value = Field("n_states", dtype="bool", text="one truth value for each state")
+
+
+class Transitions(NamedTuple):
+    """All transitions, those from the first state first."""
+
+    first: Indices1D
+    """For each state the place of its first transition; one more for the end."""
+    target: Indices1D
+    """The state that is entered."""
+    condition: Indices1D
+    """The place of the condition; -1 where there is none."""
+    expected: Flags1D
+    """What the condition must be."""
+    least_runs: Indices1D
+    """For how many runs the state must have lasted."""
+
+
+class MachineState(Signal):
+    """What a state machine remembers."""
+
+    index = Field((), dtype="int64", text="the present state")
+    runs = Field((), dtype="int64", text="runs that have passed since it was entered")
+
+
+class StateMachine(Block):
+    """A finite-state machine: ``states``, of which the first is the initial one, and transitions.
+
+    In every run the transitions from the present state are tried in the order they are written, and
+    the first whose condition holds and whose time has come is taken, at most one in a run. The
+    outputs show the state after it::
+
+        states: [idle, running]
+        conditions: [start, stop]          # the names of u's elements
+        transitions:
+          - {from: idle, to: running, when: start}
+          - {from: running, to: idle, when: stop, after: 0.5 s}
+    """
+
+    class Params(Parameters):
+        states: list[str] = parameter(text="the names of all states", min_length=1)
+        conditions: list[str] = parameter(
+            text="the names of the input's elements, in order", min_length=1
+        )
+        transitions: list[Transition] = parameter(text="the ways between states")
+
+    params: Params
+    u = Input(Flags, text="the conditions")
+    state = Output(StateName, text="the present state")
+    elapsed = Output(Seconds, text="how long it has lasted")
+    x = State(MachineState, text="the present state")
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` conditions and ``n_states``."""
+        assert isinstance(params, cls.Params)
+        return {"n": len(params.conditions), "n_states": len(params.states)}
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Every name of a transition must be one of a state or of a condition."""
+        assert isinstance(params, cls.Params)
+        for key, names in (("states", params.states), ("conditions", params.conditions)):
+            for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+                yield Misfit(f"{name!r} is twice in {key}", parameter=key)
+        for transition in params.transitions:
+            for state in (transition.source, transition.to):
+                if state not in params.states:
+                    yield _unknown("state", state, params.states)
+            if transition.when is not None:
+                name = transition.when.removeprefix("not ").strip()
+                if name not in params.conditions:
+                    yield _unknown("condition", name, params.conditions)
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Two states and two conditions."""
+        return {
+            "states": ["idle", "running"],
+            "conditions": ["start", "stop"],
+            "transitions": [
+                {"from": "idle", "to": "running", "when": "start"},
+                {"from": "running", "to": "idle", "when": "not stop", "after": 0.004},
+            ],
+        }
+
+    def setup(self) -> None:
+        p = self.params
+        ways = sorted(
+            p.transitions, key=lambda way: p.states.index(way.source)
+        )  # keeps their order
+        names = [(way.when or "").removeprefix("not ").strip() for way in ways]
+        self.transitions = Transitions(
+            np.searchsorted(
+                [p.states.index(way.source) for way in ways], np.arange(len(p.states) + 1)
+            ),
+            np.array([p.states.index(way.to) for way in ways], np.int64),
+            np.array([p.conditions.index(name) if name else -1 for name in names], np.int64),
+            np.array([not (way.when or "").startswith("not ") for way in ways], bool),
+            np.array([np.ceil(way.after / self.period - 1e-6) for way in ways], np.int64),
+        )
+
+    @kernel
+    @staticmethod
+    def step(
+        u: Flags,
+        state: StateName,
+        elapsed: Seconds,
+        x: MachineState,
+        transitions: Transitions,
+        period: float,
+    ) -> None:
+        before = x.index
+        for k in range(transitions.first[before], transitions.first[before + 1]):
+            condition = transitions.condition[k]
+            holds = condition < 0 or u.value[condition] == transitions.expected[k]
+            if holds and x.runs >= transitions.least_runs[k]:
+                x.index = transitions.target[k]
+                x.runs = 0
+                break
+        for k in range(state.value.shape[0]):
+            state.value[k] = k == x.index
+        state.index = x.index
+        elapsed.value[0] = x.runs * period
+        x.runs += 1
+
+
+def _unknown(kind: str, name: str, known: list[str]) -> Misfit:
+    return Misfit(
+        f"there is no {kind} {name!r}",
+        parameter="transitions",
+        expected=", ".join(known),
+        found=name,
+    )
+
+
+class Violations(Signal):
+    """What an assertion remembers."""
+
+    count = Field((), dtype="int64", text="runs in which a bound was broken")
+    first = Field((), unit="s", text="when that was first")
+    value = Field((), text="the element's value then")
+    element = Field((), dtype="int64", text="the element that broke it then")
+
+
+class Assertion(Bounded, Block):
+    """Bounds that every element must keep: lower <= u <= upper.
+
+    A run in which one was broken is not successful, and its reason names the first: the element, its
+    value, and when. With ``action: stop`` the run ends there; with ``mark`` it goes on.
+    """
+
+    class Params(VectorParameters):
+        lower: ScalarOrVector | None = parameter(None, text="what u must not be below")
+        upper: ScalarOrVector | None = parameter(None, text="what u must not be above")
+        action: Literal["stop", "mark"] = parameter("stop", text="what a broken bound does")
+
+    params: Params
+    u = Input(Vector, text="what must keep the bounds")
+    ok = Output(Flag, text="whether it does in this run")
+    x = State(Violations, text="what was broken")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross, and one must be there."""
+        assert isinstance(params, cls.Params)
+        yield from super().requires(params, robot)
+        if params.lower is None and params.upper is None:
+            yield Misfit("it has no bound", fix="with: {upper: 1.0}")
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, object]:
+        """A bound that is broken now and then."""
+        return {"n": 2, "lower": -0.9, "upper": 0.9}
+
+    def _reason(self) -> str:
+        element = int(self.x.element)
+        return (
+            f"{self.context.path}: element {element} was {float(self.x.value):.6g} at "
+            f"{float(self.x.first):.6g} s, outside [{self.constants.lower[element]:g}, "
+            f"{self.constants.upper[element]:g}]"
+        )
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """Whether the bounds were kept, and in how many runs they were not."""
+        count = int(self.x.count)
+        if not count:
+            return {"success": True, "violations": 0}
+        return {"success": False, "reason": self._reason(), "violations": count}
+
+    @kernel
+    @staticmethod
+    def step(
+        u: Vector, ok: Flag, x: Violations, params: Params, constants: Bounds, clock: Clock
+    ) -> bool:
+        broken = -1
+        for i in range(u.value.shape[0]):
+            if u.value[i] < constants.lower[i] or u.value[i] > constants.upper[i]:
+                broken = i
+                break
+        ok.value = broken < 0
+        if broken < 0:
+            return False
+        if x.count == 0:
+            x.first = clock.base_period * clock.tick
+            x.element = broken
+            x.value = u.value[broken]
+        x.count += 1
+        return params.action == "stop"
+
+    def on_event(self) -> None:
+        self.request_stop(self._reason())

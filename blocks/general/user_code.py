@@ -1,0 +1,336 @@
+"""What the graph computes by a formula, a function, or from outside."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import field_validator
+
+from ...mathematics.expression import parse_expression
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.errors import UnitError
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.unit_algebra import ONE, SECOND, over, read_unit, root, times
+from ...runtime.language.units import Unit, parse_unit
+from .vectors import (
+    InitialValueParameters,
+    SourceParameters,
+    UnitFromParameters,
+    Vector,
+    VectorParameters,
+)
+
+Name = Literal[
+    "abs", "sign", "negative", "reciprocal", "square", "sqrt", "exp", "log", "log10",
+    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "round",
+]  # fmt: skip
+UFUNCS: Mapping[str, Any] = {
+    "abs": np.absolute, "sign": np.sign, "negative": np.negative, "reciprocal": np.reciprocal,
+    "square": np.square, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "log10": np.log10,
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos,
+    "atan": np.arctan, "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "floor": np.floor,
+    "ceil": np.ceil, "round": np.rint,
+}  # fmt: skip
+
+
+_SAME = ("abs", "negative", "floor", "ceil", "round")
+_OF_ANGLES = ("sin", "cos", "tan")
+_TO_ANGLES = ("asin", "acos", "atan")
+
+
+def _quantity(name: str, given: Given) -> Quantity | None:
+    """What a function makes of the quantity of ``u``."""
+    u = given["u"]
+    if u is None or name in _SAME:
+        return u
+    if name == "reciprocal":
+        return Quantity(frame=u.frame).times(u.unit, -1)
+    if name == "square":
+        return u.times(u.unit)
+    if name == "sqrt":
+        try:
+            return Quantity(None if u.unit is None else root(u.unit), u.frame)
+        except UnitError as error:
+            given.refuse("u", str(error))
+            return Quantity(None)
+    if name in _OF_ANGLES:
+        given.demand("u", ("rad", ""), f"{name} takes angles in rad")
+    elif name != "sign":
+        given.demand("u", ("",), f"{name} takes plain numbers")
+    return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
+
+
+class Function(Block):
+    """A function of every element by itself: y = f(u).
+
+    Angles are in rad; ``round`` rounds halves to even. Outside a function's domain, such as the
+    square root of a negative number, an element is not finite, and that ends the run with the
+    block's name.
+    """
+
+    class Params(VectorParameters):
+        function: Name = parameter("abs", text="which function")
+
+    params: Params
+    u = Input(Vector, text="the arguments")
+    y = Output(Vector, text="the function's values")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Angles go into sin, cos and tan; roots need even powers."""
+        assert isinstance(params, cls.Params)
+        return {"y": _quantity(params.function, given)}
+
+    def setup(self) -> None:
+        """Choose the function."""
+        self._function = UFUNCS[self.params.function]
+
+    def step(self) -> None:
+        """Evaluate it."""
+        self._function(self.u.value, out=self.y.value)
+
+
+INPUTS = ("a", "b", "c", "d", "e", "f", "g", "h")
+ABSENT = {"value": 0.0}
+
+
+class Expression(Block):
+    """A formula, element by element, of the inputs a to h, the time t [s] and named constants.
+
+    It may hold numbers, ``+ - * / ** %``, comparisons (1 where they hold, else 0), brackets,
+    ``x if condition else y``, ``pi``, and abs, sign, sqrt, exp, log, sin, cos, tan, asin, acos,
+    atan, atan2, tanh, floor, ceil, min, max, hypot::
+
+        with: {expression: "k * (a - b) if t > 1 else 0", constants: {k: 2.5}}
+
+    Units are checked in it: ``units: {k: N/m}`` says those of constants, t is in s, and other
+    numbers are plain. ``unit: unchecked`` switches this off.
+
+    It is compiled once, never evaluated as Python. Both sides of a choice are computed, so neither
+    may be outside a function's domain.
+    """
+
+    class Params(VectorParameters):
+        expression: str = parameter(text="the formula")
+        constants: dict[str, float] = parameter({}, text="numbers by the names the formula has")
+        units: dict[str, str] = parameter({}, text="units of constants, by name")
+        unit: str | None = parameter(None, text="unit of y, if it is said and not computed")
+
+        @field_validator("unit", "units")
+        @classmethod
+        def _readable(cls, value: Any) -> Any:
+            for text in value.values() if isinstance(value, dict) else [value or ""]:
+                read_unit(text)
+            return value
+
+    params: Params
+    a = Input(Vector, text="the variable a", default=ABSENT)
+    b = Input(Vector, text="the variable b", default=ABSENT)
+    c = Input(Vector, text="the variable c", default=ABSENT)
+    d = Input(Vector, text="the variable d", default=ABSENT)
+    e = Input(Vector, text="the variable e", default=ABSENT)
+    f = Input(Vector, text="the variable f", default=ABSENT)
+    g = Input(Vector, text="the variable g", default=ABSENT)
+    h = Input(Vector, text="the variable h", default=ABSENT)
+    y = Output(Vector, text="the formula's value")
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The formula must be one."""
+        assert isinstance(params, cls.Params)
+        for name in params.constants:
+            if name in (*INPUTS, "t", "pi") or not name.isidentifier():
+                yield Misfit(f"a constant cannot be called {name!r}", "constants")
+        for name in params.units:
+            if name not in params.constants:
+                yield Misfit(
+                    f"there is no constant {name!r}",
+                    f"units.{name}",
+                    expected=", ".join(params.constants) or "constants",
+                )
+        try:
+            parse_expression(params.expression, (*INPUTS, "t", *params.constants))
+        except ValueError as error:
+            yield Misfit(str(error), "expression", found=params.expression)
+
+    @classmethod
+    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+        """Every input that the formula reads must be wired."""
+        assert isinstance(params, cls.Params)
+        try:
+            names = parse_expression(params.expression, (*INPUTS, "t", *params.constants)).names
+        except ValueError:
+            return  # reported by ``requires``
+        for name in names:
+            if name in INPUTS and name not in context.wired:
+                yield Misfit(f"the formula reads {name!r}, which is not wired", "expression")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The unit of the formula, and the one frame that its inputs have."""
+        assert isinstance(params, cls.Params)
+        formula = parse_expression(params.expression, (*INPUTS, "t", *params.constants))
+        read = {name: given[name] for name in formula.names if name in INPUTS}
+        known = {name: quantity for name, quantity in read.items() if quantity is not None}
+        frames = dict.fromkeys(q.frame for q in known.values() if q.frame is not None)
+        frame = next(iter(frames)) if len(frames) == 1 else None
+        said = None if params.unit is None else read_unit(params.unit)
+        if params.unit is not None and said is None:
+            return {"y": Quantity(None, frame)}
+        if len(known) < len(read):
+            return {"y": None if params.unit is None else Quantity(said, frame)}
+        units = {name: parse_unit(unit) for name, unit in params.units.items()}
+        try:
+            unit = unit_of(formula.tree, {**{n: q.unit for n, q in known.items()}, **units, **TIME})
+        except UnitError as error:
+            given.refuse(next(iter(known), "a"), f"in {params.expression!r} {error}")
+            return {"y": Quantity(said, frame)}
+        if said is not None and unit is not None and not said.matches(unit):
+            given.refuse(next(iter(known), "a"), f"the formula is in {unit}, not in {said}")
+        return {"y": Quantity(unit if said is None else said, frame)}
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """A formula of all inputs."""
+        return {
+            "n": 2,
+            "expression": "k * a - b + e * f if c > d else sin(t) * d + g - h",
+            "constants": {"k": 2.0},
+        }
+
+    def setup(self) -> None:
+        """Compile the formula."""
+        p = self.params
+        self._time = np.zeros(())
+        ports = (self.a, self.b, self.c, self.d, self.e, self.f, self.g, self.h)
+        variables = {name: port.value for name, port in zip(INPUTS, ports, strict=True)}
+        variables |= {name: np.array(value) for name, value in p.constants.items()}
+        variables["t"] = self._time
+        self._evaluate = parse_expression(p.expression, variables).compile(variables, p.n)
+
+    def step(self) -> None:
+        """Evaluate it."""
+        self._time[...] = self.time
+        self._evaluate(self.y.value)
+
+
+_RAD = parse_unit("rad")
+_EXPRESSION_UNITS_TO_ANGLES = ("asin", "acos", "atan", "atan2")
+_ALIKE = ("min", "max", "hypot", "atan2")
+_EXPRESSION_UNITS_SAME = ("abs", "floor", "ceil")
+TIME = {"t": SECOND}
+"""The unit of the variable that every expression has."""
+
+
+def unit_of(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
+    """The unit of a checked expression; ``None`` where it is not checked.
+
+    ``units`` has those of the variables. Numbers are plain; zero has every unit.
+
+    Raises:
+        UnitError: parts that are added or compared differ, or a function does not take a unit.
+    """
+    match node:
+        case ast.Constant(value=value):
+            return None if value == 0 else ONE
+        case ast.Name(id=name):
+            return units.get(name, ONE)
+        case ast.UnaryOp(operand=operand):
+            return unit_of(operand, units)
+        case ast.IfExp(test=test, body=body, orelse=other):
+            unit_of(test, units)
+            return _alike(body, other, units)
+        case ast.Compare(left=left, comparators=[right]):
+            _alike(left, right, units)
+            return ONE
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mod(), right=right):
+            return _alike(left, right, units)
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            return _power(left, right, units)
+        case ast.BinOp(left=left, op=operator, right=right):
+            a, b = _factor(left, units), _factor(right, units)
+            if a is None or b is None:
+                return None
+            return times(a, b) if isinstance(operator, ast.Mult) else over(a, b)
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            return _call(name, arguments, units)
+        case _:
+            raise AssertionError("the expression was not checked")
+
+
+def _factor(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
+    """The same for a factor, in which zero is as plain as any number."""
+    return ONE if isinstance(node, ast.Constant) else unit_of(node, units)
+
+
+def _alike(left: ast.expr, right: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
+    a, b = unit_of(left, units), unit_of(right, units)
+    if a is not None and b is not None and not a.matches(b):
+        raise UnitError(f"{ast.unparse(left)} is in {a} and {ast.unparse(right)} in {b}")
+    return b if a is None else a
+
+
+def _power(base: ast.expr, power: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
+    unit = unit_of(base, units)
+    if unit is None or unit.matches(ONE):
+        return unit
+    try:
+        exponent = ast.literal_eval(power)
+    except ValueError:
+        exponent = None
+    if exponent == 0.5:
+        return root(unit)
+    if exponent is None or exponent != int(exponent):
+        raise UnitError(f"{ast.unparse(base)} is in {unit} and needs a whole number as its power")
+    return times(ONE, unit, int(exponent))
+
+
+def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]) -> Unit | None:
+    first = arguments[0]
+    if name in _ALIKE:
+        found = _alike(first, arguments[1], units)
+        return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else found
+    unit = unit_of(first, units)
+    if name in _EXPRESSION_UNITS_SAME:
+        return unit
+    if name == "sqrt":
+        return None if unit is None else root(unit)
+    if name == "sign":
+        return ONE
+    taken = (_RAD, ONE) if name in _OF_ANGLES else (ONE,)
+    if unit is not None and not any(unit.matches(each) for each in taken):
+        raise UnitError(
+            f"{name} takes {taken[0] if len(taken) > 1 else 'plain numbers'}, not {unit}"
+        )
+    return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else ONE
+
+
+class External(UnitFromParameters, Block):
+    """A vector that Python sets between two ticks: ``run["action"] = [0.1, 0.2]``.
+
+    It holds what was set last, and ``initial`` before. See ``aloft.Graph.open`` and ``aloft.gym``.
+    In a run that nobody steps it is a constant.
+    """
+
+    class Params(InitialValueParameters, SourceParameters):
+        in_unit = ("initial",)
+
+    params: Params
+    y = Output(Vector, text="what was set last")
+    x = State(Vector, text="what was set last")
+
+    def setup(self) -> None:
+        """Begin with the initial value."""
+        self.x.value[...] = self.params.initial
+
+    def emit(self) -> None:
+        """Write the vector."""
+        np.copyto(self.y.value, self.x.value)
+
+    def update(self) -> None:
+        """Do nothing: there is no input."""

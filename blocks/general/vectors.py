@@ -1,0 +1,249 @@
+"""The common signals and parameters of the general blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, ValidationInfo, field_validator, model_validator
+
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Misfit
+from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
+from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import read_unit
+from ...runtime.language.units import QUANTITY, parse_quantity
+
+
+class Vector(Signal):
+    """A vector of ``n`` numbers. Its unit and frame are those of what is wired."""
+
+    value = Field("n", carried=True, text="the vector's elements")
+
+
+class Number(Signal):
+    """One number as a vector of one element, so that it fits blocks with n = 1."""
+
+    value = Field(1, unit="", text="the number")
+
+
+class Seconds(Signal):
+    """A duration as a vector of one element, so that it fits blocks with n = 1."""
+
+    value = Field(1, unit="s", text="the duration")
+
+
+class CountState(Signal):
+    """A whole number that a block counts."""
+
+    count = Field((), dtype="int64", text="the number")
+
+
+_CHECKED = (ScalarOrVector, ScalarOrVector | None)
+
+
+class VectorParameters(Parameters):
+    """The base of the parameters of blocks on a vector with ``n`` elements.
+
+    A parameter of type ``ScalarOrVector`` that is a list must have n numbers, which is part of the
+    load report.
+    """
+
+    n: int = parameter(1, ge=1, text="elements")
+
+    @field_validator("*")
+    @classmethod
+    def _one_or_n(cls, value: Any, info: ValidationInfo) -> Any:
+        n, name = info.data.get("n"), info.field_name
+        if n is None or name is None or not isinstance(value, list):
+            return value
+        if cls.model_fields[name].annotation in _CHECKED and len(value) != n:
+            raise ValueError(f"{name} has {len(value)} elements, expected n = {n}")
+        return value
+
+
+class Flags(Signal):
+    """A vector of ``n`` truth values."""
+
+    value = Field("n", dtype="bool", text="the truth values")
+
+
+class Flag(Signal):
+    """One truth value."""
+
+    value = Field((), dtype="bool", text="whether it holds")
+
+
+NEVER = {"value": False}
+"""The default of an optional trigger or condition that is not wired."""
+
+
+class InitialValueParameters(VectorParameters):
+    """The parameters of blocks that start from a vector."""
+
+    initial: ScalarOrVector = parameter(
+        0.0, text="the first output: n numbers, or one for all elements"
+    )
+
+    def start_value(self) -> NDArray[np.float64]:
+        """``initial`` as an array of n elements."""
+        return np.full(self.n, self.initial)
+
+
+def crossed_bounds(
+    lower: ScalarOrVector | None, upper: ScalarOrVector | None, n: int
+) -> Iterable[Misfit]:
+    """A misfit where a lower bound is above its upper one."""
+    low = np.full(n, -np.inf if lower is None else lower)
+    high = np.full(n, np.inf if upper is None else upper)
+    for i in np.flatnonzero(low > high)[:1]:
+        yield Misfit(
+            f"the lower bound of element {i} is above the upper one",
+            parameter="lower",
+            expected=f"at most {high[i]:g}",
+            found=f"{low[i]:g}",
+        )
+
+
+class Bounds(Signal):
+    """The bounds of each element; infinite where there is none."""
+
+    lower = Field("n", text="the lower bounds")
+    upper = Field("n", text="the upper bounds")
+
+
+class Bounded:
+    """The base of blocks whose parameters ``lower`` and ``upper`` bound ``n`` elements."""
+
+    Constants = Bounds
+
+    @classmethod
+    def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """The bounds must not cross."""
+        return crossed_bounds(params.lower, params.upper, params.n)
+
+    def prepare(self: Any) -> None:
+        """Take the bounds."""
+        p = self.params
+        self.constants.lower[...] = -np.inf if p.lower is None else p.lower
+        self.constants.upper[...] = np.inf if p.upper is None else p.upper
+
+
+def _readable(text: str) -> str:
+    """The text of a unit. Raises ``UnitError`` if it cannot be read."""
+    read_unit(text)
+    return text
+
+
+UnitText = Annotated[str, AfterValidator(_readable)]
+"""A unit such as ``N m/rad``; empty for plain numbers; ``unchecked`` where it is not checked."""
+
+
+class InUnit(Parameters):
+    """The base of parameters that have a common unit, which the graph says.
+
+    It is said by ``unit``, or with the numbers themselves: ``gain: 40 N m/rad``. Numbers in
+    ``in_unit`` that are written with another unit of the same dimension are converted.
+    """
+
+    in_unit: ClassVar[tuple[str, ...]] = ()
+
+    unit: UnitText = parameter("", text="unit of the numbers; nothing for plain ones")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_units(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        texts = [each for name in cls.in_unit for each in _units_in(data.get(name))]
+        if not texts:
+            return data
+        unit = data.get("unit") or texts[0]
+        converted = {name: _numbers(data[name], unit) for name in cls.in_unit if name in data}
+        return {**data, **converted, "unit": unit}
+
+
+class SourceParameters(InUnit):
+    """The base of the parameters of sources: the graph says what their numbers are."""
+
+    frame: str | None = parameter(None, text="frame of the numbers, such as world")
+
+    def quantity(self) -> Quantity:
+        """The quantity of the numbers."""
+        return Quantity(read_unit(self.unit), self.frame)
+
+
+def _units_in(value: Any) -> list[str]:
+    """The units of all texts such as ``3 m`` in a value."""
+    if isinstance(value, str):
+        match = QUANTITY.match(value)
+        return [match["unit"]] if match is not None and match["unit"].strip() else []
+    if isinstance(value, Sequence) and not isinstance(value, bytes):
+        return [unit for item in value for unit in _units_in(item)]
+    return []
+
+
+def _numbers(value: Any, unit: str) -> Any:
+    """The value with its texts as numbers in ``unit``; what cannot be converted stays a text."""
+    if isinstance(value, str):
+        try:
+            return parse_quantity(value, unit)
+        except ValueError:
+            return value  # reported by pydantic at its own place
+    if isinstance(value, Sequence) and not isinstance(value, bytes):
+        return [_numbers(item, unit) for item in value]
+    return value
+
+
+class UnitFromParameters:
+    """A block whose output ``y`` is what its parameters ``unit`` and ``frame`` say."""
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The quantity of the parameters."""
+        assert isinstance(params, SourceParameters)
+        return {"y": params.quantity()}
+
+
+class UnitOfInput:
+    """A block whose output ``y`` is the same quantity as its input ``u``."""
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The quantity of ``u``."""
+        return {"y": given["u"]}
+
+
+class UnitOfProduct:
+    """A block whose output ``y`` is its input ``u`` times the parameter ``unit``."""
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """The quantity of ``u``, times the unit."""
+        assert isinstance(params, InUnit)
+        u = given["u"]
+        return {"y": u and u.times(read_unit(params.unit))}
+
+
+Matrix = list[list[float]]
+"""A list of rows."""
+
+
+def equal_rows(value: Matrix) -> Matrix:
+    """The same matrix.
+
+    Raises:
+        ValueError: it has no column, or its rows are not equally long.
+    """
+    lengths = [len(row) for row in value]
+    if value and (min(lengths) != max(lengths) or not lengths[0]):
+        raise ValueError(f"expected rows of one length, found lengths {lengths}")
+    return value
+
+
+def matrix_rows(*names: str) -> Any:
+    """The validator that a class of parameters has for its matrices."""
+    return field_validator(*names)(equal_rows)

@@ -1,0 +1,146 @@
+"""Vectors joined, split and selected from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ...mathematics.kernel import kernel
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import UNCHECKED, Carried, Given
+from ...runtime.language.signals import Field, Signal
+from .vectors import UnitOfInput, Vector
+
+
+class First(Signal):
+    """A vector of ``n_a`` numbers."""
+
+    value = Field("n_a", carried=True, text="the first elements")
+
+
+class Second(Signal):
+    """A vector of ``n_b`` numbers."""
+
+    value = Field("n_b", carried=True, text="the elements behind them")
+
+
+class Joined(Signal):
+    """A vector of ``n_a + n_b`` numbers."""
+
+    value = Field("n", carried=True, text="first those of a, then those of b")
+
+
+class PairSizes(Parameters):
+    """The sizes of two vectors that make one."""
+
+    n_a: int = parameter(1, ge=1, text="elements of a")
+    n_b: int = parameter(1, ge=1, text="elements of b")
+
+
+class Pairs:
+    """The base of blocks with two vectors and the one that they make."""
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` is the sum of ``n_a`` and ``n_b``."""
+        assert isinstance(params, PairSizes)
+        return {"n_a": params.n_a, "n_b": params.n_b, "n": params.n_a + params.n_b}
+
+
+class Mux(Pairs, Block):
+    """Two vectors one behind the other: y = [a, b]. More are joined by several such blocks."""
+
+    Params = PairSizes
+    params: PairSizes
+    a = Input(First, text="the first elements")
+    b = Input(Second, text="the elements behind them")
+    y = Output(Joined, text="all elements")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """What both have in common; the unit is not checked where they differ."""
+        a, b = given["a"], given["b"]
+        if a is None or b is None:
+            return {}
+        return {"y": a if a == b else UNCHECKED}
+
+    @kernel
+    @staticmethod
+    def step(a: First, b: Second, y: Joined, params: PairSizes) -> None:
+        y.value[: params.n_a] = a.value
+        y.value[params.n_a :] = b.value
+
+
+class Demux(Pairs, Block):
+    """The first ``n_a`` elements and the ``n_b`` behind them: [a, b] = u."""
+
+    Params = PairSizes
+    params: PairSizes
+    u = Input(Joined, text="what is split")
+    a = Output(First, text="the first elements")
+    b = Output(Second, text="the elements behind them")
+
+    @classmethod
+    def carried(cls, params: Parameters, given: Given) -> Carried:
+        """Both are what u is."""
+        return {"a": given["u"], "b": given["u"]}
+
+    @kernel
+    @staticmethod
+    def step(u: Joined, a: First, b: Second, params: PairSizes) -> None:
+        a.value[:] = u.value[: params.n_a]
+        b.value[:] = u.value[params.n_a :]
+
+
+class Selected(Signal):
+    """The ``m`` elements that were selected."""
+
+    value = Field("m", carried=True, text="the elements, in the order asked for")
+
+
+class Selector(UnitOfInput, Block):
+    """Some elements of the input, in any order, also repeated: y[i] = u[elements[i]], from 0."""
+
+    class Params(Parameters):
+        n: int = parameter(ge=1, text="elements of the input")
+        elements: list[int] = parameter(text="which elements, counted from 0", min_length=1)
+
+    params: Params
+    u = Input(Vector, text="what is selected from")
+    y = Output(Selected, text="the selected elements")
+
+    @classmethod
+    def local_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """``n`` elements come in and ``m`` go out."""
+        assert isinstance(params, cls.Params)
+        return {"n": params.n, "m": len(params.elements)}
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Every element that is selected must be there."""
+        assert isinstance(params, cls.Params)
+        for element in params.elements:
+            if not 0 <= element < params.n:
+                yield Misfit(
+                    f"element {element} is not there",
+                    parameter="elements",
+                    expected=f"0 to {params.n - 1}",
+                    found=str(element),
+                )
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Two of three."""
+        return {"n": 3, "elements": [2, 0]}
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Selected, params: Params) -> None:
+        for i in range(y.value.shape[0]):
+            y.value[i] = u.value[params.elements[i]]

@@ -1,0 +1,154 @@
+"""Distances: segments against brute force, the ground under a step, the standing robot."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from aloft.planner.checking.evidence import (
+    _gaps,
+    body_heights,
+    capsule_ends,
+    ground_height,
+    leg_lack,
+    legs,
+    segment_distance,
+    step_edge,
+)
+from aloft.planner.task.task import make_task
+from aloft.robots.description import find_robot
+from aloft.robots.kinematics import link_poses
+from aloft.robots.pinocchio_model import build_pinocchio_model
+
+
+def test_segments_against_brute_force() -> None:
+    a, b, c, d = np.random.default_rng(0).normal(size=(4, 200, 3))
+    s = np.linspace(0.0, 1.0, 101)[None, :, None]
+    first, second = a[:, None] + s * (b - a)[:, None], c[:, None] + s * (d - c)[:, None]
+    brute = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=(1, 2))
+    found = segment_distance(a, b, c, d)
+    assert np.all(found <= brute + 1e-12)
+    assert np.abs(found - brute).max() < 5e-3
+
+
+def test_parallel_crossing_and_point_segments() -> None:
+    a = np.zeros((4, 3))
+    b = np.array([[1.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0]])
+    c = np.array([[0.2, 0.3, 0], [2, 0, 0], [0.5, -1, 0.1], [0, 3, 4]])
+    d = np.array([[0.7, 0.3, 0], [3, 0, 0], [0.5, 1, 0.1], [0, 3, 4]])
+    np.testing.assert_allclose(segment_distance(a, b, c, d), [0.3, 1.0, 0.1, 5.0], atol=1e-12)
+
+
+def test_where_the_ground_changes() -> None:
+    level = make_task({"name": "a", "rise": 0.1, "distance_x": 0.2})
+    assert step_edge(level) is None
+    up = make_task({"name": "a", "rise": 0.1, "distance_x": 0.2, "landing_height": 0.05})
+    assert step_edge(up) == pytest.approx(0.1)
+    np.testing.assert_array_equal(ground_height(up, np.array([0.0, 0.2]), 0.0), [0.0, 0.05])
+    back = make_task({"name": "a", "rise": 0.1, "distance_x": -0.2, "landing_height": -0.05,
+                      "step_edge": -0.08})  # fmt: skip
+    np.testing.assert_array_equal(ground_height(back, np.array([0.0, -0.2]), 0.0), [0.0, -0.05])
+    there = make_task({"name": "a", "rise": 0.1, "landing_height": 0.05})
+    x = np.zeros(2)
+    np.testing.assert_array_equal(ground_height(there, x, np.array([0.4, 0.6])), [0.0, 0.05])
+
+
+def test_the_standing_robot() -> None:
+    robot = find_robot("bruce")
+    base = np.array([[0.0, 0.0, 0.3796]])
+    pose = link_poses(robot, base, np.array([[0.0, 0, 0, 1]]), robot.standing_position[None])
+    task = make_task({"name": "a", "rise": 0.1})
+    heights = body_heights(robot, task, pose, np.zeros(1))
+    assert "right_foot" not in heights
+    assert heights["torso"][0] == pytest.approx(0.3796 + 0.03 - 0.055)
+    # The hips' capsules, of radius 30 mm, are the nearest: 151.7 mm from axis to axis.
+    nearest = min(gap[0] for gap in _gaps(robot, pose))
+    assert nearest == pytest.approx(0.151711 - 0.06, abs=1e-3)
+    assert legs(robot)[0] == [
+        "right_hip", "right_hip_shaft", "right_thigh", "right_calf", "right_foot",
+    ]  # fmt: skip
+
+
+def closest(first: list, second: list, k: int) -> float:  # type: ignore[type-arg]
+    """The least distance between the capsules of two legs at an instant, by trying many points."""
+    share = np.linspace(0.0, 1.0, 60)[:, None]
+    found = np.inf
+    for a, b, radius in first:
+        for c, d, other in second:
+            p, q = a[k] + share * (b[k] - a[k]), c[k] + share * (d[k] - c[k])
+            gap = np.linalg.norm(p[:, None] - q[None], axis=2).min()
+            found = min(found, float(gap) - radius - other)
+    return found
+
+
+@pytest.mark.parametrize("wanted", [0.03, 0.2])
+def test_legs_lack_what_is_wanted_or_what_they_had_at_first(wanted: float) -> None:
+    robot = find_robot("bruce")
+    count = 6
+    joints = np.tile(robot.standing_position, (count, 1))
+    names = [joint.name for joint in robot.joints]
+    for side, sign in (("right", 1.0), ("left", -1.0)):
+        roll = next(k for k, name in enumerate(names) if side in name and "roll" in name)
+        joints[:, roll] += sign * np.linspace(0.0, 0.25, count)
+    poses = link_poses(robot, np.zeros((count, 3)), np.tile([0.0, 0, 0, 1], (count, 1)), joints)
+    left, right = ([c for link in chain for c in capsule_ends(robot, poses, link)]
+                   for chain in legs(robot))  # fmt: skip
+    gaps = np.array([closest(left, right, k) for k in range(count)])
+    assert np.ptp(gaps) > 0.02, "the legs come closer or go apart"
+    lack = leg_lack(robot, poses, wanted)
+    assert lack is not None
+    # what is lacked of the nearest pair; pairs that were close at first may stay so
+    assert np.all(lack >= np.minimum(wanted, gaps[0]) - gaps - 1e-3)
+    assert np.all(lack <= wanted - gaps + 1e-9)
+    assert lack[0] <= 0.0 + max(0.0, wanted - gaps[0])
+
+
+def test_ends_of_capsules_move_with_their_link() -> None:
+    robot = find_robot("bruce")
+    random = np.random.default_rng(0)
+    quaternion = random.normal(size=(3, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
+    base = random.normal(size=(3, 3))
+    joints = robot.standing_position + random.uniform(-0.2, 0.2, (3, 10))
+    poses = link_poses(robot, base, quaternion, joints)
+    built = build_pinocchio_model(robot)
+    data = built.model.createData()
+    for k in range(3):
+        q = np.concatenate([base[k], quaternion[k], joints[k]])
+        pin.forwardKinematics(built.model, data, q)
+        for joint in robot.joints:
+            place = data.oMi[built.model.getJointId(joint.name)]
+            shapes = robot.link(joint.child).shapes
+            for shape, (start, end, radius) in zip(
+                shapes, capsule_ends(robot, poses, joint.child), strict=True
+            ):
+                np.testing.assert_allclose(start[k], place.act(np.array(shape.start)), atol=1e-12)
+                np.testing.assert_allclose(end[k], place.act(np.array(shape.end)), atol=1e-12)
+                assert radius == shape.radius
+
+
+def test_bodies_over_a_step_are_as_high_as_their_lowest_point() -> None:
+    """Points on the surface of the torso's capsules, straight above whichever ground is there."""
+    robot = find_robot("bruce")
+    task = make_task({"name": "a", "rise": 0.1, "distance_x": 0.1, "landing_height": 0.04})
+    edge = step_edge(task)
+    assert edge is not None
+    share = np.linspace(0.0, 1.0, 200)[:, None]
+    for x in np.linspace(edge - 0.15, edge + 0.15, 13):
+        pose = link_poses(robot, np.array([[x, 0.0, 0.4]]), np.array([[0.0, 0.6, 0, 0.8]]),
+                          robot.standing_position[None])  # fmt: skip
+        heights = body_heights(robot, task, pose, np.zeros(1))
+        lowest = np.inf
+        for start, end, radius in capsule_ends(robot, pose, "torso"):
+            centres = start + share * (end - start)
+            for aside in np.linspace(-0.999, 0.999, 201):
+                below = centres[:, 2] - radius * np.sqrt(1.0 - aside**2)
+                ground = np.where(centres[:, 0] + radius * aside > edge, 0.04, 0.0)
+                lowest = min(lowest, float((below - ground).min()))
+        assert lowest - 1e-9 <= heights["torso"][0] <= lowest + 0.012
+
+
+def test_ground_behind_many_flights() -> None:
+    up = make_task({"name": "a", "rise": 0.1, "distance_x": 0.2, "landing_height": 0.05})
+    x = np.array([0.0, 0.2, 0.0, 0.2, 0.0, 0.2])
+    progress = np.array([-1.0, -1.0, 0.5, 0.5, 3.0, 3.0])
+    np.testing.assert_array_equal(ground_height(up, x, progress), [0.0, 0.05] * 3)
