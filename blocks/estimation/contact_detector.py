@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, ContactSwitches, SwitchHealth
@@ -22,7 +17,7 @@ class ContactTimers(Signal):
     active = Field("n_contacts", dtype="bool", text="whether the point is in contact")
 
 
-class ContactDetector(KernelBlock):
+class ContactDetector(Block):
     """Debounces the switch of every contact point separately (paper, II-A).
 
     A point becomes active once its switch has been closed for ``close_samples`` ticks in a row, and
@@ -44,53 +39,41 @@ class ContactDetector(KernelBlock):
             1, ge=1, text="ticks a switch must be closed before its point is active"
         )
 
+    class Constants(Signal):
+        """What follows from the parameters."""
+
+        hold_samples = Field(dtype="int64", text="ticks a point stays active with an open switch")
+
     params: Params
+    constants: Constants
 
     switches = Input(ContactSwitches, text="the raw switches")
     faults = Input(SwitchHealth, default={}, text="which switches are not to be believed")
     state = Output(ContactState, text="which points carry load")
     timers = State(ContactTimers, text="one timer a point")
 
-    def setup(self) -> None:
-        timers = self.timers
-        self._close_samples, self._hold_samples = np.zeros(1, np.int64), np.zeros(1, np.int64)
-        self.on_parameters()
-        latching = KernelCall(
-            latch, self.switches.closed, self.faults.fault, self._close_samples,
-            self._hold_samples, timers.closed, timers.opened, timers.active, self.state.active,
-        )  # fmt: skip
-        self.kernel_calls = (latching,)
+    def prepare(self) -> None:
+        self.constants.hold_samples = round(self.params.hold / self.period)
 
-    def on_parameters(self) -> None:
-        self._close_samples[0] = self.params.close_samples
-        self._hold_samples[0] = round(self.params.hold / self.period)
-
-
-@kernel
-def latch(
-    switches: NDArray[np.bool_],
-    faults: NDArray[np.int64],
-    close_samples: NDArray[np.int64],
-    hold_samples: NDArray[np.int64],
-    closed: NDArray[np.int64],
-    opened: NDArray[np.int64],
-    active: NDArray[np.bool_],
-    out: NDArray[np.bool_],
-) -> None:
-    """Update ``closed``, ``opened`` and ``active`` (n_contacts,) by the switches of one tick.
-
-    A switch with a fault counts as open. ``close_samples`` and ``hold_samples`` have one element;
-    ``out`` becomes a copy of ``active``.
-    """
-    for point in range(switches.shape[0]):
-        if switches[point] and faults[point] == 0:
-            closed[point] += 1
-            opened[point] = 0
-            if closed[point] >= close_samples[0]:
-                active[point] = True
-        else:
-            closed[point] = 0
-            opened[point] += 1
-            if opened[point] > hold_samples[0]:
-                active[point] = False
-        out[point] = active[point]
+    @kernel
+    @staticmethod
+    def step(
+        switches: ContactSwitches,
+        faults: SwitchHealth,
+        state: ContactState,
+        timers: ContactTimers,
+        params: Params,
+        constants: Constants,
+    ) -> None:
+        for point in range(switches.closed.shape[0]):
+            if switches.closed[point] and faults.fault[point] == 0:
+                timers.closed[point] += 1
+                timers.opened[point] = 0
+                if timers.closed[point] >= params.close_samples:
+                    timers.active[point] = True
+            else:
+                timers.closed[point] = 0
+                timers.opened[point] += 1
+                if timers.opened[point] > constants.hold_samples:
+                    timers.active[point] = False
+        state.active[:] = timers.active

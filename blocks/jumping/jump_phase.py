@@ -3,43 +3,133 @@
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...mathematics.arrays import (
-    Array0D,
     Array1D,
     Flags1D,
-    Indices0D,
     Indices1D,
     Indices2D,
     Rows3,
-    Vector3,
 )
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
-from .capture_law import PhaseFields
-from .phase_table import (
-    AHEAD,
-    IN_PHASE,
-    LIFT_OFF,
-    NOW,
-    REMAINING,
-    TABLE,
-    TOUCHDOWN,
-    UNLOADED,
-    Condition,
-    find_conditions,
-    next_phase,
+
+
+class Condition(IntEnum):
+    """A condition of a tick that may lead to another phase."""
+
+    PLAN_SQUATS = 0
+    """The plan is in its squat or beyond."""
+    PLAN_THRUSTS = 1
+    """The plan is in its thrust or beyond."""
+    LIFT_OFF_DUE = 2
+    """The planned lift-off is over, and all points have left the ground or waited long enough."""
+    LEFT_EARLY = 3
+    """In the second half of the thrust no point has had contact for a while."""
+    TOUCHED_DOWN = 4
+    """A point has contact after the least share of the predicted flight."""
+    OVERDUE = 5
+    """The flight lasts much longer than planned."""
+    RESTED = 6
+    """The landing has lasted long enough, and no other flight is planned."""
+    THRUSTS_AGAIN = 7
+    """Another flight is planned, and the plan is in its thrust."""
+    LOST_CONTACT = 8
+    """No point has had contact for too long."""
+
+
+class Transition(NamedTuple):
+    """From ``phase`` to ``to`` when the condition ``when`` holds."""
+
+    phase: Phase
+    when: Condition
+    to: Phase
+
+
+TRANSITIONS = (
+    Transition(Phase.STAND, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.STAND, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.STAND, Condition.PLAN_THRUSTS, Phase.THRUST),
+    Transition(Phase.STAND, Condition.PLAN_SQUATS, Phase.SQUAT),
+    Transition(Phase.SQUAT, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.SQUAT, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.SQUAT, Condition.PLAN_THRUSTS, Phase.THRUST),
+    Transition(Phase.THRUST, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.THRUST, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
+    Transition(Phase.THRUST, Condition.LEFT_EARLY, Phase.FLIGHT),
+    Transition(Phase.FLIGHT, Condition.TOUCHED_DOWN, Phase.LANDING),
+    Transition(Phase.FLIGHT, Condition.OVERDUE, Phase.FAULT),
+    Transition(Phase.LANDING, Condition.LOST_CONTACT, Phase.FAULT),
+    Transition(Phase.LANDING, Condition.THRUSTS_AGAIN, Phase.THRUST),
+    Transition(Phase.LANDING, Condition.RESTED, Phase.RECOVER),
+    Transition(Phase.RECOVER, Condition.LOST_CONTACT, Phase.FAULT),
 )
+"""All transitions. In each phase the first transition whose condition holds is taken; a phase
+without transitions, such as FAULT, lasts to the end of the run."""
+
+TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
+"""The transitions as an array (n, 3), for the kernel."""
+
+NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED, AHEAD = range(7)
+"""Elements of ``times`` [s]: the plan's time; how long the phase has lasted; the planned lift-off
+and touchdown of the next flight, the one under way or the last; the predicted time to touchdown;
+how long no point has had contact; and by how much the controller works ahead of time."""
+
+LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT, EARLY_LANDING = range(6)
+"""Elements of ``limits``: the parameters of ``JumpPhase`` of these names."""
+
+LEAST_AHEAD = 0.0015
+"""A controller that works less ahead of time [s] waits for contact: the prediction is no better."""
+
+
+@kernel
+def find_conditions(
+    times: Array1D, limits: Array1D, planned: int, another: bool, holds: Flags1D
+) -> None:
+    """Which conditions hold in this tick.
+
+    Args:
+        times, limits: see ``NOW`` and ``LATE_LIFT_OFF``.
+        planned: the phase that the plan is in.
+        another: whether the plan has a flight after the one that ``times`` is about.
+        holds: becomes true for each ``Condition`` that holds.
+    """
+    now, in_phase = times[NOW], times[IN_PHASE]
+    lift_off, unloaded = times[LIFT_OFF], times[UNLOADED]
+    flight = times[TOUCHDOWN] - lift_off
+    due = now >= lift_off
+    waiting = unloaded == 0.0 and now < lift_off + limits[LATE_LIFT_OFF]
+    share = limits[TOUCHDOWN_SHARE] * (in_phase + times[REMAINING])
+    holds[Condition.PLAN_SQUATS] = planned >= Phase.SQUAT
+    holds[Condition.PLAN_THRUSTS] = planned >= Phase.THRUST or due
+    holds[Condition.LIFT_OFF_DUE] = due and not waiting
+    holds[Condition.LEFT_EARLY] = (
+        now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
+    )
+    ahead = times[AHEAD]
+    early = ahead > LEAST_AHEAD and times[REMAINING] < ahead * limits[EARLY_LANDING]
+    holds[Condition.TOUCHED_DOWN] = (unloaded == 0.0 or early) and in_phase >= share
+    holds[Condition.OVERDUE] = in_phase > flight + limits[LOST_CONTACT]
+    holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
+    holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
+    holds[Condition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+
+
+@kernel
+def next_phase(table: Indices2D, phase: int, holds: Flags1D) -> int:
+    """The phase that follows by the first row (phase, condition, to) of the table that applies."""
+    for row in range(table.shape[0]):
+        if table[row, 0] == phase and holds[table[row, 1]]:
+            return int(table[row, 2])
+    return phase
 
 
 class PhaseMemory(Signal):
@@ -54,7 +144,7 @@ class PhaseMemory(Signal):
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
 
-class JumpPhase(KernelBlock):
+class JumpPhase(Block):
     """The phase by plan time and measured contact, the stance points, and the time to touchdown.
 
     ============  =====================================================================
@@ -132,8 +222,22 @@ class JumpPhase(KernelBlock):
             0.2, unit="s", gt=0.0, text="time without contact after which it is a fault"
         )
 
+    class Constants(Signal):
+        """What follows from the robot and the parameters."""
+
+        transitions = Field((len(TRANSITIONS), 3), dtype="int64", text="rows of TRANSITIONS")
+        limits = Field(6, text="see LATE_LIFT_OFF")
+        foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+
+    class Scratch(Signal):
+        """What a step computes on its way."""
+
+        times = Field(7, unit="s", text="see NOW")
+        holds = Field(len(Condition), dtype="bool", text="the conditions that hold in this tick")
+
     needs = ("feet",)
     params: Params
+    constants: Constants
     reference = Input(JumpReference, text="the plan")
     contacts = Input(ContactState, text="which points carry load")
     terms = Input(DynamicsTerms, text="the present state")
@@ -142,150 +246,81 @@ class JumpPhase(KernelBlock):
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
     def setup(self) -> None:
-        reference, terms = self.reference, self.terms
-        self._limits, self._stance_limits = np.zeros(6), np.zeros(2)
-        self.on_parameters()
-        following = KernelCall(
-            follow_phases,
-            self.period,
-            Planned(*(getattr(reference, name) for name in Planned._fields)),
-            self.contacts.active,
-            self.delay.ahead,
-            Present(terms.com, terms.com_velocity, terms.contact_position),
-            np.array(self.robot.foot_of_contact(), np.int64),
-            Table(
-                TABLE, self._limits, self._stance_limits, np.zeros(7),
-                np.zeros(len(Condition), np.bool_),
-            ),
-            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
-            PhaseFields(*(getattr(self.phase, name) for name in PhaseFields._fields)),
-        )  # fmt: skip
-        self.kernel_calls = (following,)
+        self.constants.transitions[:] = TABLE
+        self.constants.foot_of_point[:] = self.robot.foot_of_contact()
 
-    def on_parameters(self) -> None:
+    def prepare(self) -> None:
         p = self.params
-        self._limits[:] = (
+        self.constants.limits[:] = (
             p.late_lift_off, p.early_lift_off, p.touchdown_share, p.landing_time, p.lost_contact,
             p.early_landing,
         )  # fmt: skip
-        self._stance_limits[:] = p.contact_hold, p.flat_height
 
     def start(self) -> None:
-        self.memory.touchdown[()] = -1.0
+        self.memory.touchdown = -1.0
 
-
-class Planned(NamedTuple):
-    """The fields of ``JumpReference`` that the phases follow."""
-
-    time: Array0D
-    phase: Indices0D
-    lift_off_time: Array0D
-    touchdown_time: Array0D
-    com: Vector3
-    com_velocity: Vector3
-    contact: Flags1D
-
-
-class Present(NamedTuple):
-    """The fields of ``DynamicsTerms`` that tell the time to touchdown, and the points."""
-
-    com: Vector3
-    com_velocity: Vector3
-    contact_position: Rows3
-
-
-class Memory(NamedTuple):
-    """The fields of ``PhaseMemory``."""
-
-    phase: Indices0D
-    began: Array0D
-    touchdown: Array0D
-    lift_off_time: Array0D
-    touchdown_time: Array0D
-    unloaded: Array1D
-    stance: Flags1D
-
-
-class Table(NamedTuple):
-    """The ``transitions`` and their ``limits``, those of the stance, and memory: see ``phase_table``.
-
-    ``stance_limits`` (2,) are how long a lost contact counts [s], and how high a point of a flat foot
-    may be above the lowest [m].
-    """
-
-    transitions: Indices2D
-    limits: Array1D
-    stance_limits: Array1D
-    times: Array1D
-    holds: Flags1D
-
-
-@kernel
-def follow_phases(
-    period: float,
-    planned: Planned,
-    active: Flags1D,
-    ahead: Array0D,
-    present: Present,
-    foot_of_point: Indices1D,
-    table: Table,
-    memory: Memory,
-    out: PhaseFields,
-) -> None:
-    """One tick of ``JumpPhase``; ``active`` are the points with contact, (n_contacts,)."""
-    now, before, times = planned.time[()], memory.phase[()], table.times
-    shortest = count_unloaded(active, period, memory.unloaded)
-    if before < Phase.FLIGHT:
-        memory.lift_off_time[()] = planned.lift_off_time[()]
-        memory.touchdown_time[()] = planned.touchdown_time[()]
-    lift_off = memory.lift_off_time[()]
-    touchdown = memory.touchdown_time[()]
-    another = planned.lift_off_time[()] > touchdown
-    remaining = 0.0
-    if before <= Phase.FLIGHT:
-        remaining = time_to_height(
-            present.com[2], present.com_velocity[2],
-            planned_touchdown_height(
-                planned.com[2], planned.com_velocity[2],
-                touchdown - max(now, lift_off),
-            ),
+    @kernel
+    @staticmethod
+    def step(
+        reference: JumpReference,
+        contacts: ContactState,
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        phase: PhaseState,
+        memory: PhaseMemory,
+        params: Params,
+        constants: Constants,
+        scratch: Scratch,
+        period: float,
+    ) -> None:
+        now, before, times = reference.time, memory.phase, scratch.times
+        shortest = count_unloaded(contacts.active, period, memory.unloaded)
+        if before < Phase.FLIGHT:
+            memory.lift_off_time = reference.lift_off_time
+            memory.touchdown_time = reference.touchdown_time
+        lift_off, touchdown = memory.lift_off_time, memory.touchdown_time
+        another = reference.lift_off_time > touchdown
+        remaining = 0.0
+        if before <= Phase.FLIGHT:
+            remaining = time_to_height(
+                terms.com[2], terms.com_velocity[2],
+                planned_touchdown_height(
+                    reference.com[2], reference.com_velocity[2], touchdown - max(now, lift_off)
+                ),
+            )  # fmt: skip
+        times[NOW], times[IN_PHASE] = now, now - memory.began
+        times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
+        if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
+            shortest = min(shortest, times[IN_PHASE])
+        times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, delay.ahead
+        find_conditions(times, constants.limits, reference.phase, another, scratch.holds)
+        after = next_phase(constants.transitions, before, scratch.holds)
+        if after != before:
+            memory.phase = after
+            memory.began = now
+            if after == Phase.LANDING:
+                memory.touchdown = now
+        choose_stance(
+            after, reference.contact, memory.unloaded, params.contact_hold,
+            terms.contact_position, constants.foot_of_point, params.flat_height, memory.stance,
         )  # fmt: skip
-    times[NOW], times[IN_PHASE] = now, now - memory.began[()]
-    times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
-    if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
-        shortest = min(shortest, times[IN_PHASE])
-    times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, ahead[()]
-    find_conditions(times, table.limits, planned.phase[()], another, table.holds)
-    phase = next_phase(table.transitions, before, table.holds)
-    if phase != before:
-        memory.phase[()] = phase
-        memory.began[()] = now
-        if phase == Phase.LANDING:
-            memory.touchdown[()] = now
-    choose_stance(
-        phase, planned.contact, memory.unloaded, table.stance_limits[0],
-        present.contact_position, foot_of_point, table.stance_limits[1], memory.stance,
-    )  # fmt: skip
-    out.phase[()] = phase
-    out.time_in_phase[()] = now - memory.began[()]
-    out.time_to_touchdown[()] = remaining if phase == Phase.FLIGHT else 0.0
-    landed = memory.touchdown[()]
-    out.time_since_touchdown[()] = now - landed if landed >= 0.0 else 0.0
-    for i in range(active.shape[0]):
-        out.stance[i] = memory.stance[i]
-        out.stepping[i] = False  # steps are for CaptureStep to take
-        out.step_acceleration[i, :] = 0.0
+        phase.phase = after
+        phase.time_in_phase = now - memory.began
+        phase.time_to_touchdown = remaining if after == Phase.FLIGHT else 0.0
+        landed = memory.touchdown
+        phase.time_since_touchdown = now - landed if landed >= 0.0 else 0.0
+        phase.stance[:] = memory.stance
+        phase.stepping[:] = False  # steps are for CaptureStep to take
+        phase.step_acceleration[:] = 0.0
 
 
 @kernel
-def count_unloaded(
-    active: NDArray[np.bool_], period: float, unloaded: NDArray[np.float64]
-) -> float:
+def count_unloaded(active: Flags1D, period: float, unloaded: Array1D) -> float:
     """Update how long each point has been without contact; returns the shortest time [s]."""
     shortest = math.inf
     for i in range(active.shape[0]):
-        unloaded[i] = 0.0 if active[i] else float(unloaded[i]) + period
-        shortest = min(shortest, float(unloaded[i]))
+        unloaded[i] = 0.0 if active[i] else unloaded[i] + period
+        shortest = min(shortest, unloaded[i])
     return shortest
 
 
@@ -309,13 +344,13 @@ def time_to_height(height: float, velocity: float, goal: float) -> float:
 @kernel
 def choose_stance(
     phase: int,
-    planned: NDArray[np.bool_],
-    unloaded: NDArray[np.float64],
+    planned: Flags1D,
+    unloaded: Array1D,
     hold: float,
-    position: NDArray[np.float64],
-    foot: NDArray[np.int64],
+    position: Rows3,
+    foot: Indices1D,
     flat_height: float,
-    stance: NDArray[np.bool_],
+    stance: Flags1D,
 ) -> None:
     """Update the points in ``stance``, which holds those of the tick before; see ``JumpPhase``.
 
@@ -328,8 +363,8 @@ def choose_stance(
     if phase <= Phase.FLIGHT:
         any_planned, any_stance = False, False
         for i in range(stance.shape[0]):
-            any_planned = any_planned or bool(planned[i])
-            any_stance = any_stance or bool(stance[i])
+            any_planned = any_planned or planned[i]
+            any_stance = any_stance or stance[i]
         for i in range(stance.shape[0]):
             if phase == Phase.FLIGHT:
                 stance[i] = False
@@ -341,17 +376,17 @@ def choose_stance(
     ground = math.inf
     for i in range(unloaded.shape[0]):
         if unloaded[i] <= hold:
-            ground = min(ground, float(position[i, 2]))
+            ground = min(ground, position[i, 2])
     if ground == math.inf:
         any_held = False
         for i in range(stance.shape[0]):
-            any_held = any_held or bool(stance[i])
+            any_held = any_held or stance[i]
         for i in range(stance.shape[0]):
             stance[i] = stance[i] or not any_held
         return
     for i in range(unloaded.shape[0]):
         stance[i] = unloaded[i] <= hold
-        if float(position[i, 2]) >= ground + flat_height:
+        if position[i, 2] >= ground + flat_height:
             continue
         for j in range(unloaded.shape[0]):
             if foot[j] == foot[i] and unloaded[j] <= hold:

@@ -2,29 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ...mathematics.arrays import (
-    Array0D,
-    Array1D,
-    Flags0D,
-    Flags1D,
-    Indices0D,
-    Indices1D,
-)
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactSwitches, Phase, PhaseState, SwitchFault, SwitchHealth
-
-_CLOSED, _OPEN = int(SwitchFault.STUCK_CLOSED), int(SwitchFault.STUCK_OPEN)
-_BOUNCING = int(SwitchFault.BOUNCING)
-_STAND, _FLIGHT, _LANDING = int(Phase.STAND), int(Phase.FLIGHT), int(Phase.LANDING)
 
 
 class SwitchMemory(Signal):
@@ -38,30 +22,7 @@ class SwitchMemory(Signal):
     fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="what is wrong with it")
 
 
-class SwitchLimits(NamedTuple):
-    """Ticks in the air and of standing after which a switch is stuck, 0 for never; the time before
-    touchdown [s] in which it may close; by which factor the count of changes falls in a tick; and the
-    changes that a good switch may have made."""
-
-    air: int
-    stand: int
-    approach: float
-    fading: float
-    changes: float
-
-
-class Watched(NamedTuple):
-    """What is kept of the switches: see ``SwitchMemory``."""
-
-    started: Flags0D
-    last: Flags1D
-    changes: Array1D
-    closed: Indices1D
-    opened: Indices1D
-    fault: Indices1D
-
-
-class SwitchMonitor(KernelBlock):
+class SwitchMonitor(Block):
     """Compares each foot switch with the phase of the jump, and with itself.
 
     * **Stuck closed**: in the air, it was closed for ``air_time`` in a row, all of it more than
@@ -98,64 +59,55 @@ class SwitchMonitor(KernelBlock):
             80.0, gt=0.0, text="a switch with more changes in that time bounces"
         )
 
+    class Constants(Signal):
+        """What follows from the parameters."""
+
+        air_samples = Field(dtype="int64", text="ticks closed in the air that are no fault yet")
+        stand_samples = Field(dtype="int64", text="ticks open while standing; 0: not judged")
+        fading = Field(unit="", text="share of the count of changes that stays in a tick")
+
     params: Params
+    constants: Constants
     switches = Input(ContactSwitches, text="the raw switches")
     phase = Input(PhaseState, text="the phase the robot is in")
     health = Output(SwitchHealth, text="which switches are at fault")
     memory = State(SwitchMemory, text="counts, and the faults found")
 
-    def setup(self) -> None:
-        p, memory = self.params, self.memory
-        limits = SwitchLimits(
-            round(p.air_time / self.period),
-            0 if p.stand_time is None else max(1, round(p.stand_time / self.period)),
-            p.approach,
-            np.exp(-self.period / p.bounce_window).item(),
-            p.bounce_changes,
-        )
-        watched = Watched(*(getattr(memory, name) for name in Watched._fields))
-        watching = KernelCall(
-            watch_switches, self.switches.closed, self.phase.phase, self.phase.time_to_touchdown,
-            limits, watched, self.health.fault, self.health.stop,
-        )  # fmt: skip
-        self.kernel_calls = (watching,)
+    def prepare(self) -> None:
+        p, constants = self.params, self.constants
+        constants.air_samples = round(p.air_time / self.period)
+        if p.stand_time is not None:
+            constants.stand_samples = max(1, round(p.stand_time / self.period))
+        constants.fading = np.exp(-self.period / p.bounce_window)
 
-
-@kernel
-def watch_switches(
-    switches: Flags1D,
-    phase: Indices0D,
-    time_to_touchdown: Array0D,
-    limits: SwitchLimits,
-    watched: Watched,
-    fault: Indices1D,
-    stop: Flags0D,
-) -> None:
-    """Update what is kept of all switches in a tick, and write what is wrong to ``fault`` and ``stop``.
-
-    Args:
-        switches: which are closed, (n_contacts,).
-        phase: see ``Phase``, ().
-        time_to_touchdown: in flight [s], ().
-    """
-    now = phase[()]
-    in_the_air = now == _FLIGHT and time_to_touchdown[()] > limits.approach
-    found = False
-    for k in range(switches.shape[0]):
-        closed = bool(switches[k])
-        changed = bool(watched.started[()]) and closed != bool(watched.last[k])
-        watched.last[k] = closed
-        watched.changes[k] = watched.changes[k] * limits.fading + (1.0 if changed else 0.0)
-        watched.closed[k] = watched.closed[k] + 1 if in_the_air and closed else 0
-        watched.opened[k] = watched.opened[k] + 1 if now == _STAND and not closed else 0
-        if watched.fault[k] == 0:
-            if watched.changes[k] > limits.changes:
-                watched.fault[k] = _BOUNCING
-            elif watched.closed[k] > limits.air:
-                watched.fault[k] = _CLOSED
-            elif 0 < limits.stand < watched.opened[k]:
-                watched.fault[k] = _OPEN
-        fault[k] = watched.fault[k]
-        found = found or fault[k] != 0
-    watched.started[()] = True
-    stop[()] = found and now != _FLIGHT and now != _LANDING
+    @kernel
+    @staticmethod
+    def step(
+        switches: ContactSwitches,
+        phase: PhaseState,
+        health: SwitchHealth,
+        memory: SwitchMemory,
+        params: Params,
+        constants: Constants,
+    ) -> None:
+        in_the_air = phase.phase == Phase.FLIGHT and phase.time_to_touchdown > params.approach
+        found = False
+        for k in range(switches.closed.shape[0]):
+            closed = switches.closed[k]
+            changed = memory.started and closed != memory.last[k]
+            memory.last[k] = closed
+            memory.changes[k] = memory.changes[k] * constants.fading + (1.0 if changed else 0.0)
+            memory.closed[k] = memory.closed[k] + 1 if in_the_air and closed else 0
+            standing = phase.phase == Phase.STAND
+            memory.opened[k] = memory.opened[k] + 1 if standing and not closed else 0
+            if memory.fault[k] == 0:
+                if memory.changes[k] > params.bounce_changes:
+                    memory.fault[k] = SwitchFault.BOUNCING
+                elif memory.closed[k] > constants.air_samples:
+                    memory.fault[k] = SwitchFault.STUCK_CLOSED
+                elif 0 < constants.stand_samples < memory.opened[k]:
+                    memory.fault[k] = SwitchFault.STUCK_OPEN
+            health.fault[k] = memory.fault[k]
+            found = found or health.fault[k] != 0
+        memory.started = True
+        health.stop = found and phase.phase != Phase.FLIGHT and phase.phase != Phase.LANDING

@@ -26,7 +26,8 @@ import aloft
 from aloft.blocks.signals import DrivePhase
 from aloft.hal.bear.bear_robot import BearRobot
 from aloft.hal.bear.bus import open_port
-from aloft.hal.bear.configuration import Hardware
+from aloft.hal.bear.configuration import Hardware, HardwareError
+from aloft.hal.bear.driven_robot import read_hardware
 from aloft.hal.bear.protocol import Instruction, frame_bytes
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.twin.faults import Fault
@@ -360,3 +361,32 @@ def test_the_control_period_is_a_whole_number_of_the_buss(period: float, fits: b
     found = list(BearRobot.requires_of_graph(params, context))  # type: ignore[arg-type]
     assert (found == []) == fits
     assert fits or "does not divide the control period" in str(found[0])
+
+
+@pytest.mark.parametrize("fault", ["", "drive left_knee_motor has not answered"])
+def test_a_fault_of_the_drives_is_no_success(fault: str) -> None:
+    loop = SimpleNamespace(phase=DrivePhase.DAMPED, lost_answers=3, cycles=17, fault=fault)
+    stopped: list[str] = []
+    robot = block(
+        driver=SimpleNamespace(loop=loop), _driver=SimpleNamespace(loop=loop), robot=ROBOT,
+        params=BearRobot.Params(**BearRobot.example_parameters()), request_stop=stopped.append,
+        context=SimpleNamespace(path="robot"),
+    )  # fmt: skip
+    found = dict(BearRobot.metrics(robot))  # type: ignore[arg-type]
+    assert (found["drives_at_end"], found["lost_answers"], found["bus_cycles"]) == ("damped", 3, 17)
+    assert found.get("success", True) == (not fault)
+    assert found.get("reason") == (f"robot: {fault}" if fault else None)
+    BearRobot.stop_after_fault(robot)  # type: ignore[arg-type]
+    assert stopped == ([fault] if fault else [])
+    assert BearRobot.metrics(block()) == {}  # type: ignore[arg-type]
+
+
+def test_the_file_of_the_hardware_is_looked_for_beside_the_graph(tmp_path: Path) -> None:
+    shipped = Path(BearRobot.example_parameters()["hardware"])
+    (tmp_path / "inner").mkdir()
+    context = SimpleNamespace(folder=tmp_path / "inner", graph_folder=tmp_path)
+    with pytest.raises(HardwareError, match="there is no file bench") as caught:
+        read_hardware("bench.yaml", context, ROBOT)  # type: ignore[arg-type]
+    assert str(tmp_path / "inner" / "bench.yaml") in str(caught.value)
+    shutil.copy(shipped, tmp_path / "bench.yaml")
+    assert read_hardware("bench.yaml", context, ROBOT).motors  # type: ignore[arg-type]
