@@ -158,7 +158,7 @@ def test_another_kernel_of_blas_is_named(made: tuple[Path, RunResult]) -> None:
     """With other routines BLAS rounds otherwise, which a replay must be able to say."""
     program = (
         "from aloft.logs.replay.opened_run import OpenedRun\n"
-        "print(*OpenedRun.of('recordings/sum.rrd').what_is_other_now(), sep='\\n')\n"
+        "print(*OpenedRun.of('recordings/sum.rrd').changed_dependencies(), sep='\\n')\n"
     )
     said = subprocess.run(
         [sys.executable, "-c", program],
