@@ -33,13 +33,13 @@ blocks:
 """
 PARTS = """
 from aloft import BlockError, parameter
-from aloft.blocks.general import gain
+from aloft.blocks.general import arithmetic
 
 
-class Fragile(gain.Gain):
+class Fragile(arithmetic.Gain):
     '''A gain that breaks at a tick.'''
 
-    class Params(gain.Gain.Params):
+    class Params(arithmetic.Gain.Params):
         breaks: int = parameter(-1, text="when")
 
     def step(self) -> None:
