@@ -116,7 +116,7 @@ def plan_tasks(
         TaskError: what is wrong with any of them.
     """
     from ..planner.library.library import PlanLibrary
-    from ..planner.task.errors import TaskError
+    from ..planner.task.files import TaskError
     from ..planner.task.read_task import read_task
     from ..robots.description import find_robot
 
@@ -157,8 +157,8 @@ def plan_task(
     """Plan one task, print and draw the plan, and return its row. Without ``tests`` those of a valid
     plan are not printed."""
     from ..planner.checking.validity import InvalidPlanError
-    from ..planner.solving.bounded import cpu_time
-    from ..planner.task.errors import PlanError
+    from ..planner.solving.solver_process import cpu_time
+    from ..planner.task.files import PlanError
 
     robot, started = library.robot, cpu_time()
     try:

@@ -9,8 +9,7 @@ from typing import Any
 from marks import refresh
 
 from aloft.planner.task.margins import Margins
-from aloft.planner.task.rough_ground import RoughGround
-from aloft.planner.task.sequence import Hop, Span
+from aloft.planner.task.sequence import Hop, RoughGround, Span
 from aloft.planner.task.task import JumpTask, Knots, Weights
 from aloft.runtime.language.parameters import Parameters
 

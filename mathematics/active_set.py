@@ -209,7 +209,7 @@ def polish(n: int, gradient: Array1D, memory: ActiveSetMemory, x: Array1D) -> No
 
 
 @kernel
-def price_again(n: int, count: int, gradient: Array1D, memory: ActiveSetMemory) -> None:
+def recompute_multipliers(n: int, count: int, gradient: Array1D, memory: ActiveSetMemory) -> None:
     """Compute the multipliers of the ``count`` active constraints from the gradient at the solution.
 
     They are as exact as the gradient is, so more so than those of the search where P has lost digits.

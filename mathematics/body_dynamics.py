@@ -274,7 +274,7 @@ def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -
 
 
 @kernel
-def weigh_body(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
+def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
     """A body's own inertia, and the force that gives it its acceleration: f = I a + v x* I v."""
     mass = tree.mass[body]
     place_of(motion, body, tree.com[body], own.centre)
@@ -310,7 +310,7 @@ def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> Non
     """The inertia and the force of every body with all that it carries."""
     n_joints = motion.joint.shape[0]
     for body in range(n_joints + 1):
-        weigh_body(tree, motion, body, composite)
+        body_inertia_and_wrench(tree, motion, body, composite)
     for joint in range(n_joints - 1, -1, -1):
         carrier, carried = tree.parent[joint], joint + 1
         composite.mass[carrier] = composite.mass[carrier] + composite.mass[carried]

@@ -23,7 +23,7 @@ _SMALL = 1e-4
 
 
 @kernel
-def bend(phi: Array1D, vector: Array1D, out: Array1D) -> None:
+def left_jacobian_so3(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     """Multiply a vector by the left Jacobian J of SO(3) at ``phi``: ``out`` = J v, (3,).
 
     J v = v + (1 - cos a) / a^2 phi x v + (a - sin a) / a^3 phi x (phi x v), with the angle
@@ -45,7 +45,7 @@ def bend(phi: Array1D, vector: Array1D, out: Array1D) -> None:
 
 
 @kernel
-def unbend(phi: Array1D, vector: Array1D, out: Array1D) -> None:
+def inv_left_jacobian_so3(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     """Multiply a vector by the inverse of the left Jacobian of SO(3), for angles below 2 pi.
 
     J^-1 v = v - phi x v / 2 + (1 / a^2 - (1 + cos a) / (2 a sin a)) phi x (phi x v).
@@ -74,7 +74,7 @@ def exponential(tangent: Array1D, orientation: Array1D, vectors: Array2D) -> Non
     """
     rotation_exponential(tangent, orientation)
     for k in range(vectors.shape[0]):
-        bend(tangent, tangent[3 * k + 3 : 3 * k + 6], vectors[k])
+        left_jacobian_so3(tangent, tangent[3 * k + 3 : 3 * k + 6], vectors[k])
 
 
 @kernel
@@ -82,7 +82,7 @@ def logarithm(orientation: Array1D, vectors: Array2D, tangent: Array1D) -> None:
     """The logarithm: the tangent vector (3 + 3 m) of a group element; its angle is at most pi."""
     rotation_logarithm(orientation, tangent)
     for k in range(vectors.shape[0]):
-        unbend(tangent, vectors[k], tangent[3 * k + 3 : 3 * k + 6])
+        inv_left_jacobian_so3(tangent, vectors[k], tangent[3 * k + 3 : 3 * k + 6])
 
 
 @kernel
@@ -118,6 +118,6 @@ def retract(
     multiply(turn, orientation, orientation)
     normalise(orientation, orientation)
     for k in range(vectors.shape[0]):
-        bend(tangent, tangent[3 * k + 3 : 3 * k + 6], spare)
+        left_jacobian_so3(tangent, tangent[3 * k + 3 : 3 * k + 6], spare)
         rotate(turn, vectors[k], vectors[k])
         vectors[k, :] += spare

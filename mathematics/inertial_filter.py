@@ -74,7 +74,9 @@ def turn(orientation: Array1D, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def right_up(orientation: Array1D, specific_force: Array1D, gain: float, up: Array1D) -> None:
+def correct_tilt_from_gravity(
+    orientation: Array1D, specific_force: Array1D, gain: float, up: Array1D
+) -> None:
     """Correct the tilt of an orientation by the specific force, which should point straight up.
 
     Args:

@@ -30,7 +30,7 @@ from .active_set import (
     active_set_memory,
     fulfil,
     polish,
-    price_again,
+    recompute_multipliers,
     solve_program,
 )
 from .arrays import Array, Array1D, Array2D, Array3D, Flags, Indices, Indices1D
@@ -194,7 +194,7 @@ def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array1
 
 
 @kernel
-def bend(
+def multiplier_curvature(
     count: int, active: int, first: int, cones: Cones, memory: ActiveSetMemory, x: Array1D
 ) -> None:
     """Compute ``direction`` and ``curvature`` from a solution and its ``active`` multipliers.
@@ -409,7 +409,7 @@ def refine(
     size, n = 3 * count, 3 * count + extra
     before = 4.0
     for _ in range(STEPS):
-        bend(count, held, first, cones, memory.memory, x)
+        multiplier_curvature(count, held, first, cones, memory.memory, x)
         touch(count, friction, EXACT, cones, x)
         write_planes(count, n, first, friction, cones, program)
         force_program(reduction, size, extra, force_weight, program.hessian, program.gradient)
@@ -427,7 +427,7 @@ def refine(
             if turn == 0:
                 polish(n, memory.gradient, memory.memory, x)
             else:
-                price_again(n, held, memory.gradient, memory.memory)
+                recompute_multipliers(n, held, memory.gradient, memory.memory)
         angle = turned(count, friction, cones, x)
         if angle <= EXACT or (angle <= ENOUGH and angle > 0.5 * before):
             return True

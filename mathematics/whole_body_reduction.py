@@ -34,24 +34,23 @@ from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
 class Reduction(NamedTuple):
     """The matrices of the elimination, for n velocities, 6 of the base, and up to m force elements.
 
-    ``factor`` U (n, n), ``base`` W (6, n), ``wanted`` y (n,), ``shape`` R (6, 6), ``lever`` K (6, m),
-    ``pull`` k (6,), ``response`` X' (6, n), ``rest`` the acceleration without forces (n,), ``price``
-    (6,) the cost of pushing the base, ``free`` N' (n - 6, n), ``mirrors`` (6, n) the reflections
-    that make N, ``torque_map`` (n - 6, m + n - 6) and ``torque_rest`` (n - 6,) the torques as an affine
-    function of f and e.
+    As in the module's equations: ``factor`` U (n, n), ``base`` W (6, n), ``y`` (n,), ``R`` (6, 6), ``K`` (6, m),
+    ``k_0`` the vector k (6,), ``X_t`` X' (6, n), ``a_0`` the acceleration without forces (n,), ``multiplier`` (6,) of
+    the equations of motion of the base, ``N_t`` N' (n - 6, n), ``reflections`` (6, n) the Householder vectors that make
+    N, ``torque_map`` (n - 6, m + n - 6) and ``torque_rest`` (n - 6,) the torques as an affine function of f and e.
     """
 
     factor: Array2D
     base: Array2D
-    wanted: Array1D
-    shape: Array2D
-    lever: Array2D
-    pull: Array1D
-    response: Array2D
-    rest: Array1D
-    price: Array1D
-    free: Array2D
-    mirrors: Array2D
+    y: Array1D
+    R: Array2D
+    K: Array2D
+    k_0: Array1D
+    X_t: Array2D
+    a_0: Array1D
+    multiplier: Array1D
+    N_t: Array2D
+    reflections: Array2D
     torque_map: Array2D
     torque_rest: Array1D
 
@@ -79,10 +78,10 @@ def eliminate(
     Args:
         active: the points in stance, of which the first ``count`` are used.
     """
-    factor, wanted, base = reduction.factor, reduction.wanted, reduction.base
-    n = wanted.shape[0]
+    factor, y, base = reduction.factor, reduction.y, reduction.base
+    n = y.shape[0]
     for i in range(n):
-        wanted[i] = 0.0
+        y[i] = 0.0
         for k in range(n):
             factor[i, k] = 0.0
         factor[i, i] = acceleration_weight
@@ -94,48 +93,48 @@ def eliminate(
         for i in range(n):
             value = weight * tasks.jacobian[row, i]
             if value != 0.0:
-                wanted[i] = wanted[i] + value * desired
+                y[i] = y[i] + value * desired
                 for k in range(i, n):
                     factor[i, k] = factor[i, k] + value * tasks.jacobian[row, k]
     if not factorise(factor, 0.0):
         return False
-    solve_transposed(factor, wanted)
+    solve_transposed(factor, y)
     for k in range(6):
         for i in range(n):
             base[k, i] = terms.mass_matrix[k, i]
         solve_transposed(factor, base[k])
-    shape, pull, lever = reduction.shape, reduction.pull, reduction.lever
+    R, k_0, K = reduction.R, reduction.k_0, reduction.K
     for k in range(6):
         for j in range(k, 6):
             total = 0.0
             for i in range(n):
                 total += base[k, i] * base[j, i]
-            shape[k, j] = total
+            R[k, j] = total
         total = terms.nonlinear[k]
         for i in range(n):
-            total += base[k, i] * wanted[i]
-        pull[k] = total
+            total += base[k, i] * y[i]
+        k_0[k] = total
         for j in range(count):
             for axis in range(3):
-                lever[k, 3 * j + axis] = terms.jacobian[active[j], axis, k]
-    if not factorise(shape, 0.0):
+                K[k, 3 * j + axis] = terms.jacobian[active[j], axis, k]
+    if not factorise(R, 0.0):
         return False
-    solve_transposed(shape, pull)
-    solve_rows_transposed(shape, 3 * count, lever)
-    response, rest = reduction.response, reduction.rest
+    solve_transposed(R, k_0)
+    solve_rows_transposed(R, 3 * count, K)
+    X_t, a_0 = reduction.X_t, reduction.a_0
     for k in range(6):
         for i in range(n):
-            response[k, i] = base[k, i]
-    solve_rows_transposed(shape, n, response)
+            X_t[k, i] = base[k, i]
+    solve_rows_transposed(R, n, X_t)
     for k in range(6):
-        solve_upper(factor, response[k])
+        solve_upper(factor, X_t[k])
     for i in range(n):
-        rest[i] = wanted[i]
-    solve_upper(factor, rest)
+        a_0[i] = y[i]
+    solve_upper(factor, a_0)
     for k in range(6):
-        value = pull[k]
+        value = k_0[k]
         for i in range(n):
-            rest[i] = rest[i] - value * response[k, i]
+            a_0[i] = a_0[i] - value * X_t[k, i]
     return True
 
 
@@ -149,7 +148,7 @@ def force_program(
     gradient: Array1D,
 ) -> None:
     """The cost in the first ``size`` elements of force and the first ``extra`` elements of e."""
-    lever, pull = reduction.lever, reduction.pull
+    K, k_0 = reduction.K, reduction.k_0
     for i in range(size + extra):
         gradient[i] = 0.0
         for j in range(size + extra):
@@ -157,10 +156,10 @@ def force_program(
         hessian[i, i] = force_weight if i < size else 1.0
     for k in range(6):
         for i in range(size):
-            value = lever[k, i]
-            gradient[i] = gradient[i] - value * pull[k]
+            value = K[k, i]
+            gradient[i] = gradient[i] - value * k_0[k]
             for j in range(size):
-                hessian[i, j] = hessian[i, j] + value * lever[k, j]
+                hessian[i, j] = hessian[i, j] + value * K[k, j]
 
 
 @kernel
@@ -179,19 +178,19 @@ def force_gradient(
     It has no rounding errors along forces that do not move the base, where only w_f decides and
     K'K + w_f 1 has lost most of its digits.
     """
-    size, price = 3 * count, reduction.price
+    size, multiplier = 3 * count, reduction.multiplier
     for k in range(6):
-        total = -reduction.pull[k]
+        total = -reduction.k_0[k]
         for i in range(size):
-            total += reduction.lever[k, i] * unknowns[i]
-        price[k] = total
-    solve_upper(reduction.shape, price)
+            total += reduction.K[k, i] * unknowns[i]
+        multiplier[k] = total
+    solve_upper(reduction.R, multiplier)
     for j in range(count):
         for axis in range(3):
             i = 3 * j + axis
             total = force_weight * unknowns[i]
             for k in range(6):
-                total += terms.jacobian[active[j], axis, k] * price[k]
+                total += terms.jacobian[active[j], axis, k] * multiplier[k]
             out[i] = total
     for k in range(size, size + extra):
         out[k] = unknowns[k]
@@ -229,32 +228,32 @@ def friction_rows(
 @kernel
 def free_motions(reduction: Reduction) -> None:
     """Compute N, the accelerations that do not push the base, by reflections (Householder)."""
-    mirrors, free = reduction.mirrors, reduction.free
-    n = reduction.rest.shape[0]
+    reflections, N_t = reduction.reflections, reduction.N_t
+    n = reduction.a_0.shape[0]
     for k in range(6):
         for i in range(n):
-            mirrors[k, i] = reduction.base[k, i]
+            reflections[k, i] = reduction.base[k, i]
     for k in range(6):
         square = 0.0
         for i in range(k, n):
-            square += mirrors[k, i] * mirrors[k, i]
-        head = mirrors[k, k]
-        mirrors[k, k] = head + math.copysign(math.sqrt(square), head)
-        square += mirrors[k, k] * mirrors[k, k] - head * head
+            square += reflections[k, i] * reflections[k, i]
+        head = reflections[k, k]
+        reflections[k, k] = head + math.copysign(math.sqrt(square), head)
+        square += reflections[k, k] * reflections[k, k] - head * head
         scale = math.sqrt(2.0 / square) if square > 0.0 else 0.0
         for i in range(k):
-            mirrors[k, i] = 0.0
+            reflections[k, i] = 0.0
         for i in range(k, n):
-            mirrors[k, i] = mirrors[k, i] * scale
+            reflections[k, i] = reflections[k, i] * scale
         for other in range(k + 1, 6):
-            reflect(mirrors[k], mirrors[other])
+            reflect(reflections[k], reflections[other])
     for j in range(n - 6):
         for i in range(n):
-            free[j, i] = 0.0
-        free[j, 6 + j] = 1.0
+            N_t[j, i] = 0.0
+        N_t[j, 6 + j] = 1.0
         for k in range(5, -1, -1):
-            reflect(mirrors[k], free[j])
-        solve_upper(reduction.factor, free[j])
+            reflect(reflections[k], N_t[j])
+        solve_upper(reduction.factor, N_t[j])
 
 
 @kernel
@@ -283,43 +282,43 @@ def torque_rows(
     Args:
         transmission: from joint torques to those that are limited, (n_joints, n_joints).
     """
-    response, lever, free = reduction.response, reduction.lever, reduction.free
+    X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
-    joints, n, size = torque_rest.shape[0], reduction.rest.shape[0], 3 * count
+    joints, n, size = torque_rest.shape[0], reduction.a_0.shape[0], 3 * count
     for j in range(joints):
-        rest = terms.nonlinear[6 + j]
+        torque = terms.nonlinear[6 + j]
         for i in range(n):
-            rest += terms.mass_matrix[6 + j, i] * reduction.rest[i]
-        torque_rest[j] = rest
+            torque += terms.mass_matrix[6 + j, i] * reduction.a_0[i]
+        torque_rest[j] = torque
         for point in range(count):
             for axis in range(3):
                 torque_map[j, 3 * point + axis] = -terms.jacobian[active[point], axis, 6 + j]
         for k in range(6):
             total = 0.0
             for i in range(n):
-                total += terms.mass_matrix[6 + j, i] * response[k, i]
+                total += terms.mass_matrix[6 + j, i] * X_t[k, i]
             for i in range(size):
-                torque_map[j, i] = torque_map[j, i] + total * lever[k, i]
+                torque_map[j, i] = torque_map[j, i] + total * K[k, i]
         for k in range(joints):
             total = 0.0
             for i in range(n):
-                total += terms.mass_matrix[6 + j, i] * free[k, i]
+                total += terms.mass_matrix[6 + j, i] * N_t[k, i]
             torque_map[j, size + k] = total
     for motor in range(joints):
         high, low = first + motor, first + joints + motor
         for i in range(size + joints):
             matrix[high, i] = 0.0
-        rest = 0.0
+        torque = 0.0
         for j in range(joints):
             share = transmission[motor, j]
             if share != 0.0:
-                rest += share * torque_rest[j]
+                torque += share * torque_rest[j]
                 for i in range(size + joints):
                     matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
         for i in range(size + joints):
             matrix[low, i] = -matrix[high, i]
-        bound[high] = bounds.upper[motor] - rest
-        bound[low] = rest - bounds.lower[motor]
+        bound[high] = bounds.upper[motor] - torque
+        bound[low] = torque - bounds.lower[motor]
     return int(first + 2 * joints)
 
 
@@ -342,16 +341,16 @@ def recover_acceleration(
     reduction: Reduction, size: int, extra: int, unknowns: Array1D, out: Array1D
 ) -> None:
     """The acceleration (n,) for ``size`` elements of force and ``extra`` elements of e."""
-    response, lever, free = reduction.response, reduction.lever, reduction.free
-    out[:] = reduction.rest
+    X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
+    out[:] = reduction.a_0
     for k in range(6):
         value = 0.0
         for i in range(size):
-            value += lever[k, i] * unknowns[i]
-        out[:] = out + value * response[k]
+            value += K[k, i] * unknowns[i]
+        out[:] = out + value * X_t[k]
     for k in range(extra):
         value = unknowns[size + k]
-        out[:] = out + value * free[k]
+        out[:] = out + value * N_t[k]
 
 
 @kernel

@@ -68,8 +68,8 @@ class Contacts(NamedTuple):
     patterned: bool
 
 
-class Seen(NamedTuple):
-    """What ``see_contacts`` writes: see the attributes of ``ContactKinematics``."""
+class ContactMotion(NamedTuple):
+    """What ``contact_motion`` writes: see the attributes of ``ContactKinematics``."""
 
     points: Rows3
     rates: Rows3
@@ -97,7 +97,9 @@ class Measured(NamedTuple):
 
 
 @kernel
-def see_contacts(rigid: Rigid, contacts: Contacts, measured: Measured, seen: Seen) -> None:
+def contact_motion(
+    rigid: Rigid, contacts: Contacts, measured: Measured, seen: ContactMotion
+) -> None:
     """The contact points as seen from the base, which is held in place but turns."""
     tree, motion, down, arm = rigid.tree, rigid.motion, rigid.scratch[0], rigid.scratch[1]
     motion.velocity[0, 3:6] = measured.angular_velocity
@@ -167,7 +169,7 @@ def differentiate_contacts(
     rigid: Rigid, contacts: Contacts, centres: Array2D, jacobians: Array3D
 ) -> None:
     """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
-    (n_contacts, 3, n_joints), with the bodies where ``see_contacts`` has left them."""
+    (n_contacts, 3, n_joints), with the bodies where ``contact_motion`` has left them."""
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
         centre, jacobian = centres[i], jacobians[i]
@@ -205,7 +207,7 @@ class ContactKinematics:
             no heading.
 
     ``centres`` and ``jacobians`` are updated by ``differentiate`` only. A kernel that calls
-    ``see_contacts`` itself takes ``rigid``, ``contacts`` and ``seen``.
+    ``contact_motion`` itself takes ``rigid``, ``contacts`` and ``seen``.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -229,9 +231,11 @@ class ContactKinematics:
         self.points, self.rates = np.zeros((n_contacts, 3)), np.zeros((n_contacts, 3))
         self.soles = np.zeros((len(robot.feet), 3))
         self.forward, self.com_velocity = np.zeros(3), np.zeros(3)
-        self.seen = Seen(self.points, self.rates, self.soles, self.forward, self.com_velocity)
+        self.seen = ContactMotion(
+            self.points, self.rates, self.soles, self.forward, self.com_velocity
+        )
         self._measured = Measured(np.zeros(4), np.zeros(3), np.zeros(n_joints), np.zeros(n_joints))
-        self._see = KernelCall(see_contacts, self.rigid, self.contacts, self._measured, self.seen)
+        self._see = KernelCall(contact_motion, self.rigid, self.contacts, self._measured, self.seen)
         self.centres = np.zeros((n_contacts, 3))
         self.jacobians = np.zeros((n_contacts, 3, n_joints))
         self._differentiate = KernelCall(

@@ -152,12 +152,12 @@ def link_poses_in_base(
     """
     poses = {robot.base: (np.eye(3), np.zeros(3))}
     for joint, value in zip(robot.joints, position.tolist(), strict=True):
-        turn, place = poses[joint.parent]
-        origin = place + product(turn, np.array(joint.origin))
+        R, p = poses[joint.parent]
+        origin = p + product(R, np.array(joint.origin))
         if joint.kind == "slide":
-            poses[joint.child] = (turn, origin + product(turn, np.array(joint.axis) * value))
+            poses[joint.child] = (R, origin + product(R, np.array(joint.axis) * value))
         else:
-            poses[joint.child] = (product(turn, axis_rotation(joint.axis, value)), origin)
+            poses[joint.child] = (product(R, axis_rotation(joint.axis, value)), origin)
     return poses
 
 
@@ -195,11 +195,11 @@ def standing_heights(robot: RobotDescription) -> Array:
     owners, centres = robot.foot_of_contact(), contact_centres(robot)
     heights = np.zeros(len(robot.contacts))
     for k, contact in enumerate(robot.contacts):
-        turn, place = poses[links[contact.foot]]
+        R, p = poses[links[contact.foot]]
         if owners.count(owners[k]) == 1:  # a ball: straight below its centre
-            heights[k] = (place + product(turn, centres[k]))[2] - contact.radius
+            heights[k] = (p + product(R, centres[k]))[2] - contact.radius
         else:
-            heights[k] = (place + product(turn, np.array(contact.position)))[2]
+            heights[k] = (p + product(R, np.array(contact.position)))[2]
     return heights
 
 
@@ -208,8 +208,8 @@ def standing_com(robot: RobotDescription) -> Array:
     poses = link_poses_in_base(robot, robot.standing_position)
     total = np.zeros(3)
     for link in robot.links:
-        turn, place = poses[link.name]
-        total += link.mass * (place + product(turn, np.array(link.com)))
+        R, p = poses[link.name]
+        total += link.mass * (p + product(R, np.array(link.com)))
     return np.asarray(total / robot.total_mass)
 
 

@@ -20,8 +20,8 @@ from ..blocks.jumping.plan_progress import speed_error
 from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
+from ..planner.library.library import shipped_folder
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
-from ..planner.library.shipped import shipped_folder
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
 from ..runtime.loading.flattening.flat import FlatGraph

@@ -366,14 +366,14 @@ UNUSED = {
     "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
-    "aloft.mathematics.inertial_filter.right_up": (
+    "aloft.mathematics.inertial_filter.correct_tilt_from_gravity": (
         np.array([0.0, 0.0, 0.0, 1.0]), np.array([0.3, 0.2, 9.8]), 0.01, np.zeros(3),
     ),
     "aloft.mathematics.invariant_filter.remove_contact": (1, np.full((37, 37), 0.5)),
     "aloft.mathematics.extended_pose.exponential": (
         np.linspace(-0.5, 0.6, 12), np.zeros(4), np.zeros((3, 3)),
     ),
-    "aloft.mathematics.extended_pose.unbend": (
+    "aloft.mathematics.extended_pose.inv_left_jacobian_so3": (
         np.array([0.1, -0.4, 0.3]), np.array([0.5, 0.2, -0.3]), np.zeros(3),
     ),
     "aloft.mathematics.extended_pose.logarithm": (

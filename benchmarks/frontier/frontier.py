@@ -26,7 +26,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from ...planner.library.shipped import shipped_folder
+from ...planner.library.library import shipped_folder
 from ...plotting import COLOURS, FAINT, INK, PALE, new_figure, style, svg_text
 from ...robots.description import find_robot
 from ...studies.batch.jobs import job_results

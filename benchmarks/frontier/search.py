@@ -19,11 +19,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...planner.checking.binding import what_binds
+from ...planner.checking.plan_tests import active_limits
 from ...planner.checking.validity import InvalidPlanError
 from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.solving.bounded import cpu_time
-from ...planner.task.errors import PlanError, TaskError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError, TaskError
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot
 from ...studies.journal import Outcome
@@ -219,7 +219,7 @@ def make_plan(job: PlanJob) -> Outcome:
         return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
     library.add(plan)
-    return Outcome(True, "", metrics={"cpu_s": spent, "binds": list(what_binds(plan, robot))})
+    return Outcome(True, "", metrics={"cpu_s": spent, "binds": list(active_limits(plan, robot))})
 
 
 def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:

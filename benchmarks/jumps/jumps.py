@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 
 from ...planner.checking.validity import InvalidPlanError
-from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.library.shipped import shipped_folder
-from ...planner.solving.bounded import cpu_time
+from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
-from ...planner.task.errors import PlanError, TaskError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError, TaskError
 from ...planner.task.task import JumpTask
 from ...robots.description import RobotDescription, find_robot
 from ...studies.batch.jobs import job_results

@@ -28,8 +28,8 @@ import numpy as np
 
 from ...planner.checking.validity import InvalidPlanError
 from ...planner.library.library import solve_and_check
-from ...planner.solving.bounded import cpu_time
-from ...planner.task.errors import PlanError, TaskError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError, TaskError
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import RobotDescription, find_robot
 from ..rows import Row

@@ -21,14 +21,13 @@ from typing import Any
 import numpy as np
 
 from ...planner.checking.validity import InvalidPlanError, check_plan
-from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.library.shipped import shipped_folder
+from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.problem.guess import ballistic_guess
 from ...planner.problem.problem import Problem
-from ...planner.solving.bounded import cpu_time
 from ...planner.solving.solve import make_problem, solve_jump
 from ...planner.solving.solver import Solution, solve
-from ...planner.task.errors import PlanError
+from ...planner.solving.solver_process import cpu_time
+from ...planner.task.files import PlanError
 from ...planner.task.read_task import read_task
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot

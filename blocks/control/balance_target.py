@@ -192,7 +192,7 @@ class BalanceTarget(Block):
         if not memory.started:
             memory.standing_height = reference.com[2]
             memory.heading = heading - planned
-            turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
+            turn_about_vertical(scratch.planned_middle, float(memory.heading), scratch.vector)
             memory.origin[:] = scratch.middle - scratch.vector
             memory.started = True
         goes_on = reference.lift_off_time > reference.time
@@ -291,7 +291,7 @@ def correct_place(
     flight = reference.touchdown_time - lift_off
     share = 1.0 - (lift_off - reference.time) / duration
     if share <= 0.0:
-        turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
+        turn_about_vertical(scratch.planned_middle, float(memory.heading), scratch.vector)
         scratch.vector[:] = memory.origin + scratch.vector
         memory.off_place[:] = scratch.middle - scratch.vector
         return
@@ -323,11 +323,11 @@ def correct_lift_off(
     duration = max(elapsed + left, period)
     share = min(elapsed / duration, 1.0)
     vector = scratch.vector
-    turn_about_vertical(params.momentum_correction, turn, vector)
+    turn_about_vertical(params.momentum_correction, turn, vector)  # type: ignore[arg-type]  # an array here
     add_quadratic_growth(
         vector, share, duration, target.angular_momentum, target.angular_momentum_rate
     )
-    turn_about_vertical(params.velocity_correction, turn, vector)
+    turn_about_vertical(params.velocity_correction, turn, vector)  # type: ignore[arg-type]  # likewise
     add_quadratic_growth(vector, share, duration, target.com_velocity, target.com_acceleration)
     target.com[:] = target.com + vector * (duration * share * share * share / 3.0)
 
@@ -347,7 +347,7 @@ def balance(
     depth, duration = params.landing_depth, params.rise_time
     share, rate, second = 0.0, 0.0, 0.0
     if phase.phase == Phase.RECOVER:
-        share, rate, second = minimum_jerk(phase.time_in_phase / duration)
+        share, rate, second = minimum_jerk(float(phase.time_in_phase) / duration)
     for k in range(3):
         target.com[k] = scratch.middle[k]
         target.com_velocity[k], target.com_acceleration[k] = 0.0, 0.0

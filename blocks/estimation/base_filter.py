@@ -24,7 +24,7 @@ from ...mathematics.inertial_filter import (
 )
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate
-from ...robots.contact_kinematics import Contacts, Measured, Rigid, Seen, see_contacts
+from ...robots.contact_kinematics import ContactMotion, Contacts, Measured, Rigid, contact_motion
 
 _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0
@@ -81,7 +81,7 @@ class Legs(NamedTuple):
     rigid: Rigid
     contacts: Contacts
     measured: Measured
-    seen: Seen
+    seen: ContactMotion
     points: StandingPoints
 
 
@@ -180,7 +180,7 @@ def start(estimator: Estimator) -> None:
     estimate, scratch, seen = estimator.filter, estimator.scratch, estimator.legs.seen
     error, spare, legs = scratch.error, scratch.spare, estimator.legs
     upright(estimator.sample.force, estimate.orientation)
-    see_contacts(legs.rigid, legs.contacts, legs.measured, seen)
+    contact_motion(legs.rigid, legs.contacts, legs.measured, seen)
     for _ in range(20):
         misalignment(estimate.orientation, seen.points, seen.forward, error, spare)
         limit(error, 0.2, error)
@@ -221,7 +221,7 @@ def predict(estimator: Estimator) -> float:
             estimate.angular_velocity, sample.force, estimator.fixed.period, scratch.middle,
             scratch.acceleration,
         )  # fmt: skip
-        see_contacts(legs.rigid, legs.contacts, legs.measured, legs.seen)
+        contact_motion(legs.rigid, legs.contacts, legs.measured, legs.seen)
     else:
         start(estimator)
     return fastest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.inertial_filter import right_up
+from ...mathematics.inertial_filter import correct_tilt_from_gravity
 from ...mathematics.kernel import kernel
 from .base_filter import (
     Estimator,
@@ -30,7 +30,7 @@ def filter_tick(estimator: Estimator) -> None:
     else:
         forget_samples(learning)
     if is_unaccelerated(sample.force) and count_standing(points.active) > 0:
-        right_up(
+        correct_tilt_from_gravity(
             estimate.orientation, sample.force, estimator.settings.tilt_gain[0],
             estimator.scratch.spare,
         )  # fmt: skip

@@ -14,8 +14,8 @@ from ...mathematics.invariant_filter import error_transition
 from ...robots.contact_kinematics import (
     ContactKinematics,
     Measured,
+    contact_motion,
     differentiate_contacts,
-    see_contacts,
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
@@ -123,7 +123,7 @@ class InvariantKalmanFilter(KernelBlock):
                 self.joints.position, foot, estimate, tuning, samples, work, health,
             ),
             KernelCall(
-                see_contacts, seen.rigid, seen.contacts,
+                contact_motion, seen.rigid, seen.contacts,
                 Measured(
                     estimate.orientation, estimate.angular_velocity, samples.angles,
                     np.zeros(joints),

@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array0D, Array1D, Flags0D, Indices0D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.inertial_filter import misalignment, right_up, turn, weigh
+from ...mathematics.inertial_filter import correct_tilt_from_gravity, misalignment, turn, weigh
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, rotate_back, wrap
 from ...runtime.language.block import State
@@ -116,7 +116,7 @@ def correct_orientation(
     if fastest < settings.slow_rate[0] and (level_ground or not flown):
         align_with_ground(estimator, trust)
     elif still:
-        right_up(
+        correct_tilt_from_gravity(
             estimator.filter.orientation, estimator.sample.force,
             estimator.settings.tilt_gain[0], estimator.scratch.spare,
         )  # fmt: skip

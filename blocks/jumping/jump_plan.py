@@ -158,7 +158,7 @@ class JumpPlan(KernelBlock):
     @classmethod
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
-        from ...planner.library.shipped import shipped_tasks
+        from ...planner.library.library import shipped_tasks
         from ...planner.task.task import TaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
@@ -289,7 +289,7 @@ class JumpPlan(KernelBlock):
 
     def _turning(self, instant: Array, table: JumpTable) -> Iterator[KernelCall]:
         """Follow the rotation of a somersault in flight where that is asked for."""
-        from ...planner.library.flight_rotation import flight_rotation
+        from ...planner.library.jump_table import flight_rotation
 
         given, terms, reference = self.params.turning, self.terms, self.reference
         if given is None or "terms" not in self.context.wired:
@@ -331,7 +331,7 @@ class JumpPlan(KernelBlock):
         return report
 
     def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.task.errors import TaskError
+        from ...planner.task.files import TaskError
         from ...planner.task.plan import PlanFileError
 
         library = plan_library(self.params, robot)
@@ -383,9 +383,8 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
         TaskError: it cannot be read as a task.
     """
-    from ...planner.library.shipped import find_task
-    from ...planner.task.changed_task import changed_task, spoken_name
-    from ...planner.task.read_task import read_task
+    from ...planner.library.library import find_task
+    from ...planner.task.read_task import changed_task, read_task, spoken_name
     from ...planner.task.task import make_task
 
     changes = {} if isinstance(wanted, str) else dict(wanted)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...logs.recording.motion_recording import RecordedMotion
     from ...planner.library.library import PlanLibrary
     from ...planner.library.nearest_feasible import NearestFeasible
-    from ...planner.task.errors import PlanError
+    from ...planner.task.files import PlanError
     from ...planner.task.plan import JumpPlan
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
@@ -296,7 +296,7 @@ def plan_grid(
 def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
     """Compile before the workers start; otherwise each of them would compile the same functions."""
     from ...planner.solving.solve import make_problem
-    from ...planner.task.errors import PlanError
+    from ...planner.task.files import PlanError
     from ...planner.task.task import TaskError
 
     # In the plane and out of it there are other functions, and for every formulation.

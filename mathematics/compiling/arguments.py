@@ -17,6 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .machine_code import ENTRY
+from .written_code import written_code
+
 HEADER = 2
 """The number of words before the arguments."""
 
@@ -109,10 +112,37 @@ def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:
 
 
 @cache
+def error_record() -> NDArray[np.int64]:
+    """What machine code reports errors with, (3,): whether one was reported, and the addresses of
+    Python's function that sets an error and of the error."""
+    function = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
+    return np.array([0, function or 0, id(ZeroDivisionError)], np.int64)
+
+
+@cache
 def _error_words() -> tuple[int, int]:
-    """The address of Python's function that sets an error, and that of the error."""
-    report = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
-    return report or 0, id(ZeroDivisionError)
+    """The address of the function that reports an error, and that of its record."""
+    return written_code(_report_module()).address, int(error_record().ctypes.data)
+
+
+def _report_module() -> Any:
+    """The function that reports an error: it sets it for Python and says so in the record."""
+    from llvmlite import ir
+
+    word, text = ir.IntType(64), ir.IntType(8).as_pointer()
+    module = ir.Module("aloft.report")
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [word, text]), ENTRY)
+    builder = ir.IRBuilder(function.append_basic_block())
+    record, message = function.args
+    words = builder.inttoptr(record, word.as_pointer())
+    builder.store(ir.Constant(word, 1), words)
+    address, error = (
+        builder.load(builder.gep(words, [ir.Constant(word, place)])) for place in (1, 2)
+    )
+    set_error = ir.FunctionType(ir.VoidType(), [word, text]).as_pointer()
+    builder.call(builder.inttoptr(address, set_error), [error, message])
+    builder.ret_void()
+    return module
 
 
 def _append(argument: Any, words: list[int]) -> None:

@@ -16,14 +16,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .arguments import error_record
 from .machine_code import ENTRY
 from .written_code import written_code
 
-ERROR_CHECK, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
-"""The words at the beginning of a table: the address of Python's function that tells whether an
-error is set; that of the system's function that reads a clock, or zero; the number of entries; the
+ERROR_FLAG, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
+"""The words at the beginning of a table: the address of the word in which kernels report an error;
+that of the system's function that reads a clock, or zero; the number of entries; the
 entry to go on with; the address of the word that says who runs; that of the word with the address
-of the present row of time stamps."""
+of the present row of time stamps, which is zero where none are taken."""
 HEAD = 6
 """The number of words before the first entry."""
 FUNCTION, ARGUMENTS, OWNER, ATTENTION, STAMP, WHEN = range(6)
@@ -79,7 +80,7 @@ def call_table(
         row[STAMP] = -1
         if call.when is not None:
             row[WHEN] = call.when.ctypes.data
-    table[ERROR_CHECK] = error_check_address()
+    table[ERROR_FLAG] = error_record().ctypes.data
     table[CLOCK] = clock_address()
     table[ENTRIES] = len(calls)
     table[RUNNING] = running.ctypes.data
@@ -90,12 +91,6 @@ def call_table(
 def rows_of(table: NDArray[np.int64]) -> NDArray[np.int64]:
     """The entries of a table, (n, ``WIDTH``), in its memory."""
     return table[HEAD:].reshape(-1, WIDTH)
-
-
-@cache
-def error_check_address() -> int:
-    """The address of Python's function that tells whether an error is set."""
-    return ctypes.cast(ctypes.pythonapi.PyErr_Occurred, ctypes.c_void_p).value or 0
 
 
 @cache
@@ -110,7 +105,7 @@ def _module() -> Any:
     """The function in LLVM's language."""
     from llvmlite import ir
 
-    word, narrow, byte = ir.IntType(64), ir.IntType(32), ir.IntType(8)
+    word, narrow = ir.IntType(64), ir.IntType(32)
     module = ir.Module("aloft.chain")
     function = ir.Function(module, ir.FunctionType(word, [word]), ENTRY)
     blocks = [function.append_basic_block(name) for name in _STEPS]
@@ -127,11 +122,13 @@ def _module() -> Any:
         return builder.gep(pointer(address), [constant(place)])
 
     (table,) = function.args
-    errors = builder.load(at(table, ERROR_CHECK))
+    failure = builder.load(at(table, ERROR_FLAG))
+    builder.store(constant(0), pointer(failure))
     clock = builder.load(at(table, CLOCK))
     count = builder.load(at(table, ENTRIES))
     running = builder.load(at(table, RUNNING))
-    cursor = builder.load(at(table, CURSOR))
+    stamped = builder.load(pointer(builder.load(at(table, CURSOR))))
+    no_stamps = builder.icmp_signed("==", stamped, constant(0))
     time = builder.alloca(ir.ArrayType(word, 2))
     first = builder.load(at(table, NEXT))
     builder.branch(test)
@@ -157,8 +154,7 @@ def _module() -> Any:
     kernel = ir.FunctionType(ir.VoidType(), [word]).as_pointer()
     address = builder.inttoptr(builder.load(at(entry, FUNCTION)), kernel)
     builder.call(address, [builder.load(at(entry, ARGUMENTS))])
-    occurred = ir.FunctionType(byte.as_pointer(), []).as_pointer()
-    error = builder.ptrtoint(builder.call(builder.inttoptr(errors, occurred), []), word)
+    error = builder.load(pointer(failure))
     builder.cbranch(builder.icmp_signed("!=", error, constant(0)), failed, called)
 
     builder.position_at_end(failed)
@@ -179,7 +175,8 @@ def _module() -> Any:
 
     builder.position_at_end(stamps)
     place = builder.load(at(entry, STAMP))
-    builder.cbranch(builder.icmp_signed(">=", place, constant(0)), take, following)
+    skipped = builder.or_(no_stamps, builder.icmp_signed("<", place, constant(0)))
+    builder.cbranch(skipped, following, take)
 
     builder.position_at_end(take)
     kind = ir.FunctionType(narrow, [narrow, word.as_pointer()]).as_pointer()
@@ -188,8 +185,7 @@ def _module() -> Any:
     seconds = builder.load(value)
     rest = builder.load(builder.gep(value, [constant(1)]))
     now = builder.add(builder.mul(seconds, constant(10**9)), rest)
-    row = builder.load(pointer(cursor))
-    builder.store(now, pointer(builder.add(row, place)))
+    builder.store(now, pointer(builder.add(stamped, place)))
     builder.branch(following)
 
     builder.position_at_end(following)

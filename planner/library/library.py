@@ -6,18 +6,39 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...robots.description import RobotDescription
-from ..task.errors import PlanError
-from ..task.multipliers import multipliers_path, read_multipliers, write_multipliers
+from ..task.files import PlanError
 from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
 from ..task.task import JumpTask, TaskError
-from .shipped import shipped_folder
+
+
+def shipped_folder() -> Path:
+    """The folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
+    return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
+
+
+def find_task(name: str, *folders: Path) -> Path:
+    """The task's file of that name in the first folder that has it, or among the shipped graphs.
+
+    Raises:
+        LookupError: there is none.
+    """
+    for folder in (*folders, shipped_folder()):
+        if (folder / name).is_file():
+            return folder / name
+    raise LookupError(f"there is no task {name!r} beside the graph or among the shipped ones")
+
+
+def shipped_tasks() -> list[str]:
+    """The shipped tasks by the names that graphs give them, such as ``tasks/in_situ.yaml``."""
+    return sorted(f"tasks/{path.name}" for path in (shipped_folder() / "tasks").glob("*.yaml"))
+
 
 SHIPPED = shipped_folder() / "plans"
 """The plans that come with aloft; ``make plans`` makes them anew."""
@@ -203,8 +224,7 @@ class PlanLibrary:
             except PlanFileError:
                 continue
             if plan.valid and plan.task.hash(self.robot) in name:
-                beside = multipliers_path(Path(name).parent, plan.task.hash(self.robot))
-                return replace(plan, multipliers=read_multipliers(beside))
+                return plan
         return None
 
     def farthest(self, task: JumpTask, parameter: str, modest: float) -> JumpPlan | None:
@@ -262,8 +282,6 @@ class PlanLibrary:
         ]
         for path in others:
             path.unlink(missing_ok=True)
-            beside = multipliers_path(self.folder, path.stem.rpartition("-")[2])
-            beside.unlink(missing_ok=True)
         return others
 
     def add(self, plan: JumpPlan) -> Path:
@@ -273,11 +291,6 @@ class PlanLibrary:
         for other in self.folder.glob(f"*-{plan.task.hash(self.robot)}.npz"):
             if other != path:
                 other.unlink(missing_ok=True)
-        beside = multipliers_path(self.folder, plan.task.hash(self.robot))
-        if plan.multipliers is None:
-            beside.unlink(missing_ok=True)
-        else:
-            write_multipliers(beside, plan.multipliers)
         return path
 
     def plan(
@@ -352,8 +365,8 @@ def solve_and_check(
         TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
     from ..checking.validity import checked, require_valid
-    from ..solving.refinement import ROUNDS, curable
-    from ..task.task_checks import require_consistent
+    from ..solving.solve import ROUNDS, curable
+    from ..task.read_task import require_consistent
 
     require_consistent(task, robot)
     make = solve or solve_task

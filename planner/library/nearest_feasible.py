@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ...robots.description import RobotDescription
-from ..checking.binding import what_binds
+from ..checking.plan_tests import active_limits
 from ..checking.validity import InvalidPlanError
-from ..solving.bounded import cpu_time
-from ..task.errors import PlanError, TaskError
+from ..solving.solver_process import cpu_time
+from ..task.files import PlanError, TaskError
 from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .library import SCALES, PlanLibrary, Solver, solve_and_check
@@ -142,7 +142,7 @@ def nearest_feasible(
     """
     search = _Search(task, robot, solve, seconds, progress, library)
     tried = candidates(task, family)
-    ways = ways_together(task)
+    ways = continuation_path(task)
     for parameter in tried[:SINGLE] if ways else tried:
         found = search.along([{parameter: value} for value in values_towards(task, parameter)])
         if found is not None:
@@ -156,7 +156,7 @@ def nearest_feasible(
     return None
 
 
-def ways_together(task: JumpTask) -> list[list[dict[str, float]]]:
+def continuation_path(task: JumpTask) -> list[list[dict[str, float]]]:
     """From a modest jump to what is asked for: onto a step with its height and the rise only, as
     the robot cannot jump up close to a step; then with all parameters that say how far it goes.
     Empty where the task sets fewer than two of them to something else."""
@@ -275,7 +275,7 @@ class _Search:
         ends = {name: (way[-1][name], way[good][name], way[bad][name]) for name in way[0]}
         first, *others = ends
         return NearestFeasible(
-            first, *ends[first], self._solves, self.cpu, plan, what_binds(plan, self._robot),
+            first, *ends[first], self._solves, self.cpu, plan, active_limits(plan, self._robot),
             {name: ends[name] for name in others},
         )  # fmt: skip
 
@@ -310,8 +310,6 @@ class _Search:
         self._solves += 1
         task = self._task.model_copy(update=dict(values))
         make = _quick(self._solve, start is not None)
-        if start is not None:  # over a stride this long its multipliers lead the solver astray
-            start = replace(start, multipliers=None)
         try:
             return solve_and_check(task, self._robot, start, make, refine=False)
         except (PlanError, InvalidPlanError, TaskError):

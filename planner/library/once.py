@@ -3,22 +3,62 @@
 A study runs the same jump many times in every worker; its plan is checked and turned into a table
 in the first of these runs only, and both are kept for later processes. What counts is the content of
 plan and robot, not where they are kept, so a file that changes between two runs is checked anew.
+
+A check takes longer than all else that loading a kept plan does. That a plan has passed is noted under a
+hash of everything that decides it: all numbers of the plan, its task, the robot, the code of the check
+and of the models that it uses, and the versions of the libraries that compute. So a plan that was
+changed, by hand too, is checked anew. Only that a plan has passed is noted, in a folder of the user's
+cache; a note that cannot be read or written costs time and nothing else.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from pathlib import Path
 from typing import Generic, TypeVar
 
 from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
+from ..task.files import write_whole
 from ..task.plan import ARRAYS, JumpPlan
-from .checked_before import FOLDERS, unless_passed
 from .jump_table import JumpTable
 from .reference_table import reference_table
+
+FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "mathematics")
+"""The code that decides what the check finds."""
+
+
+def noted_folder() -> Path:
+    """Where it is noted that a plan has passed."""
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(home) / "aloft" / "checked"
+
+
+def unless_passed(content: bytes, check: Callable[[], None]) -> None:
+    """Check a plan, unless one of that content has passed the very same check before.
+
+    Args:
+        content: a digest of the plan and of the robot.
+        check: raises an error if the plan does not pass; then nothing is noted.
+    """
+    note = noted_folder() / hashlib.blake2b(content + _code(), digest_size=16).hexdigest()
+    if note.is_file():
+        return
+    check()
+    try:
+        write_whole(note, b"")
+    except OSError:
+        return
+
+
+def _code() -> bytes:
+    """A digest of the code of the check and of the versions of what computes."""
+    return code_digest(*FOLDERS)
+
 
 KEPT = 32
 """How many results are kept, of the plans used last."""
@@ -29,7 +69,7 @@ TABLE_FOLDERS = (*FOLDERS, "planner/library", "blocks/signals")
 _Result = TypeVar("_Result")
 
 
-class Kept(Generic[_Result]):
+class ResultCache(Generic[_Result]):
     """The last results of a computation, by what they follow from."""
 
     def __init__(self) -> None:
@@ -45,8 +85,8 @@ class Kept(Generic[_Result]):
         return self._results[key]
 
 
-_valid = Kept[None]()
-_tables = Kept[JumpTable]()
+_valid = ResultCache[None]()
+_tables = ResultCache[JumpTable]()
 
 
 def content(plan: JumpPlan, robot: RobotDescription) -> bytes:

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.language.errors import AloftError
+from ..task.files import write_whole
 from ..task.task import JumpTask
-from ..task.whole_file import write_whole
 from .library import PlanLibrary
 
 FORMAT = 1

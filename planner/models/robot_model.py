@@ -1,17 +1,22 @@
-"""The robot's symbolic model, made once."""
+"""The robot's symbolic model, made once, and where the robot stands at the start and at the end of a jump."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...robots.welding import HeldLoad, welded
-from ..task.errors import PlanError
-from .stance import StanceFinder
+from ..task.files import PlanError
+from ..task.task import JumpTask
 from .symbolic_model import SymbolicModel
-from .symmetry import mirrored_pairs, symmetrised
+from .symmetry import Pair, mirrored_pairs, symmetrised, symmetrised_angles
 
 HARD, HARD_TURN = 40.0, 100.0
 """m/s^2 and rad/s^2 of a link in a hard jump, gravity included."""
@@ -56,3 +61,148 @@ def _matters(load: HeldLoad) -> bool:
     arm = np.linalg.norm(np.array(load.com) - np.array(load.origin))
     torque = load.mass * arm * HARD + max(load.inertia[:3]) * HARD_TURN
     return bool(torque > MATTERS * load.most)
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A standing pose: ``coordinates`` (n_velocities), contact ``points`` (n_contacts, 3) and
+    ``com`` in the world, ``heading`` of the feet [rad], and the ``footholds`` (n_contacts, 3) that
+    stay while the robot moves above them; they differ from the points where balls roll."""
+
+    coordinates: Array
+    points: Array
+    com: Array
+    heading: float
+    footholds: Array
+
+
+LEANS = 4
+"""Steps of the search for the base's lean; each is exact for feet that do not roll."""
+UNEVEN = 5e-4
+"""m; by how much the contact points of a stance may be above or below the ground."""
+
+
+class StanceFinder:
+    """Places a robot on the ground for given joint angles, with all contact points on it."""
+
+    def __init__(self, model: SymbolicModel, pairs: Sequence[Pair] = ()) -> None:
+        """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
+        import casadi as ca
+
+        self.model, self.pairs = model, tuple(pairs)
+        q = ca.SX.sym("q", model.size)
+        frames = model.frames(q)
+        robot = model.robot
+        soles = [model.point(frames, foot.link, foot.sole) for foot in robot.feet]
+        for ball in ball_feet(robot):
+            soles[ball.foot] = model.contact_points(q)[ball.point]
+        self._points: Any = ca.Function(
+            "stance",
+            [q],
+            [
+                ca.horzcat(*model.contact_points(q)),
+                model.com(q),
+                sum(soles) / len(soles),
+                ca.horzcat(*model.footholds(q)),
+            ],
+        )
+
+    def _evaluate(self, q: Array) -> list[Array]:
+        return [np.array(value) for value in self._points.call([q])]
+
+    def place(
+        self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
+    ) -> Stance:
+        """The stance with the soles' middle over ``at`` [m] and the contact points at its height.
+
+        The base leans so that the plane through all contact points is level.
+
+        Raises:
+            PlanError: the contact points do not lie in one plane with these joint angles, or there
+                are none.
+        """
+        q = np.zeros(self.model.size)
+        q[6:] = symmetrised_angles(self.pairs, joints)
+        points = self._evaluate(q)[0]
+        if not points.size:
+            raise PlanError(
+                f"{self.model.robot.name} has no contact points to stand on", family="stance"
+            )
+        for _ in range(LEANS):
+            # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
+            turn = _rotation(q[3:5])
+            q[3:5] = _lean(turn.T @ _normal(self._evaluate(q)[0].T))
+        if heading:  # turn the leaning pose as a whole: R = Rz(heading) R(lean)
+            q[3:6] = _turned(q[3:5], heading)
+        points, _, soles, _ = self._evaluate(q)
+        q[:2] = np.array(at[:2]) - soles.ravel()[:2]
+        q[2] = at[2] - points[2].mean()
+        points, com, _, footholds = self._evaluate(q)
+        heights = points[2] - at[2]
+        if np.abs(heights).max() > UNEVEN:
+            names = [contact.name for contact in self.model.robot.contacts]
+            found = ", ".join(f"{n} {1e3 * h:+.1f} mm" for n, h in zip(names, heights, strict=True))
+            raise PlanError(
+                "with these joint angles the contact points do not lie in one plane: they are off "
+                f"the best one by {found}; choose angles that put all feet on the ground",
+                family="stance",
+            )
+        return Stance(q, points.T.copy(), com.ravel(), heading, footholds.T.copy())
+
+
+def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
+               ) -> tuple[Stance, ...]:  # fmt: skip
+    """The task's stances: at the start, between jumps, with the same joint angles, and at the end.
+    The pitch includes the body's turns so far."""
+    names = [joint.name for joint in finder.model.robot.joints]
+    first, last = task.start_joints(robot), task.end_joints(robot)
+    places = task.places()
+    found = []
+    for number, place in enumerate(places):
+        angles = last if number == len(places) - 1 else first
+        stance = finder.place(
+            np.array([angles[name] for name in names]),
+            heading=place.heading,
+            at=(place.x, place.y, place.z),
+        )
+        turned = stance.coordinates.copy()
+        turned[3] += place.turned
+        found.append(replace(stance, coordinates=turned))
+    return tuple(found)
+
+
+def _normal(points: Array) -> Array:
+    """The upward normal of the plane nearest to points (n, 3); it leans in no direction in which
+    the points have no width, so one point or a line of them is on level ground as it is."""
+    off = points - points.mean(axis=0)
+    slopes = np.linalg.lstsq(off[:, :2], off[:, 2], rcond=1e-6)[0]
+    normal = np.array([-slopes[0], -slopes[1], 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _lean(normal: Array) -> Array:
+    """Pitch and roll of the base that make a direction of the body vertical."""
+    roll = np.arctan2(normal[1], normal[2])
+    return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
+
+
+def _rotation(lean: Array) -> Array:
+    """From body to world of a base with that pitch and roll."""
+    (cp, cr), (sp, sr) = np.cos(lean), np.sin(lean)
+    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    return np.asarray(pitch @ roll)
+
+
+def _turned(lean: Array, heading: float) -> Array:
+    """Pitch, roll, yaw of a base with that pitch and roll that is then turned by ``heading``."""
+    ch, sh = np.cos(heading), np.sin(heading)
+    turn = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
+    rotation = turn @ _rotation(lean)
+    return np.array(
+        [
+            np.arctan2(rotation[0, 2], rotation[2, 2]),
+            np.arcsin(-rotation[1, 2]),
+            np.arctan2(rotation[1, 0], rotation[1, 1]),
+        ]
+    )

@@ -7,27 +7,107 @@ singular at a roll of 90 degrees only. Links whose joints lead to the base throu
 joint form a limb.
 
 Agrees with Pinocchio's model of the same robot to rounding (the tests say 1e-10), rotors included.
+
+The centroidal momentum takes one pass from the links to the base and about half as long as the inverse
+dynamics: what every link carries (mass, momentum) is passed on to the link that carries it, in that link's frame.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...robots.description import ContactPoint, Link, RobotDescription
+from ...robots.description import ContactPoint, Joint, Link, RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.welding import HeldLoad
-from .symbolic_frames import (
-    Expression,
-    base_angular_acceleration,
-    base_angular_velocity,
-    base_rotation,
-    inertia_tensor,
-    joint_origin,
-    joint_rotation,
-)
 from .symmetry import limbs_of
+
+Expression = Any
+"""A CasADi SX or DM; the library has no types of its own."""
+
+
+def base_rotation(angles: Expression) -> Expression:
+    """The rotation from body to world of pitch, roll, yaw."""
+    import casadi as ca
+
+    sp, cp = ca.sin(angles[0]), ca.cos(angles[0])
+    sr, cr = ca.sin(angles[1]), ca.cos(angles[1])
+    sy, cy = ca.sin(angles[2]), ca.cos(angles[2])
+    return ca.vertcat(
+        ca.horzcat(cp * cy + sp * sr * sy, -cp * sy + sp * sr * cy, sp * cr),
+        ca.horzcat(cr * sy, cr * cy, -sr),
+        ca.horzcat(-sp * cy + cp * sr * sy, sp * sy + cp * sr * cy, cp * cr),
+    )
+
+
+def base_angular_velocity(angles: Expression, rates: Expression) -> Expression:
+    """The base's angular velocity in the body frame."""
+    import casadi as ca
+
+    sr, cr = ca.sin(angles[1]), ca.cos(angles[1])
+    sy, cy = ca.sin(angles[2]), ca.cos(angles[2])
+    return ca.vertcat(
+        cr * sy * rates[0] + cy * rates[1],
+        cr * cy * rates[0] - sy * rates[1],
+        -sr * rates[0] + rates[2],
+    )
+
+
+def base_angular_acceleration(
+    angles: Expression, rates: Expression, accelerations: Expression
+) -> Expression:
+    """The time derivative of ``base_angular_velocity``, in the body frame."""
+    import casadi as ca
+
+    sr, cr = ca.sin(angles[1]), ca.cos(angles[1])
+    sy, cy = ca.sin(angles[2]), ca.cos(angles[2])
+    _, roll, yaw = rates[0], rates[1], rates[2]
+    drift = ca.vertcat(
+        (-sr * sy * roll + cr * cy * yaw) * rates[0] - sy * yaw * roll,
+        (-sr * cy * roll - cr * sy * yaw) * rates[0] - cy * yaw * roll,
+        -cr * roll * rates[0],
+    )
+    return base_angular_velocity(angles, accelerations) + drift
+
+
+def joint_origin(joint: Joint, place: Expression) -> Expression:
+    """The child's origin in the parent's frame; a slide carries it along its axis."""
+    import casadi as ca
+
+    origin = ca.DM(list(joint.origin))
+    return origin + ca.DM(list(joint.axis)) * place if joint.kind == "slide" else origin
+
+
+def joint_rotation(joint: Joint, angle: Expression) -> Expression:
+    """The rotation from child to parent: none for a slide, Rodrigues' formula for a hinge.
+
+    A hinge about a coordinate axis gets a matrix with structural zeros, which is far cheaper.
+    """
+    import casadi as ca
+
+    if joint.kind == "slide":
+        return ca.SX.eye(3)
+    axis = int(np.argmax(np.abs(joint.axis)))
+    if abs(joint.axis[axis]) != 1.0:
+        x, y, z = joint.axis
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turned = ca.DM(cross) * ca.sin(angle) + ca.DM(cross @ cross) * (1.0 - ca.cos(angle))
+        return ca.SX.eye(3) + turned
+    sine, cosine = joint.axis[axis] * ca.sin(angle), ca.cos(angle)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    rotation = ca.SX(3, 3)
+    rotation[axis, axis] = 1
+    rotation[first, first] = rotation[second, second] = cosine
+    rotation[first, second], rotation[second, first] = -sine, sine
+    return rotation
+
+
+def inertia_tensor(link: Link | HeldLoad) -> np.ndarray[Any, np.dtype[np.float64]]:
+    xx, yy, zz, xy, xz, yz = link.inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 class SymbolicModel:
@@ -321,3 +401,83 @@ class SymbolicModel:
         """Joint indices of those limbs, or of all of them, parents first."""
         chosen = range(len(self.limbs)) if limbs is None else limbs
         return sorted(index for limb in chosen for index in self.limbs[limb])
+
+
+class Centroidal(NamedTuple):
+    """The centre of mass, linear momentum and angular momentum about the centre, world axes."""
+
+    com: Expression
+    linear: Expression
+    angular: Expression
+
+
+class _Carried(NamedTuple):
+    """What a link and all that hangs on it have, in the link's frame: mass, mass times the centre's
+    place, linear momentum and angular momentum about the link's origin."""
+
+    mass: float
+    moment: Expression
+    linear: Expression
+    angular: Expression
+
+
+def centroidal_momentum(
+    model: SymbolicModel, q: Expression, v: Expression, limbs: Sequence[int], share: int = 1
+) -> Centroidal:
+    """The momentum of the base and ``share`` times those limbs.
+
+    Of a mirrored motion, with half of the limbs and a share of two, only what is not zero by
+    symmetry means anything: x and z of the centre and of the linear momentum, y of the angular.
+    The rotors' own spin is left out, as in the centroidal momentum matrix.
+    """
+    import casadi as ca
+
+    robot, base = model.robot, model.robot.base
+    rotation = base_rotation(q[3:6])
+    spins = {base: base_angular_velocity(q[3:6], v[3:6])}
+    speeds = {base: ca.mtimes(rotation.T, v[0:3])}
+    chosen = sorted(index for limb in limbs for index in model.limbs[limb])
+    for index in chosen:
+        joint = robot.joints[index]
+        back = joint_rotation(joint, q[6 + index]).T
+        carried = speeds[joint.parent] + ca.cross(
+            spins[joint.parent], joint_origin(joint, q[6 + index])
+        )
+        rate = ca.DM(list(joint.axis)) * v[6 + index]
+        slides = joint.kind == "slide"
+        speeds[joint.child] = ca.mtimes(back, carried + rate if slides else carried)
+        spin = ca.mtimes(back, spins[joint.parent])
+        spins[joint.child] = spin if slides else spin + rate
+    held = {name: _own(model, name, spins[name], speeds[name]) for name in spins}
+    for index in reversed(chosen):
+        joint = robot.joints[index]
+        inner, outer = held[joint.parent], held[joint.child]
+        turn, origin = joint_rotation(joint, q[6 + index]), joint_origin(joint, q[6 + index])
+        times = share if joint.parent == base else 1
+        linear: Any = ca.mtimes(turn, outer.linear)
+        moment: Any = ca.mtimes(turn, outer.moment) + outer.mass * origin
+        angular: Any = ca.mtimes(turn, outer.angular) + ca.cross(origin, linear)
+        held[joint.parent] = _Carried(
+            inner.mass + times * outer.mass,
+            inner.moment + times * moment,
+            inner.linear + times * linear,
+            inner.angular + times * angular,
+        )
+    whole = held[base]
+    centre = whole.moment / whole.mass
+    about = whole.angular - ca.cross(centre, whole.linear)
+    return Centroidal(
+        q[0:3] + ca.mtimes(rotation, centre),
+        ca.mtimes(rotation, whole.linear),
+        ca.mtimes(rotation, about),
+    )
+
+
+def _own(model: SymbolicModel, name: str, spin: Expression, speed: Expression) -> _Carried:
+    import casadi as ca
+
+    link = model.robot.link(name)
+    centre = ca.DM(list(link.com))
+    linear = link.mass * (speed + ca.cross(spin, centre))
+    angular = ca.mtimes(ca.DM(inertia_tensor(link)), spin) + ca.cross(centre, linear)
+    return _Carried(link.mass, link.mass * centre, linear, angular)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Indices
-from .stage_functions import Piece
+from .stage_functions import StageFunction
 
 
 @dataclass
@@ -47,7 +47,7 @@ class Assembly:
         parameter_start: (piece, knot) -> where the piece's parameters begin.
     """
 
-    def __init__(self, knots: Sequence[Knot], pieces: Mapping[str, Piece]) -> None:
+    def __init__(self, knots: Sequence[Knot], pieces: Mapping[str, StageFunction]) -> None:
         self.knots, self.pieces = list(knots), dict(pieces)
         self.nx = [knot.states for knot in knots]
         self.nu = [knot.controls for knot in knots]

@@ -4,6 +4,10 @@ Knots are the beginnings of intervals, and the end. A stretch is a phase with a 
 where its time is free, and in every flight, the mean length of its intervals is a state that the
 knot before it chooses. With impacts one interval of no length, the touchdown's impulse, comes
 between a flight and the ground.
+
+Where forces and legs move fast, at lift-off and around touchdown, intervals are short; where the
+robot squats or comes to rest they are long. Each function gives the intervals' lengths as multiples
+of the phase's mean.
 """
 
 from __future__ import annotations
@@ -17,7 +21,27 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, TaskError
-from .knot_spacing import spacing
+
+GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 5.0}
+"""The last interval's length by the first's."""
+GROWTH_BETWEEN = 2.0
+"""The same for a landing that leads to another jump."""
+FLIGHT_MIDDLE = 4.0
+"""The length of an interval in the middle of the flight by one at its ends."""
+
+
+def spacing(phase: Phase, count: int, *, last: bool = True) -> Array:
+    """Interval lengths (count,) with a mean of one; ``last`` says that no jump follows."""
+    place = (np.arange(count) + 0.5) / count
+    if phase is Phase.FLIGHT:
+        lengths = 1.0 + (FLIGHT_MIDDLE - 1.0) * np.sin(np.pi * place)
+    else:
+        growth = GROWTH[phase]
+        if phase is Phase.LANDING and not last:
+            growth = GROWTH_BETWEEN
+        lengths = growth**place
+    return np.asarray(lengths * count / lengths.sum())
+
 
 SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.04, 1.5
 """s; bounds of a flight time that is left to the planner."""

@@ -17,14 +17,14 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.coordinates import Coordinates
-from ..models.stance import Stance
+from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
 from ..task.task import JumpTask
 from .assembly import Assembly
 from .layout import Stretch
 from .obstacles import step_parameters
-from .stage_functions import Piece, body_points, parameter_sizes
+from .stage_functions import StageFunction, body_points, parameter_sizes
 from .structure import Structure
 
 BODY_CLEARANCE = 0.002
@@ -122,7 +122,7 @@ class ProblemBuilder:
         task: JumpTask,
         model: SymbolicModel,
         coordinates: Coordinates,
-        pieces: Mapping[str, Piece],
+        pieces: Mapping[str, StageFunction],
         stances: Sequence[Stance],
         exact: SymbolicModel | None = None,
     ) -> None:

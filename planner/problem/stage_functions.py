@@ -11,7 +11,7 @@ reduced coordinates of ``Coordinates``:
 ``impact``  z = q, v, dv, L.    Touchdown: velocities change by dv under impulses L, M dv = J' L, with
             none from the motors. Rows: gap (2n), impulse balance (n), motor speed (m), friction.
 ``flight``  z = q, v, h, a, r.  Interval of ``share`` h seconds in the air. Rows: gap (2n + 1), momentum at
-            its end and in its middle (``exact_flight``), motor torque, torque-speed line at begin
+            its end and in its middle, motor torque, torque-speed line at begin
             and end, motor speed, torques of held joints.
 ``contact`` z = q, v.           Rows: velocity + 10/s x place error of every contact point along its
             foot, across it and upwards (2 in the sagittal plane), then the place errors;
@@ -26,13 +26,31 @@ reduced coordinates of ``Coordinates``:
 Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
 on the ground the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
 by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscopic moment.
+
+Derivatives go by way of a few intermediate quantities, which makes them three times as small. The equations of motion are written in the position and velocity in an interval's middle or at its
+end. These are simple expressions of the variables, but of nearly all of them, so that derivatives by
+the variables repeat the equations of motion for every one of them. Here the derivatives are by the
+intermediate quantities, and the chain rule does the rest.
+
+An interval in the air is exact but for how the attitude is integrated, which is of fourth order. The joints' accelerations are constant over an interval, so their motion is known. What the base
+does then follows from momentum alone: the centre of mass falls, and the angular momentum about it
+stays. Written for the interval's ends this has no error, however long the interval is:
+
+    centre(q+)     = centre(q) + h c + h^2 g / 2,      c the centre's velocity,
+    momentum(q+, v+) = momentum(q, v) + h m g,
+    k(q+, v+)      = k(q, v),                          k the angular momentum.
+
+The attitude is integrated by Simpson's rule, whose middle rates ``r`` are variables that have the
+same angular momentum at the angles of the cubic through both ends (Lobatto's method of order four):
+
+    angles+ = angles + h (rates + 4 r + rates+) / 6.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,11 +61,156 @@ from ..models.coordinates import (
     mirrored_coordinates,
     sagittal_coordinates,
 )
-from ..models.symbolic_frames import base_rotation
-from ..models.symbolic_model import SymbolicModel
-from .exact_flight import flight_interval
-from .lifted import Lifted
+from ..models.symbolic_model import Expression, SymbolicModel, base_rotation, centroidal_momentum
 from .obstacles import heights_above_step, touching_sphere
+
+
+class IntermediateExpressions:
+    """Expressions that were replaced by symbols, and derivatives that know of them.
+
+    What is lifted is an expression of the variables alone, not of other lifted symbols.
+    """
+
+    def __init__(self) -> None:
+        self.symbols: list[Any] = []
+        self.expressions: list[Any] = []
+
+    def __call__(self, expression: Any) -> Any:
+        """A symbol that stands for the expression from here on."""
+        import casadi as ca
+
+        dense = ca.densify(expression)
+        symbol = ca.SX.sym(f"lifted_{len(self.symbols)}", dense.numel())
+        self.symbols.append(symbol)
+        self.expressions.append(dense)
+        return symbol
+
+    def put_back(self, expressions: list[Any]) -> list[Any]:
+        """The expressions without the symbols."""
+        import casadi as ca
+
+        if not self.symbols:
+            return expressions
+        return list(ca.substitute(expressions, [self._symbol], [self._expression]))
+
+    def jacobian(self, rows: Any, variables: Any) -> Any:
+        """The whole derivative of rows by the variables."""
+        import casadi as ca
+
+        direct = ca.jacobian(rows, variables)
+        if not self.symbols:
+            return direct
+        through = ca.mtimes(ca.jacobian(rows, self._symbol), self._slope(variables))
+        return self.put_back([direct + through])[0]
+
+    def hessian(self, value: Any, variables: Any) -> tuple[Any, Any]:
+        """The whole second derivative of a value by the variables, and the first."""
+        import casadi as ca
+
+        if not self.symbols:
+            found, slope = ca.hessian(value, variables)
+            return found, slope
+        count = variables.numel()
+        inner, first = ca.hessian(value, ca.vertcat(variables, self._symbol))
+        by_symbols = first[count:]
+        slope = self._slope(variables)
+        # How the lifted expressions bend, weighted by what the value takes from each.
+        weights = ca.SX.sym("weights", by_symbols.numel())
+        bend, _ = ca.hessian(ca.dot(weights, self._expression), variables)
+        bend = ca.substitute(bend, weights, by_symbols)
+        cross = ca.mtimes(inner[:count, count:], slope)
+        through = ca.mtimes(slope.T, ca.mtimes(inner[count:, count:], slope))
+        whole = inner[:count, :count] + cross + cross.T + through + bend
+        whole = ca.triu2symm(ca.triu(whole))
+        return tuple(self.put_back([whole, first[:count] + ca.mtimes(slope.T, by_symbols)]))
+
+    @property
+    def _symbol(self) -> Any:
+        import casadi as ca
+
+        return ca.vertcat(*self.symbols)
+
+    @property
+    def _expression(self) -> Any:
+        import casadi as ca
+
+        return ca.vertcat(*self.expressions)
+
+    def _slope(self, variables: Any) -> Any:
+        import casadi as ca
+
+        return ca.jacobian(self._expression, variables)
+
+
+class FlightInterval(NamedTuple):
+    """The state at an interval's end, ``rows`` that are zero where momentum is conserved (those of
+    a base wrench, then the middle's angular momentum), and position and velocity in its middle."""
+
+    end: Expression
+    end_velocity: Expression
+    rows: list[Expression]
+    middle: Expression
+    middle_velocity: Expression
+
+
+def flight_interval(
+    model: SymbolicModel, coordinates: Coordinates,
+    q: Expression, v: Expression, h: Expression, a: Expression, r: Expression, lift: IntermediateExpressions,
+) -> FlightInterval:  # fmt: skip
+    """The interval of ``h`` seconds that begins with the reduced state ``q``, ``v``; ``a`` are the
+    mean accelerations, of the joints the constant ones, and ``r`` the angles' rates in the middle.
+    Positions and velocities at its end and in its middle are lifted."""
+    import casadi as ca
+
+    turning = list(coordinates.turning)
+    falling = [i for i, axis in enumerate(coordinates.free_base) if axis < 3]
+    end_velocity: Any = v + h * a
+    end, middle = _copied(q + h * v + 0.5 * h * h * a), _copied(q + 0.5 * h * v + 0.125 * h * h * a)
+    rate: Any
+    middle_velocity = _copied(v + 0.5 * h * a)
+    for i, rate in zip(turning, ca.vertsplit(r), strict=True):
+        both: Any = v[i] + end_velocity[i]
+        change: Any = v[i] - end_velocity[i]
+        end[i] = q[i] + h / 6.0 * (both + 4.0 * rate)
+        middle[i] = 0.5 * (q[i] + end[i]) + 0.125 * h * change
+        middle_velocity[i] = rate
+    end, end_velocity, middle, middle_velocity = map(
+        lift, (end, end_velocity, middle, middle_velocity)
+    )
+
+    def momentum(place: Expression, speed: Expression) -> Any:
+        return centroidal_momentum(
+            model, coordinates.expand(place), coordinates.expand(speed),
+            coordinates.limbs, coordinates.share,
+        )  # fmt: skip
+
+    mass = model.robot.total_mass
+    start = momentum(q, v)
+    pull = ca.vertcat(0.0, 0.0, -GRAVITY)
+    # The base's own place does not matter for where the centre is in the body.
+    stop = momentum(end, end_velocity)
+    fallen = start.com + h / mass * start.linear + 0.5 * h * h * pull
+    missed = fallen - stop.com
+    end = _copied(end)
+    for i in falling:
+        end[i] = end[i] + missed[coordinates.free_base[i]]
+    forces = (stop.linear - start.linear) / h - mass * pull
+    moments = (stop.angular - start.angular) / h
+    half = momentum(middle, middle_velocity).angular - start.angular
+    wrench = ca.vertcat(forces, moments)
+    rows = [
+        wrench[list(coordinates.rows)],
+        half[[row - 3 for row in coordinates.rows if row >= 3]],
+    ]
+    return FlightInterval(end, end_velocity, rows, middle, middle_velocity)
+
+
+def _copied(expression: Expression) -> Expression:
+    """An expression whose elements may be replaced."""
+    import casadi as ca
+
+    return ca.vertcat(*ca.vertsplit(ca.densify(expression)))
+
 
 DRIFT_RATE = 10.0
 """1/s, how fast the place error of a foot on the ground dies out."""
@@ -56,7 +219,7 @@ PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "a
 
 
 @dataclass(frozen=True)
-class Piece:
+class StageFunction:
     """The functions of one piece: ``value(z, w) -> f, g``; ``jacobian(z, w) -> g, grad f, jac g``;
     ``hessian(z, w, lam_f, lam_g) -> gradient and Hessian of the Lagrangian``."""
 
@@ -106,13 +269,16 @@ def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
 
 
 def piece_expressions(
-    model: SymbolicModel, coordinates: Coordinates, name: str, lifted: Lifted | None = None
+    model: SymbolicModel,
+    coordinates: Coordinates,
+    name: str,
+    lifted: IntermediateExpressions | None = None,
 ) -> tuple[Any, Any, Any, Any]:
     """The symbols ``z`` and ``w`` of a piece, its cost and its rows; with ``lifted`` in terms of
     what is lifted there, too."""
     import casadi as ca
 
-    lift = Lifted() if lifted is None else lifted
+    lift = IntermediateExpressions() if lifted is None else lifted
     sizes = parameter_sizes(coordinates)[name]
     w = {key: ca.SX.sym(key, size) for key, size in sizes.items()}
     q, v = ca.SX.sym("q", coordinates.size), ca.SX.sym("v", coordinates.size)
@@ -143,7 +309,7 @@ def piece_expressions(
 
 def _interval(
     model: SymbolicModel, coordinates: Coordinates, name: str, q: Any, v: Any,
-    w: Mapping[str, Any], lift: Lifted,
+    w: Mapping[str, Any], lift: IntermediateExpressions,
 ) -> tuple[list[Any], Any, list[Any]]:  # fmt: skip
     """The symbols, the cost and the rows of an interval on the ground or in the air."""
     import casadi as ca
@@ -274,28 +440,28 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
     return sums[0] - sums[1]
 
 
-def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Piece:
+def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> StageFunction:
     """The functions of a piece with exact derivatives."""
-    lifted = Lifted()
+    lifted = IntermediateExpressions()
     return derived(
         f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name, lifted), lifted
     )
 
 
 def derived(
-    prefix: str, z: Any, w: Any, cost: Any, rows: Any, lifted: Lifted | None = None
-) -> Piece:
+    prefix: str, z: Any, w: Any, cost: Any, rows: Any, lifted: IntermediateExpressions | None = None
+) -> StageFunction:
     """A piece from its symbols ``z`` and ``w``, its cost and its rows, which may be written in
     terms of what is ``lifted``."""
     import casadi as ca
 
-    lift = Lifted() if lifted is None else lifted
+    lift = IntermediateExpressions() if lifted is None else lifted
     lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
     hessian, slope = lift.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
     jacobian, gradient = lift.jacobian(rows, z), ca.densify(lift.jacobian(cost, z).T)
     cost, rows = lift.put_back([cost, ca.densify(rows)])
     options = {"cse": True}
-    return Piece(
+    return StageFunction(
         ca.Function(f"{prefix}_value", [z, w], [cost, rows], options),
         ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, jacobian], options),
         ca.Function(

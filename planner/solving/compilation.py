@@ -24,21 +24,19 @@ from typing import Any
 from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
-from ..problem.stage_functions import PIECES, Piece, make_piece
+from ..problem.stage_functions import PIECES, StageFunction, make_piece
+from ..task.plan import JumpPlan
+from ..task.task import Knots
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
 """No flags of one machine's: its libraries may be kept where other machines find them, and plans
 are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
 
 SOURCES = (
-    "models/symbolic_frames.py",
     "models/symbolic_model.py",
-    "models/symbolic_momentum.py",
     "models/symmetry.py",
     "models/coordinates.py",
     "problem/stage_functions.py",
-    "problem/exact_flight.py",
-    "problem/lifted.py",
     "problem/obstacles.py",
 )
 KINDS = ("value", "jacobian", "hessian")
@@ -66,7 +64,7 @@ class FunctionSet:
     name: str
     pieces: tuple[str, ...]
     sources: tuple[str, ...]
-    make: Callable[[str], Piece]
+    make: Callable[[str], StageFunction]
 
 
 UNUSED = {"profiles", "profile", "sensors", "standing", "held", "points", "text"}
@@ -97,7 +95,7 @@ def load_pieces(
     names: tuple[str, ...] = PIECES,
     compiled: bool = True,
     progress: Progress | None = None,
-) -> dict[str, Piece]:
+) -> dict[str, StageFunction]:
     """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
     it."""
     functions = FunctionSet(
@@ -112,7 +110,7 @@ def load_functions(
     *,
     compiled: bool = True,
     progress: Progress | None = None,
-) -> dict[str, Piece]:
+) -> dict[str, StageFunction]:
     """The same for any set of pieces."""
     key = content_hash(model.robot, functions.name, functions.sources, model.loads)
     held = _held.setdefault((key, compiled), {})
@@ -122,15 +120,15 @@ def load_functions(
     return {name: held[name] for name in functions.pieces}
 
 
-_held: dict[tuple[str, bool], dict[str, Piece]] = {}
+_held: dict[tuple[str, bool], dict[str, StageFunction]] = {}
 
 
 def _load(
     functions: FunctionSet, key: str, names: tuple[str, ...], compiled: bool,
     progress: Progress | None,
-) -> dict[str, Piece]:  # fmt: skip
+) -> dict[str, StageFunction]:  # fmt: skip
     compiler = find_compiler() if compiled else None
-    pieces: dict[str, Piece] = {}
+    pieces: dict[str, StageFunction] = {}
     waiting, elsewhere = deque(names), 0
     while waiting:
         name = waiting.popleft()
@@ -184,11 +182,11 @@ def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[boo
             yield True
 
 
-def _external(library: Path, prefix: str) -> Piece:
+def _external(library: Path, prefix: str) -> StageFunction:
     import casadi as ca
 
     found: list[Any] = [ca.external(f"{prefix}_{kind}", str(library)) for kind in KINDS]
-    return Piece(*found)
+    return StageFunction(*found)
 
 
 @lru_cache(maxsize=1)
@@ -197,7 +195,7 @@ def find_compiler() -> str | None:
     return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 
 
-def _compile(compiler: str, piece: Piece, library: Path) -> bool:
+def _compile(compiler: str, piece: StageFunction, library: Path) -> bool:
     """Compile a piece; whether that worked."""
     import casadi as ca
 
@@ -236,3 +234,26 @@ def run_compiler(compiler: str, source: Path, library: Path, *flags: str) -> Non
     """
     command = [compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
     subprocess.run(command, check=True, capture_output=True)
+
+
+@dataclass(frozen=True)
+class SolveOptions:
+    """What every formulation takes beside the task and the robot.
+
+    Attributes:
+        warm_start: a plan of a near task, on any grid; one that goes through other phases is not
+            used. A plan of this very task that failed the validity check is solved again on finer
+            intervals (see ``refinement``).
+        progress: is told when functions are compiled, once for each robot.
+        compiled: whether functions are compiled where there is a compiler.
+        solver: ``fatrop`` or ``ipopt`` to insist on one of them.
+        knots: numbers of intervals to use instead of the task's.
+        quick: whether to give up soon: what is not found in a few iterations is not looked for.
+    """
+
+    warm_start: JumpPlan | None = None
+    progress: Progress | None = None
+    compiled: bool = True
+    solver: str = ""
+    knots: Knots | None = None
+    quick: bool = False

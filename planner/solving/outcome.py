@@ -1,13 +1,23 @@
-"""Describes the outcome of a solve: the reason why there is no plan, or the statistics of the solution."""
+"""The outcome of a solve: the reason why there is no plan, or the plan's arrays and statistics.
+
+The planner leaves out held joints of the robot; the plan is then written for all joints.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..problem.program import Program
-from ..task.errors import PlanError
+from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
+from ...robots.description import RobotDescription
+from ...robots.welding import WeldedRobot
+from ..models.exact_dynamics import ExactDynamics
+from ..problem.program import Program, joint_torques
+from ..task.files import PlanError
+from ..task.plan import JumpPlan
 from ..task.task import JumpTask
 from .solver import Solution
 
@@ -64,3 +74,71 @@ def versions() -> dict[str, str]:
     import casadi as ca
 
     return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}
+
+
+def motion_arrays(
+    problem: Program, steps: Array, position: Array, velocity: Array, force: Array
+) -> dict[str, Any]:
+    """The motion at the knots, with accelerations by differences and torques by exact dynamics.
+
+    Args:
+        steps: the intervals' lengths [s], (knots - 1,).
+        position: (knots, n_positions).
+        velocity: (knots, n_velocities).
+        force: of all contact points [N], (knots, 3 n_contacts).
+    """
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    acceleration = np.diff(velocity, axis=0) / steps[:, None]
+    phases = [*problem.grid.phases, problem.grid.phases[-1]]
+    contact = np.array([phase != Phase.FLIGHT for phase in phases])
+    forces = force.reshape(len(times), -1, 3)
+    dynamics = ExactDynamics(problem.model.robot)
+    return {
+        "time": times,
+        "position": position,
+        "velocity": velocity,
+        "acceleration": np.vstack([acceleration, acceleration[-1:]]),
+        "contact_force": forces,
+        "contact": np.repeat(contact[:, None], forces.shape[1], axis=1),
+        "phase": np.array([int(phase) for phase in phases], dtype=np.int64),
+        "joint_torque": joint_torques(dynamics, times, position, velocity, forces),
+    }
+
+
+def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -> JumpPlan:
+    """A plan of the welded robot as one of the whole robot.
+
+    Held joints keep their angle. Their torques are what exact dynamics needs to keep them there.
+    """
+    if not part.held:
+        return plan
+    position = np.hstack(
+        [plan.position[:, :7], part.expand(plan.position[:, 7:], held=part.angles)]
+    )
+    velocity = np.hstack([plan.velocity[:, :6], part.expand(plan.velocity[:, 6:])])
+    bend = np.hstack([plan.acceleration[:, :6], part.expand(plan.acceleration[:, 6:])])
+    torque = part.expand(plan.joint_torque)
+    needed = joint_torques(
+        ExactDynamics(robot), plan.time, position, velocity, plan.contact_force
+    )  # fmt: skip
+    torque[:, list(part.held)] = needed[:, list(part.held)]
+    return replace(
+        plan, position=position, velocity=velocity, acceleration=bend, joint_torque=torque
+    )
+
+
+def for_moving_joints(plan: JumpPlan, part: WeldedRobot) -> JumpPlan:
+    """A plan of the whole robot as one of the welded robot, to start a solver from."""
+    if not part.held:
+        return plan
+
+    def reduced(rows: Array, base: int) -> Array:
+        return np.hstack([rows[:, :base], part.reduce(rows[:, base:])])
+
+    return replace(
+        plan,
+        position=reduced(plan.position, 7),
+        velocity=reduced(plan.velocity, 6),
+        acceleration=reduced(plan.acceleration, 6),
+        joint_torque=part.reduce(plan.joint_torque),
+    )

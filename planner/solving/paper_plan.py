@@ -10,19 +10,16 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
-from ..models.robot_model import model_of
-from ..models.stance import stances_of
-from ..problem import centroidal_stages as stages
+from ..models.robot_model import model_of, stances_of
+from ..problem import paper_problem as stages
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import Program
 from ..task.plan import JumpPlan
 from ..task.task import JumpTask
-from .bounded import cpu_time
-from .compilation import FunctionSet, Progress, load_functions
-from .motion_arrays import motion_arrays
-from .options import SolveOptions
-from .outcome import failure, statistics_of, versions
+from .compilation import FunctionSet, Progress, SolveOptions, load_functions
+from .outcome import failure, motion_arrays, statistics_of, versions
 from .solver import solve
+from .solver_process import cpu_time
 
 LIMIT = 500
 """Iterations; without weights on accelerations the problem needs many."""

@@ -1,4 +1,13 @@
-"""Plans a task in the ``srbm`` formulation."""
+"""Plans a task in the ``srbm`` formulation.
+
+The motion of the whole robot follows from that of the single rigid body by inverse kinematics.
+
+The robot takes over the rigid body's centre of mass and attitude, and its feet stand where they were
+planned. In flight each foot goes, seen from the centre of mass, from where it left the ground to
+where it lands; within ``BLEND`` of both it gains and loses speed, so that it is at rest on the
+ground. So the linear momentum is the planned one, but the angular momentum is not, because the legs add
+theirs.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +20,164 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import matrices_of_quaternions
 from ..models.quaternions import pose_of
-from ..models.rigid_body import RigidBody, lump
-from ..models.robot_model import model_of
-from ..models.stance import stances_of
-from ..problem import rigid_body_stages as stages
+from ..models.robot_model import Stance, model_of, stances_of
+from ..models.simple_models import BLEND, RigidBody, composite_inertia
+from ..models.symbolic_model import SymbolicModel
+from ..problem import rigid_body_problem as stages
 from ..problem.program import Program
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..problem.unpacking import twist
+from ..task.files import PlanError
 from ..task.plan import JumpPlan
 from ..task.task import JumpTask
-from .bounded import cpu_time
-from .compilation import FunctionSet, Progress, load_functions
-from .motion_arrays import motion_arrays
-from .options import SolveOptions
-from .outcome import failure, statistics_of, versions
-from .rigid_body_motion import FeetPath, whole_body
+from .compilation import FunctionSet, Progress, SolveOptions, load_functions
+from .outcome import failure, motion_arrays, statistics_of, versions
 from .solver import solve
+from .solver_process import cpu_time
+
+RATE_STEP = 1e-6
+"""s, of the differences that give the feet's velocities."""
+
+
+class FeetPath:
+    """The contact points over the flight of a centre of mass.
+
+    ``com`` and ``speed`` are its states at lift-off and touchdown, ``times`` the two instants.
+    """
+
+    def __init__(
+        self, stances: tuple[Stance, Stance], com: Array, speed: Array, times: tuple[float, float]
+    ) -> None:
+        self.stances, self.com, self.speed, self.times = stances, com, speed, times
+        self.blend = min(BLEND, 0.5 * (times[1] - times[0]))
+
+    def at(self, time: float, com: Array) -> tuple[Array, float]:
+        """The points (n_contacts, 3) and the feet's heading when the centre of mass is at ``com``."""
+        first, last = self.stances
+        if time <= self.times[0]:
+            return first.points, first.heading
+        if time >= self.times[1]:
+            return last.points, last.heading
+        duration = self.times[1] - self.times[0]
+        after, before = time - self.times[0], self.times[1] - time
+        x = after / duration
+        share = x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        lag = [-s * self._coast(t) for s, t in ((self.speed[0], after), (-self.speed[1], before))]
+        offset = (1.0 - share) * (self._middle(0) + lag[0]) + share * (self._middle(1) + lag[1])
+        heading = (1.0 - share) * first.heading + share * last.heading
+        return com + offset + self._shape() @ _turned(heading).T, heading
+
+    def _middle(self, which: int) -> Array:
+        """From the centre of mass to the middle of the points, on the ground."""
+        return np.asarray(self.stances[which].points.mean(axis=0) - self.com[which])
+
+    def _shape(self) -> Array:
+        """The points from their middle, at heading zero."""
+        first = self.stances[0]
+        return np.asarray((first.points - first.points.mean(axis=0)) @ _turned(first.heading))
+
+    def _coast(self, time: float) -> float:
+        """The way of a speed of one that dies out over the blend, 1 - 3 u^2 + 2 u^3 of it."""
+        u = min(time / self.blend, 1.0)
+        return self.blend * (u - u**3 + 0.5 * u**4)
+
+
+class WholeBodyPose:
+    """Base position and joints for a centre of mass, a torso attitude and feet on given points."""
+
+    def __init__(self, model: SymbolicModel) -> None:
+        import casadi as ca
+
+        self.model = model
+        contacts = len(model.robot.contacts)
+        q, com = ca.SX.sym("q", model.size), ca.SX.sym("com", 3)
+        points, heading = ca.SX.sym("points", 3 * contacts), ca.SX.sym("heading")
+        rows: list[Any] = [model.com(q) - com]
+        along = (ca.cos(heading), ca.sin(heading))
+        seen: set[str] = set()
+        for j, point in enumerate(model.contact_points(q)):
+            off = point - points[3 * j : 3 * j + 3]
+            foot = model.robot.contacts[j].foot
+            if foot not in seen:
+                rows.append(along[0] * off[0] + along[1] * off[1])
+            rows += [along[0] * off[1] - along[1] * off[0], off[2]]
+            seen.add(foot)
+        given = ca.vertcat(com, points, heading)
+        error = ca.vertcat(*rows)
+        self._free = [0, 1, 2, *range(6, model.size)]
+        self._errors: Any = ca.Function(
+            "pose", [q, given], [error, ca.jacobian(error, q), ca.jacobian(error, given)],
+            {"cse": True},
+        )  # fmt: skip
+
+    def find(self, q: Array, given: Array) -> Array:
+        """The pose near ``q`` that has its attitude.
+
+        Raises:
+            PlanError: the legs do not reach, or a joint would have to pass its limit.
+        """
+        q, limits = q.copy(), self.model.robot.joint_limits
+        for _ in range(30):
+            error, jacobian, _ = (np.array(x) for x in self._errors(q, given))
+            if np.abs(error).max() < 1e-11:
+                break
+            step = np.linalg.lstsq(jacobian[:, self._free], -error.ravel(), rcond=None)[0]
+            q[self._free] += step * min(1.0, 0.3 / np.abs(step).max())
+        missed = float(np.abs(np.array(self._errors(q, given)[0])).max())
+        over = np.maximum(q[6:] - limits[:, 1], limits[:, 0] - q[6:])
+        if missed > 1e-8 or over.max() > 0.0:
+            joint = self.model.robot.joints[int(over.argmax())].name
+            raise PlanError(
+                "the legs cannot follow the single rigid body: "
+                + (f"a foot is missed by {missed:.2g} m" if missed > 1e-8 else
+                   f"{joint} would pass its limit by {over.max():.2g} rad")
+                + "; ask for a smaller jump, or use formulation: full",
+                family="leg length", violation=max(missed, float(over.max())),
+            )  # fmt: skip
+        return q
+
+    def rates(self, q: Array, turning: Array, given: Array, given_rates: Array) -> Array:
+        """The coordinates' rates at that pose for the torso's rates of pitch, roll and yaw."""
+        _, jacobian, slope = (np.array(x) for x in self._errors(q, given))
+        known = jacobian[:, 3:6] @ turning + slope @ given_rates
+        v = np.zeros(self.model.size)
+        v[3:6] = turning
+        v[self._free] = np.linalg.lstsq(jacobian[:, self._free], -known, rcond=None)[0]
+        return v
+
+
+def whole_body(
+    model: SymbolicModel, path: FeetPath, times: Array, body: Array, rates: Array, first: Array
+) -> tuple[Array, Array]:
+    """Coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
+
+    ``body`` and ``rates`` (N, 6) are centre of mass, pitch, roll and yaw, and their derivatives.
+    """
+    pose, q = WholeBodyPose(model), first
+    positions, velocities = [], []
+    for time, place, rate in zip(times, body, rates, strict=True):
+
+        def given(dt: float, time: float = time, place: Array = place, rate: Array = rate) -> Array:
+            com = place[:3] + dt * rate[:3]
+            points, heading = path.at(time + dt, com)
+            return np.concatenate([com, points.ravel(), [heading]])
+
+        q = q.copy()
+        q[3:6] = place[3:]
+        q = pose.find(q, given(0.0))
+        flies = path.times[0] < time < path.times[1]
+        slope = (given(RATE_STEP) - given(-RATE_STEP)) / (2.0 * RATE_STEP) if flies else None
+        if slope is None:  # on the ground nothing moves but the centre of mass
+            slope = np.zeros(len(given(0.0)))
+            slope[:3] = rate[:3]
+        positions.append(q)
+        velocities.append(pose.rates(q, rate[3:], given(0.0), slope))
+    return np.array(positions), np.array(velocities)
+
+
+def _turned(heading: float) -> Array:
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def rigid_body_problem(
@@ -47,7 +198,7 @@ def rigid_body_problem(
     )
     pieces = load_functions(functions, model, compiled=compiled, progress=progress)
     stances = stances_of(task, robot, finder)
-    body = lump(model, stances[0])
+    body = composite_inertia(model, stances[0])
     builder = RigidBodyProblemBuilder(task, model, pieces, body, stances[0], stances[-1])
     return builder.build(), body
 

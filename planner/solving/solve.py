@@ -1,47 +1,170 @@
-"""Plans a task."""
+"""Plans a task.
+
+Hard jumps are solved by way of easier ones, with stronger motors first and then weaker ones step by step. For a somersault a solver that starts from a rough guess rarely finds a motion within tight motor limits. With
+limits that are higher by 40 % or more it does. That motion is then a good initial guess for limits a little lower, and so on
+down to the real ones. All other constraints hold at every step.
+
+A plan that failed the validity check because its intervals are too long is solved again on finer ones. The planner's equations on the ground are of second order: errors of limits between knots and of torques at an
+interval's ends fall to a fourth where intervals are halved. A plan that failed for a reason that a finer grid
+cannot remove (a body in the way of a step, a task that is missed) is not solved again.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
 from ..models.coordinates import Coordinates
-from ..models.robot_model import model_of, symmetric_model_of
-from ..models.stance import Stance, stances_of
+from ..models.robot_model import Stance, model_of, stances_of, symmetric_model_of
 from ..models.symbolic_model import SymbolicModel
-from ..problem.contact_rows import is_mirrored
 from ..problem.guess import USUAL_TIMES, ballistic_guess, displaced_guess
 from ..problem.layout import Stretch, layout
 from ..problem.problem import Problem, ProblemBuilder
 from ..problem.stage_functions import PIECES, make_coordinates
-from ..problem.unpacking import can_start, knot_times, pack, unpack
-from ..task.errors import PlanError, TaskError
-from ..task.plan import JumpPlan
+from ..problem.structure import is_mirrored
+from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
+from ..task.files import PlanError, TaskError
+from ..task.plan import ARRAYS, JumpPlan
 from ..task.recipe import choices
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, Knots
-from .bounded import cpu_time
-from .compilation import Progress, load_pieces
-from .easing import EASES, eased, from_eased, tighten, with_impacts
-from .options import SolveOptions
-from .outcome import failure, versions
+from .compilation import Progress, SolveOptions, load_pieces
+from .outcome import failure, for_all_joints, for_moving_joints, versions
 from .paper_plan import solve_paper
-from .refinement import asks_for_finer, finer_knots, with_knots
 from .rigid_body_plan import solve_rigid_body
-from .solver import LIMIT, NEAR, Solution, solve, structure_of
-from .whole_robot import for_all_joints, for_moving_joints
+from .solver import LIMIT, NEAR, Solution, solve
+from .solver_process import cpu_time
+
+EASES = (1.4, 2.0)
+"""Times the real motor limits that a first motion is looked for with."""
+FIRST_STEP, LAST_STEP = 0.1, 0.02
+"""By how much the limits come down at a time; halved where the solver does not follow."""
+COLD_LIMIT, WARM_LIMIT = 250, 100
+"""Iterations."""
+
+
+def eased(problem: Problem, ease: float) -> Problem:
+    """The problem with motor limits ``ease`` times as high."""
+    motors = np.array([family.startswith("motor") for family in problem.families])
+    scale = np.where(motors, ease, 1.0)
+    return replace(
+        problem, row_lower=problem.row_lower * scale, row_upper=problem.row_upper * scale
+    )
+
+
+def tighten(problem: Problem, values: Array, ease: float) -> Solution | None:
+    """A solution of the problem, from one of the problem eased so much; ``None`` if none is
+    reached."""
+    step, found = FIRST_STEP, None
+    iterations, cpu = 0, 0.0
+    while ease > 1.0 or found is None:
+        to = max(1.0, ease - step)
+        trial = solve(eased(problem, to), values, warm=True, solver="fatrop", limit=WARM_LIMIT)
+        iterations, cpu = iterations + trial.iterations, cpu + trial.cpu
+        if trial.solved:
+            values, ease, found = trial.values, to, trial
+            continue
+        step /= 2.0
+        if step < LAST_STEP:
+            return None
+    return replace(found, iterations=iterations, cpu=cpu)
+
+
+def from_eased(problem: Problem, guess: Array) -> Solution | None:
+    """A solution of the problem from a rough guess, by way of eased ones."""
+    for ease in EASES:
+        first = solve(eased(problem, ease), guess, solver="fatrop", limit=COLD_LIMIT)
+        if first.solved:
+            found = tighten(problem, first.values, ease)
+            if found is not None:
+                return replace(found, iterations=found.iterations + first.iterations)
+    return None
+
+
+def with_impacts(plan: JumpPlan) -> JumpPlan:
+    """A plan whose feet arrive at rest with an impact of no impulse after every flight."""
+    flying = np.append(plan.phase[:-1] == 3, False)
+    touchdowns = np.flatnonzero(flying[:-1] & ~flying[1:]) + 1
+    arrays = {
+        name: np.insert(getattr(plan, name), touchdowns, getattr(plan, name)[touchdowns], axis=0)
+        for name in ARRAYS
+    }
+    arrays["contact_force"][touchdowns + np.arange(len(touchdowns))] = 0.0
+    return replace(plan, **arrays)
+
+
+FACTOR = 1.5
+"""How many times as many intervals a plan is solved on again."""
+ROUNDS = 2
+"""How often at most."""
+CURABLE = frozenset(
+    {
+        "position_defect", "rotation_defect", "velocity_defect", "angular_velocity_defect",
+        "flight_position", "flight_rotation", "rise", "joint_torque", "joint_limits",
+        "motor_torque", "motor_speed", "effort", "touchdown_speed", "foot_slip", "foot_on_ground",
+        "foot_below_ground", "foot_clearance", "body_on_ground", "leg_clearance",
+    }
+)  # fmt: skip
+"""Tests whose figures depend on the length of the intervals."""
+CURABLE_EXCESS = 8.0
+"""A figure further than this many times its limit is no error of the grid."""
+
+
+def curable(plan: JumpPlan) -> bool:
+    """Whether a plan with its report failed by what finer intervals may cure."""
+    failed = [test for test in plan.report.get("tests", []) if not test["passed"]]
+    return bool(failed) and all(
+        test["name"] in CURABLE and test["value"] <= CURABLE_EXCESS * max(test["limit"], 1e-3)
+        for test in failed
+    )
+
+
+def finer_knots(plan: JumpPlan) -> Knots:
+    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
+    with the most counts."""
+    count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
+    for phase, start, stop in segments(plan.phase[:-1].tolist()):
+        name = Phase(phase).name.lower()
+        count[name] = max(count.get(name, 0), stop - start)
+    return Knots.model_validate(
+        {name: math.ceil(FACTOR * count[name]) for name in Knots.model_fields}
+    )
+
+
+def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
+    """The task on those numbers of intervals; phases that name their own change in proportion."""
+    changed: dict[str, object] = {"knots": knots}
+    if task.phases is not None and knots != task.knots:
+        more = knots.total / task.knots.total
+        changed["phases"] = tuple(
+            span if span.knots is None
+            else span.model_copy(update={"knots": math.ceil(more * span.knots)})
+            for span in task.phases
+        )  # fmt: skip
+    return task.model_copy(update=changed)
+
+
+def asks_for_finer(task: JumpTask, plan: JumpPlan | None) -> bool:
+    """Whether a plan to start from is a failed one of that very task."""
+    return (
+        plan is not None
+        and bool(plan.report)
+        and not plan.valid
+        and plan.task.content() == task.content()
+    )
+
 
 QUICK = 60
 """Iterations of a quick solve."""
 QUICK_NEAR = 40
 """Iterations of a quick solve from a plan with all coordinates; those that come to an end take 20 to 30."""
-KNOWN_LIMIT = 25
-"""Iterations from a plan and its multipliers; those that come to an end take 3 to 15."""
 LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
@@ -104,11 +227,9 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         near, most = pack(problem, warm_start, guess), LIMIT
         if options.quick:
             most = QUICK_NEAR if problem.coordinates.name == "full" else QUICK
-        solution = _from_multipliers(problem, near, warm_start)
-        if solution is None or not solution.solved:
-            solution = solve(
-                problem, near, warm=True, barrier=_barrier(problem), solver="fatrop", limit=most
-            )
+        solution = solve(
+            problem, near, warm=True, barrier=_barrier(problem), solver="fatrop", limit=most
+        )
         if options.quick and not solution.solved and problem.coordinates.name == "full":
             # The jump straight ahead is farther than the plan, and takes as long again.
             raise failure(task, solution)
@@ -147,9 +268,8 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         "compiled": not problem.assembly.interpreted,
     }
     return JumpPlan(
-        task=task, statistics=statistics, versions=versions(), multipliers=solution.multipliers,
-        **unpack(problem, solution.values),
-    )  # fmt: skip
+        task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
+    )
 
 
 FORMULATIONS: Mapping[str, Formulation] = {
@@ -258,15 +378,6 @@ def straight_ahead(task: JumpTask) -> JumpTask:
     ahead = {"distance_y": 0.0, "twist": 0.0}
     jumps = task.jumps and tuple(hop.model_copy(update=ahead) for hop in task.jumps)
     return task.model_copy(update={**ahead, "jumps": jumps})
-
-
-def _from_multipliers(problem: Problem, near: Array, plan: JumpPlan) -> Solution | None:
-    """A solution from a plan's variables and multipliers; ``None`` where these are not known, or mean
-    something else."""
-    known = plan.multipliers
-    if known is None or known.structure != structure_of(problem):
-        return None
-    return solve(problem, near, solver="fatrop", limit=KNOWN_LIMIT, multipliers=known)
 
 
 def _barrier(problem: Problem) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -13,10 +12,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly
-from ..task.multipliers import Multipliers
-from .bounded import cpu_time
-from .given_multipliers import use_given_multipliers
-from .solver_process import MULTIPLIERS, call_bounded, call_solver, quiet
+from .solver_process import call_bounded, call_solver, cpu_time, quiet
 
 VIOLATION = 1e-6
 """What a solution may violate a constraint by, in the constraint's unit."""
@@ -28,10 +24,10 @@ finds it often where it does not."""
 PATIENCE = 3e-5
 """s of processor time for each iteration and state of the problem, about three times what one takes:
 a solver that restores feasibility without counting, or looks for a step for ever, is given up."""
-FAR, NEAR, KNOWN = 10.0, 1e-4, 1e-5
-"""The barrier's parameter to begin with, far from a solution, near one, and near one with its multipliers."""
-PUSH, KNOWN_PUSH = 1e-6, 1e-4
-"""How far a start near a solution is moved away from bounds, without and with its multipliers."""
+FAR, NEAR = 10.0, 1e-4
+"""The barrier's parameter to begin with, far from a solution and near one."""
+PUSH = 1e-6
+"""How far a start near a solution is moved away from bounds."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
 
@@ -88,7 +84,6 @@ class Solution:
     family: str
     solved: bool
     cpu: float
-    multipliers: Multipliers | None = None
 
 
 def solve(
@@ -101,15 +96,13 @@ def solve(
     limit: int = LIMIT,
     last: int = LIMIT,
     other_guess: Callable[[], Array | None] = lambda: None,
-    multipliers: Multipliers | None = None,
 ) -> Solution:
     """The first solution found, or the least violated attempt: fatrop from the other guess, which is
     nearer, fatrop from the guess, IPOPT from the guess.
 
     ``warm`` says that the guess is near the solution, and ``barrier`` is the parameter of the logarithmic
     barrier to begin with near it; ``solver`` insists on one of them. ``limit`` is how many iterations each attempt
-    may take, and ``last`` how many IPOPT may take where it is not insisted on. ``multipliers`` are those of
-    a near solution of the same structure, with which fatrop begins.
+    may take, and ``last`` how many IPOPT may take where it is not insisted on.
     """
     tries = [solver] if solver else ["other", "fatrop", "ipopt"]
     best: Solution | None = None
@@ -120,9 +113,9 @@ def solve(
         start = nearer if other else guess
         if start is None or (name == "fatrop" and nearer is not None):
             continue  # what fatrop does not find from near it does not find from afar
-        begin = KNOWN if multipliers else barrier if warm or other else FAR
+        begin = barrier if warm or other else FAR
         most = min(limit, last) if name == "ipopt" and not solver else limit
-        found = _run(problem, start, "fatrop" if other else name, begin, most, multipliers)
+        found = _run(problem, start, "fatrop" if other else name, begin, most)
         if best is None or found.solved or found.violation < best.violation:
             best = found
         if best.solved:
@@ -131,22 +124,7 @@ def solve(
     return best
 
 
-def structure_of(problem: Problem) -> str:
-    """The same for problems whose multipliers mean the same: what every row asks for, and which rows and
-    variables have bounds and which are given."""
-    assembly, digest = problem.assembly, hashlib.blake2b(digest_size=16)
-    digest.update(repr((assembly.nx, assembly.nu, assembly.ng)).encode())
-    digest.update("\n".join(problem.families).encode())
-    for low, high in ((problem.row_lower, problem.row_upper), (problem.lower, problem.upper)):
-        for kind in (low == high, np.isfinite(low), np.isfinite(high)):
-            digest.update(np.packbits(kind).tobytes())
-    return digest.hexdigest()
-
-
-def _run(
-    problem: Problem, guess: Array, name: str, barrier: float, limit: int,
-    multipliers: Multipliers | None,
-) -> Solution:  # fmt: skip
+def _run(problem: Problem, guess: Array, name: str, barrier: float, limit: int) -> Solution:
     started = cpu_time()
     function, evaluate, constraint = _solver(problem.assembly, name, barrier, limit)
 
@@ -156,7 +134,6 @@ def _run(
     }  # fmt: skip
     # In a copy of a process: a fatrop that has failed once would fail at easy problems later.
     if name == "fatrop":
-        arguments[MULTIPLIERS] = np.empty(0) if multipliers is None else multipliers.values
         ended, answer = call_bounded(function, arguments, patience(problem, limit))
         if not ended or answer is None:
             spent = cpu_time() - started
@@ -172,13 +149,7 @@ def _run(
     return Solution(
         values, name, int(stats["iter_count"]), cost, violation, family, solved,
         cpu_time() - started,
-        _ended_with(problem, stats) if solved else None,
     )  # fmt: skip
-
-
-def _ended_with(problem: Problem, stats: Mapping[str, Any]) -> Multipliers | None:
-    values = stats.get(MULTIPLIERS)
-    return None if values is None else Multipliers(values, structure_of(problem))
 
 
 def patience(problem: Problem, limit: int) -> int:
@@ -224,12 +195,10 @@ def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> t
                               "max_iter": limit, "print_level": 0}  # fmt: skip
     options: dict[str, Any] = {"print_time": False, "calc_lam_p": False, "error_on_fail": False}
     if name == "fatrop":
-        use_given_multipliers()
         # Its own tolerance takes the short intervals' small coefficients for a lack of rank.
         own |= {"linsol_lu_fact_tol": 1e-7, "mu_init": barrier}
         if barrier < FAR:
-            push = KNOWN_PUSH if barrier == KNOWN else PUSH
-            own |= {"bound_push": push, "bound_frac": push}
+            own |= {"bound_push": PUSH, "bound_frac": PUSH}
         given = ("nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l", "nlp_grad")
         options |= {
             "structure_detection": "manual", "nx": assembly.nx, "nu": assembly.nu,

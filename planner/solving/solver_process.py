@@ -1,4 +1,4 @@
-"""A process beside a program with several threads, in which solvers are called with a limit of time.
+"""Calls solvers with a limit of time, because they may loop for ever inside a library.
 
 ``bounded`` copies the process that calls it, which is quick, and safe while that has one thread. A
 copy of a process with several may find a lock that another thread held, and wait for it for ever.
@@ -17,8 +17,9 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -26,13 +27,72 @@ from typing import IO, Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from .bounded import bounded, count, cpu_time
-from .given_multipliers import give, take, use_given_multipliers
+
+
+def cpu_time() -> float:
+    """Processor time [s] of this process, of those it has waited for, and what others counted."""
+    if not hasattr(os, "fork"):
+        return time.process_time()
+    import resource
+
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime + _elsewhere
+
+
+_elsewhere = 0.0
+
+
+def count(seconds: float) -> None:
+    """Count processor time that another process has spent for this one."""
+    global _elsewhere
+    _elsewhere += seconds
+
+
+def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:
+    """Whether ``function`` came to its end within ``limit`` seconds of processor time, and what it
+    returned, which has to be picklable.
+
+    It is called in a copy of this process, so it changes nothing here. Where processes cannot be
+    copied it is called here, without a limit.
+
+    Raises:
+        RuntimeError: the function raised; the text is its error's.
+    """
+    if not hasattr(os, "fork"):
+        return True, function()
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        _answer(function, limit, writing)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        data = pipe.read()
+    os.waitpid(child, 0)
+    if not data:
+        return False, None
+    raised, value = pickle.loads(data)
+    if raised:
+        raise RuntimeError(value)
+    return True, value
+
+
+def _answer(function: Callable[[], Any], limit: int, writing: int) -> None:
+    """In the copy: do it, write the answer, and end without anything else."""
+    import resource
+
+    # What this process has used so far does not count, and was not passed on.
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    try:
+        data = pickle.dumps((False, function()))
+    except BaseException as error:  # noqa: BLE001 - a copy of the process ends here
+        data = pickle.dumps((True, f"{type(error).__name__}: {error}"))
+    with os.fdopen(writing, "wb") as pipe:
+        pipe.write(data)
+    os._exit(0)
+
 
 Answer = tuple[Array, dict[str, Any]]
-
-MULTIPLIERS = "multipliers"
-"""The name, among a solver's arguments and answers, of what is no argument of CasADi's."""
 
 KEPT = 12
 """Solvers that the process keeps; a further one is sent again when it is needed again."""
@@ -53,21 +113,11 @@ def has_one_thread() -> bool:
 
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
-    """Call a solver of CasADi. Returns the variables, and what it says of its success.
-
-    fatrop's ``arguments`` have ``multipliers`` besides, see ``given_multipliers``, an empty array for
-    none, and what comes back then has those with which it ended.
-    """
-    own = {name: value for name, value in arguments.items() if name != MULTIPLIERS}
-    given = arguments.get(MULTIPLIERS)
-    if given is not None:
-        give(given)
+    """Call a solver of CasADi. Returns the variables, and what it says of its success."""
     with quiet():
-        result = function(**own)
+        result = function(**arguments)
     stats = function.stats()
     found = {key: stats.get(key) for key in ("success", "iter_count", "unified_return_status")}
-    if given is not None:
-        found[MULTIPLIERS] = take()
     return np.array(result["x"]).ravel(), found
 
 
@@ -173,7 +223,6 @@ def serve() -> None:
     """What the process does: answers calls until its input ends."""
     import casadi as ca
 
-    use_given_multipliers()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the one that asks
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
     answers: IO[bytes] = os.fdopen(os.dup(1), "wb")

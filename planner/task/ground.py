@@ -11,7 +11,7 @@ import numpy as np
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import contact_centres, link_poses_in_base
-from .errors import TaskError
+from .files import TaskError
 from .sequence import SHORTEST_JUMP_OVER_AN_EDGE, Hop, Place, edge_of
 from .task import JumpTask
 

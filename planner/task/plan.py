@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
-from .multipliers import Multipliers
+from .files import write_whole
 from .task import JumpTask, TaskError, make_task
-from .whole_file import write_whole
 
 FILE_FORMAT = "aloft jump plan 1"
 
@@ -63,7 +62,6 @@ class JumpPlan:
         statistics: how it was solved: solver, iterations, cpu_s, violation, cost and the like.
         versions: of the packages that made it.
         report: the validity report as plain data; empty until the plan is checked.
-        multipliers: with which the solver ended; not in the plan's file, see ``multipliers``.
     """
 
     task: JumpTask
@@ -84,7 +82,6 @@ class JumpPlan:
     statistics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     report: Mapping[str, Any] = field(default_factory=dict)
-    multipliers: Multipliers | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         knots = len(self.time)
@@ -150,8 +147,7 @@ ARRAYS = {
 }
 """The arrays of a plan with their units, as they stand in the file."""
 
-_ELSEWHERE = ("task", "multipliers")
-_SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in (*ARRAYS, *_ELSEWHERE))
+_SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in (*ARRAYS, "task"))
 
 
 def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> bytes:

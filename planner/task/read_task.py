@@ -1,14 +1,24 @@
-"""Reads a task from its YAML file, and reports all of its mistakes at once."""
+"""Reads a task from its YAML file, applies changes to it, and reports all of its mistakes at once.
+
+Contradictions within a task, and between a task and its robot, are found without solving anything. The checks are bounds that no jump can exceed. A task that passes them may still have no plan.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
-from ...robots.description import find_robot
-from .errors import TaskError
-from .placed_file import read_placed
+import numpy as np
+
+from ...mathematics.constants import GRAVITY
+from ...robots.description import RobotDescription, find_robot
+from ...robots.kinematics import link_poses
+from .files import TaskError, read_placed
+from .margins import unknown_joints
+from .sequence import Hop, Place, edge_of
 from .task import JumpTask, make_task
-from .task_checks import contradictions
 
 
 def read_task(path: str | Path) -> JumpTask:
@@ -31,3 +41,187 @@ def read_task(path: str | Path) -> JumpTask:
             "\n".join(f"{source.place(key.split('.'))}: {key}: {text}" for key, text in wrong)
         )
     return task
+
+
+INSTEAD = ("rise", "take_off_speed")
+"""Two ways to say one thing: a change of one of them takes the place of the other."""
+
+
+def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
+    """The task in a file with some of its parameters changed, also single ones inside ``margins``,
+    ``weights`` and ``knots``.
+
+    Raises:
+        TaskError: the file cannot be read as a task, or a change is wrong, or they contradict each
+            other; lines about a change begin with ``task: key:``.
+    """
+    read_task(path)  # what is wrong in the file itself is said with its line
+    values = dict(read_placed(path, "rise: 15 cm").values)
+    for name in INSTEAD:
+        if any(changes.get(other) is not None for other in INSTEAD if other != name):
+            values.pop(name, None)
+    task = make_task({**_merged(values, changes), "name": changes.get("name", "")})
+    wrong = contradictions(task, find_robot(task.robot, path.parent))
+    if wrong:
+        raise TaskError("\n".join(f"task: {key}: {text}" for key, text in wrong))
+    return spoken_name(task)
+
+
+def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    found = dict(old)
+    for key, value in new.items():
+        inner = found.get(key)
+        if isinstance(inner, Mapping) and isinstance(value, Mapping):
+            found[key] = _merged(inner, value)
+        else:
+            found[key] = value
+    return found
+
+
+def spoken_name(task: JumpTask) -> JumpTask:
+    """The task, called by what it asks for if it has no name: ``12 cm high, 20 cm ahead``."""
+    return task if task.name else task.model_copy(update={"name": describe_task(task)})
+
+
+def describe_task(task: JumpTask) -> str:
+    """What a task asks for, in a few words."""
+    if task.jumps or task.repeat:
+        return f"{len(task.hops())} jumps"
+    told = []
+    if task.rise is not None:
+        told.append(f"{_cm(task.rise)} high")
+    if task.take_off_speed is not None:
+        told.append(f"{task.take_off_speed:g} m per s up")
+    pairs = (
+        (task.distance_x, "ahead", "back"),
+        (task.distance_y, "to the left", "to the right"),
+        (task.landing_height, "up", "down"),
+    )
+    told += [f"{_cm(abs(value))} {plus if value > 0 else minus}" for value, plus, minus in pairs
+             if value]  # fmt: skip
+    for angle, what in ((task.twist, "turned"), (task.rotation, "over")):
+        if angle:
+            told.append(f"{what} {math.degrees(angle):.4g} deg")
+    return ", ".join(told) or "jump"
+
+
+def _cm(length: float) -> str:
+    return f"{100.0 * length:.4g} cm"
+
+
+LENIENCE = 0.03
+"""What the centre of mass may move within the body [m], beyond what the legs' length allows."""
+
+Contradiction = tuple[str, str]
+"""The parameter to look at first, and what is wrong."""
+
+
+def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradiction]:
+    """Everything about the task that cannot be, in the order of its parameters."""
+    return [*_unknown_names(task, robot), *_flight(task, robot), *_edge(task, robot)]
+
+
+def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
+    """Refuse a task that contradicts itself or its robot.
+
+    Raises:
+        TaskError: one line for every contradiction.
+    """
+    found = contradictions(task, robot)
+    if found:
+        raise TaskError("\n".join(f"{task.name}: {key}: {text}" for key, text in found))
+
+
+def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
+    from ...runtime.loading.problems import nearest
+
+    if task.profile and task.profile not in robot.profiles:
+        there = ", ".join(robot.profiles)
+        yield "profile", f"{robot.name} has no actuator profile {task.profile!r}; there is {there}"
+    joints = dict(zip((j.name for j in robot.joints), robot.joint_limits.tolist(), strict=True))
+    for key, given in (("initial", task.initial), ("final", task.final)):
+        for name, angle in given.items():
+            if name not in joints:
+                near = ", ".join(nearest(name, joints) or joints)
+                yield f"{key}.{name}", f"{robot.name} has no joint {name}; the nearest is {near}"
+            elif not joints[name][0] <= angle <= joints[name][1]:
+                low, high = joints[name]
+                yield (
+                    f"{key}.{name}",
+                    f"{angle:.4g} rad is outside the joint's limits, {low:.4g} to {high:.4g} rad",
+                )
+    if task.margins is not None:
+        for name in unknown_joints(task.margins, list(joints)):
+            short = sorted({joint.partition("_")[2] for joint in joints} | set(joints))
+            near = ", ".join(nearest(name, short) or short)
+            yield (
+                f"margins.landing_limits.{name}",
+                f"{robot.name} has no joint {name}; the nearest is {near}",
+            )
+
+
+def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, Place, Place]]:
+    """Every jump that is written down, with its path in the task and where it begins and ends."""
+    places = task.places()
+    for number, hop in enumerate(task.hops()[: len(task.jumps or "1")]):
+        path = f"jumps.{number}." if task.jumps else ""
+        yield path, hop, places[number], places[number + 1]
+
+
+def _flight(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
+    """Height and time of a flight follow from one another, but for where the legs let the centre
+    of mass be at lift-off and touchdown."""
+    low, high = leg_travel(robot)
+    for path, hop, _, _ in _jumps(task):
+        asked, up = hop.flight_time, hop.landing_height or 0.0
+        if asked is not None and hop.rise is not None:
+            # Each half of the flight is a fall to or from the apex.
+            times = [
+                _fall(hop.rise - level) + _fall(hop.rise - up - level) for level in (low, high)
+            ]
+            what = f"a rise of {hop.rise:g} m"
+        elif asked is not None and hop.take_off_speed is not None:
+            speed = hop.take_off_speed
+            most = speed**2 / (2.0 * GRAVITY) - up
+            times = [speed / GRAVITY + _fall(most + way) for way in (low - high, high - low)]
+            what = f"a take_off_speed of {speed:g} m/s"
+        else:
+            continue
+        if not min(times) <= asked <= max(times):
+            yield (
+                f"{path}flight_time",
+                f"{what} takes {min(times):.3f} to {max(times):.3f} s in the air, not {asked:g} s; "
+                + "leave flight_time to the planner, or ask for another height",
+            )
+
+
+def _fall(height: float) -> float:
+    """How long a fall takes [s]; none from below the ground."""
+    return math.sqrt(2.0 * max(0.0, height) / GRAVITY)
+
+
+def leg_travel(robot: RobotDescription) -> tuple[float, float]:
+    """The least and the greatest height of the centre of mass on the ground, above standing [m]."""
+    poses = link_poses(
+        robot, np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)),
+        np.array([robot.standing_position, np.zeros(len(robot.joints))]),
+    )  # fmt: skip
+    standing, straight = np.min([poses.of(foot.link)[0][:, 2] for foot in robot.feet], axis=0)
+    return 0.8 * float(standing), float(standing - straight) + LENIENCE
+
+
+def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
+    """A step's edge is under no foot."""
+    reach = [contact.position[0] for contact in robot.contacts]
+    for path, hop, start, end in _jumps(task):
+        edge = edge_of(hop, start)
+        for where, place in (("start", start), ("landing", end)) if edge is not None else ():
+            ends = [place.x + math.cos(place.heading) * x for x in (min(reach), max(reach))]
+            back, front = min(ends), max(ends)
+            if edge is not None and back < edge < front:
+                yield (
+                    f"{path}step_edge",
+                    f"the step's edge at x = {edge:g} m is under the feet at the {where}, which "
+                    + f"reach from {back:.3f} to {front:.3f} m; give a step_edge between start and "
+                    + "landing, or jump farther",
+                )

@@ -33,8 +33,7 @@ from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
-from .robot_parts import knee_limits, least_distance_to_limits, word_of_toes
-from .scaling import rounded, size_of
+from .scaling import knee_limits, least_distance_to_limits, rounded, size_of, toe_name_token
 from .sequence import Hop, Span
 
 EFFORT, MOST_EFFORT = 0.85, 0.92
@@ -172,7 +171,7 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
     contact = _contact_time(task, slow)
     if rows and "contact_time" not in said:
         yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
-    toes = word_of_toes(robot)
+    toes = toe_name_token(robot)
     if toes and task.thrust_time is not None and not (rows and contact is None):
         whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
         late = min(rounded(TOES * slow), 0.5 * whole)
@@ -317,7 +316,7 @@ def toes_speed(task: Asked, robot: RobotDescription) -> float | None:
     fall = drop + _rise(hop) / size.height
     bare = "margins" in task.model_fields_set and task.margins is None
     other = bare or len(task.hops()) > 1 or hop.distance_y or hop.twist
-    if other or not word_of_toes(robot) or fall <= FALL or drop < DROP:
+    if other or not toe_name_token(robot) or fall <= FALL or drop < DROP:
         return None
     return next((rounded(speed * size.slow) for most, speed in TOES_SPEEDS if fall <= most), None)
 

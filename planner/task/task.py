@@ -17,13 +17,11 @@ from pydantic import ValidationError, model_validator
 
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
-from .errors import TaskError
+from .files import PlacedFile, TaskError
 from .margins import Margins
-from .placed_file import PlacedFile
 from .recipe import choices, chosen_fields
-from .rough_ground import RoughGround
 from .scaling import scaled_defaults
-from .sequence import FreeTimes, Hop, Place, Span, check_spans, places_of
+from .sequence import FreeTimes, Hop, Place, RoughGround, Span, check_spans, places_of
 
 __all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task"]
 

@@ -126,7 +126,7 @@ class Chain:
         self._attending = self.blocks[place]
         self._attending.on_event()
         self._attending = None
-        if self._now is not None and place < len(self.blocks) - 1:
+        if self._now is not None and self._cursor[0] and place < len(self.blocks) - 1:
             address = int(self._cursor[0]) + 8 * (self._first_stamp + place)
             ctypes.c_int64.from_address(address).value = self._now()
 

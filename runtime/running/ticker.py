@@ -118,7 +118,8 @@ class Ticker:
         for owner, update in updates:
             calls.append(update)
             owners.append(owner)
-        return Program(calls, owners, self._now if self._timing else None)
+        sampled = self.pacer is None and any(isinstance(owner, Chain) for owner in owners)
+        return Program(calls, owners, self._now if self._timing else None, sampled=sampled)
 
     def _in_chains(
         self, active: Sequence[str], which: Calls = "kernel_calls"
@@ -169,7 +170,7 @@ class Ticker:
                     if clock.stop_reason is not None:
                         break
                 program = table[tick % length]
-                if timing:
+                if timing and (not program.sampled or program.times_this_run()):
                     clock.began = now()
                     row = [clock.began]
                     for call in program.calls:

@@ -1,5 +1,5 @@
 """Measures the time that each block takes: time stamps go into buffers made beforehand, and are
-folded into statistics every ``STAMPED_TICKS`` ticks.
+folded into statistics every ``STAMPED_TICKS`` timed ticks.
 
 The executor takes one stamp before the first call of a tick and one after each call, so the time of
 a call is the difference of two neighbouring stamps. A chain of blocks takes one more after each of
@@ -22,6 +22,12 @@ STAMPED_TICKS = 128
 """Ticks that are stamped before they are folded; folding takes tens of microseconds."""
 KEPT_TICKS = 2048
 """The number of last ticks of each phase from which the percentiles are computed."""
+
+
+FIRST_TIMED = 1024
+TIMED_EVERY = 32
+"""Where no deadline is watched, the first runs of a phase with chains are all timed, and then every so
+many: reading the clock takes several times as long as a small block."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,7 @@ class Program:
 
     Args:
         now: the clock, which chains need where times are taken.
+        sampled: whether only some runs are timed; see ``TIMED_EVERY``.
     """
 
     def __init__(
@@ -56,7 +63,13 @@ class Program:
         calls: Sequence[Callable[[], Any]],
         owners: Sequence[str | Chain],
         now: Callable[[], int] | None = None,
+        *,
+        sampled: bool = False,
     ) -> None:
+        self.sampled = sampled
+        self.untimed = 0
+        """Runs that were not timed."""
+        self._runs = 0
         self.calls = tuple(calls)
         starts, ends, names = _columns(owners)
         self.owners = tuple(names)
@@ -90,6 +103,14 @@ class Program:
                 self._again.append((met[owner], column))
             met.setdefault(owner, column)
         self.columns = {owner: column for owner, column in met.items() if owner}
+
+    def times_this_run(self) -> bool:
+        """Whether the run that begins now is timed; if it is not, its chains read no clock."""
+        self._runs += 1
+        timed = self._runs <= FIRST_TIMED or self._runs % TIMED_EVERY == 0
+        self._place_value[0] = self._base + self._cursor if timed else 0
+        self.untimed += not timed
+        return timed
 
     def keep(self, stamps: Sequence[int]) -> None:
         """Keep the stamps [ns] of one tick: one before the first call and one after each call."""
@@ -140,10 +161,14 @@ class Program:
         return next((o for o, end in zip(self.owners, ends, strict=True) if end > instant), "")
 
     def times(self, block: str) -> tuple[int, int, int, NDArray[np.int64]]:
-        """A block's times in this phase: runs, total and longest [ns], and the kept times [ns]."""
+        """A block's times in this phase: runs, total and longest [ns], and the kept times [ns].
+
+        The total of all runs follows from those that were timed.
+        """
         column = self.columns[block]
         kept = self._kept[: min(self.ticks, KEPT_TICKS), column]
-        return self.ticks, int(self._total[column]), int(self._maximum[column]), kept
+        runs, total = self.ticks + self.untimed, int(self._total[column])
+        return runs, total * runs // self.ticks, int(self._maximum[column]), kept
 
 
 def _columns(owners: Sequence[str | Chain]) -> tuple[list[int], list[int], list[str]]:

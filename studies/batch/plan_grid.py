@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 
 from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.task.placed_file import Key, PlacedFile, read_placed
+from ...planner.task.files import Key, PlacedFile, read_placed, remove_abandoned, write_whole
 from ...planner.task.plan import JumpPlan, PlanFileError
 from ...planner.task.task import JumpTask, TaskError, make_task
-from ...planner.task.whole_file import remove_abandoned, write_whole
 from ...robots.description import RobotDescription, find_robot
 from ...runtime.language.errors import AloftError
 from .jobs import job_results

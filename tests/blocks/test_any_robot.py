@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.control.joint_gains import default_gains
-from aloft.blocks.control.joint_pd import JointPD
+from aloft.blocks.control.joint_pd import JointPD, default_gains
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.estimation.complementary_filter import ComplementaryFilter
 from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter

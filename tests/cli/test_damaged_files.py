@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.planner.library.shipped import shipped_folder
+from aloft.planner.library.library import shipped_folder
 
 from .conftest import outcome
 

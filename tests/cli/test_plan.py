@@ -14,7 +14,7 @@ import pytest
 from aloft.planner.library import nearest_feasible
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.nearest_feasible import Axis
-from aloft.planner.task.errors import PlanError
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task

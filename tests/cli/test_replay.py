@@ -24,10 +24,10 @@ blocks:
 """
 GAINS = """
 import math
-from aloft.blocks.general import gain
+from aloft.blocks.general import arithmetic
 
 
-class Gain(gain.Gain):
+class Gain(arithmetic.Gain):
     '''A gain.'''
 
 

@@ -55,7 +55,7 @@ def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert [link["joint"] for link in about["links"]] == ["", "slider", "hinge"]
     assert about["links"][1]["limits"] == [-1.0, 1.0] and about["links"][2]["limits"] is None
     assert about["motors"][0]["peak_torque"] == 10.0 and about["feet"] == []
-    assert about["sensors"] == {"encoders": 2, "imu": False, "switches": 0}
+    assert about["sensors"] == {"encoders": 2, "imu": False, "switches": 0, "mounted": {}}
     assert about["missing"] == [
         "no speed limit of slider: 20 rad/s is assumed",
         "rotor inertia is zero; write rotor_inertia under profiles",

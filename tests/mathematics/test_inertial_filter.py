@@ -89,7 +89,7 @@ def test_right_up_converges_to_upright_and_keeps_the_heading():
     before = rotations.yaw(q)
     force = turned_back(quaternion_of((0, 0, 0.5)), [0.0, 0.0, 9.81])
     for _ in range(2000):
-        inertial.right_up(q, force, 0.01, np.empty(3))
+        inertial.correct_tilt_from_gravity(q, force, 0.01, np.empty(3))
     assert rotations.tilt(q) < 1e-6
     assert rotations.yaw(q) == pytest.approx(before, abs=0.03)
 

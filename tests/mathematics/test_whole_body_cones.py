@@ -7,16 +7,16 @@ from aloft.mathematics.active_set import (
     Program,
     active_set_memory,
     polish,
-    price_again,
+    recompute_multipliers,
     solve_program,
 )
 from aloft.mathematics.whole_body_cones import (
     PLANES,
     add_bending,
     add_curvature,
-    bend,
     cone_memory,
     cut,
+    multiplier_curvature,
     touch,
     turned,
     write_planes,
@@ -53,8 +53,8 @@ def project(forces, friction):
     for step in range(12):
         held = int(memory.is_active[:rows].sum())
         gradient = x - forces.ravel()
-        price_again(n, held, gradient, memory)
-        bend(count, held, first, cones, memory, x)
+        recompute_multipliers(n, held, gradient, memory)
+        multiplier_curvature(count, held, first, cones, memory, x)
         touch(count, friction, 1e-12, cones, x)
         write_planes(count, n, first, friction, cones, program)
         program.hessian[:] = np.eye(n)

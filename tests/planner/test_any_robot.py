@@ -12,7 +12,7 @@ from aloft.planner.models.coordinates import full_coordinates
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.quaternions import pose_of
 from aloft.planner.models.robot_model import model_of
-from aloft.planner.problem.contact_rows import ContactRows
+from aloft.planner.problem.structure import ContactRows
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.task import make_task

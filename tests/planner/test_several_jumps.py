@@ -12,8 +12,7 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.planner.checking.validity import check_plan
-from aloft.planner.drawing.picture import plan_picture
-from aloft.planner.drawing.plan_charts import phases_of
+from aloft.planner.drawing.picture import phases_of, plan_picture
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump, with_ground_times, with_times

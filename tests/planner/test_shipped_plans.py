@@ -9,7 +9,6 @@ from tests.robots.example_robots import INSTALLED
 
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.task.multipliers import read_multipliers
 from aloft.planner.task.plan import read_plan
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
@@ -58,14 +57,6 @@ def test_no_plan_is_there_without_its_task() -> None:
     wanted = {task.hash(find_robot(task.robot)) for task in tasks}
     stale = [p.name for p in SHIPPED.glob("*.npz") if p.stem.rpartition("-")[2] not in wanted]
     assert stale == [], f"plans of tasks that are no more; {REMEDY}"
-
-
-def test_multipliers_are_of_shipped_plans() -> None:
-    plans = {path.stem.rpartition("-")[2] for path in SHIPPED.glob("*.npz")}
-    files = sorted((SHIPPED / "multipliers").iterdir())
-    assert len(files) >= 30
-    assert [path.name for path in files if path.stem not in plans] == [], REMEDY
-    assert all(read_multipliers(path) is not None for path in files)
 
 
 def test_the_remedy_is_one_command_that_makes_them_all() -> None:

@@ -38,9 +38,9 @@ class PostureParameters(PostureGains):
 
 
 class PostureJoints(NamedTuple):
-    """The ``index`` (n,) of the joint of each row, and where it is ``held`` (n,) its ``angle`` (n,) [rad]."""
+    """The ``joint`` (n,) of each row, and where it is ``held`` (n,) its ``angle`` (n,) [rad]."""
 
-    index: Indices1D
+    joint: Indices1D
     held: Flags1D
     angle: Array1D
 
@@ -86,7 +86,7 @@ class Posture(FeedbackTask):
         )
         for row, joint in enumerate(chosen_joints(self.robot, params)):
             name = joints[joint].name
-            self.chosen.index[row] = joint
+            self.chosen.joint[row] = joint
             self.chosen.held[row], self.chosen.angle[row] = name in held, held.get(name, 0.0)
             for pattern, weight in patterns.items():
                 if fnmatchcase(name, pattern):
@@ -102,8 +102,8 @@ class Posture(FeedbackTask):
         e: TaskError,
     ) -> None:
         first = terms.velocity.shape[0] - joints.position.shape[0]
-        for row in range(chosen.index.shape[0]):
-            joint = chosen.index[row]
+        for row in range(chosen.joint.shape[0]):
+            joint = chosen.joint[row]
             angle, rate, feedforward = chosen.angle[row], 0.0, 0.0
             if not chosen.held[row]:
                 angle, rate = target.joint_position[joint], target.joint_velocity[joint]
@@ -117,8 +117,8 @@ class Posture(FeedbackTask):
     def jacobian(joints: JointState, chosen: PostureJoints, j: TaskJacobian) -> None:
         first = j.matrix.shape[1] - joints.position.shape[0]
         j.matrix[:, :] = 0.0
-        for row in range(chosen.index.shape[0]):
-            j.matrix[row, first + chosen.index[row]] = 1.0
+        for row in range(chosen.joint.shape[0]):
+            j.matrix[row, first + chosen.joint[row]] = 1.0
 
 
 def chosen_joints(robot: RobotDescription, params: PostureParameters) -> list[int]:

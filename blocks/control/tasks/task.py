@@ -135,7 +135,8 @@ class Task:
 
     def calls(self) -> Sequence[KernelCall | PythonCall]:
         """The calls that write the rows."""
-        return [call_of(self, _function(getattr(type(self), name))) for name in self.kernels]
+        functions = [_function(getattr(type(self), name)) for name in self.kernels]
+        return [call_of(self, function) for function in functions if function is not None]
 
 
 def _ports(cls: type[Task]) -> Mapping[str, Input[Any]]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 import pytest
 
 from aloft.benchmarks.frontier.search import DIRECTIONS, GOALS, Direction, furthest, outward
-from aloft.planner.task.task_checks import require_consistent
+from aloft.planner.task.read_task import require_consistent
 from aloft.robots.description import find_robot
 
 BY_NAME = {direction.name: direction for direction in DIRECTIONS}

@@ -4,7 +4,7 @@ import pytest
 
 from aloft.benchmarks.jumps import random_tasks as module
 from aloft.benchmarks.jumps.random_tasks import plan_one, random_rows, random_tasks
-from aloft.planner.task.errors import PlanError
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 

@@ -33,13 +33,13 @@ blocks:
 """
 PARTS = """
 from aloft import BlockError, parameter
-from aloft.blocks.general import gain
+from aloft.blocks.general import arithmetic
 
 
-class Fragile(gain.Gain):
+class Fragile(arithmetic.Gain):
     '''A gain that breaks at a tick.'''
 
-    class Params(gain.Gain.Params):
+    class Params(arithmetic.Gain.Params):
         breaks: int = parameter(-1, text="when")
 
     def step(self) -> None:
@@ -158,7 +158,7 @@ def test_another_kernel_of_blas_is_named(made: tuple[Path, RunResult]) -> None:
     """With other routines BLAS rounds otherwise, which a replay must be able to say."""
     program = (
         "from aloft.logs.replay.opened_run import OpenedRun\n"
-        "print(*OpenedRun.of('recordings/sum.rrd').what_is_other_now(), sep='\\n')\n"
+        "print(*OpenedRun.of('recordings/sum.rrd').changed_dependencies(), sep='\\n')\n"
     )
     said = subprocess.run(
         [sys.executable, "-c", program],

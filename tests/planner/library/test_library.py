@@ -1,5 +1,7 @@
 """The plan library: what is kept is found by its task alone, and only valid plans are kept."""
 
+from __future__ import annotations
+
 import shutil
 from contextlib import suppress
 from dataclasses import replace
@@ -9,9 +11,16 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.validity import InvalidPlanError
-from aloft.planner.library.library import SHIPPED, PlanLibrary, kept_name, task_distance
-from aloft.planner.task.errors import PlanError
-from aloft.planner.task.multipliers import Multipliers
+from aloft.planner.library.library import (
+    SHIPPED,
+    PlanLibrary,
+    find_task,
+    kept_name,
+    shipped_folder,
+    shipped_tasks,
+    task_distance,
+)
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import JumpPlan, PlanFileError, write_plan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
@@ -69,31 +78,6 @@ def test_what_is_not_there_is_solved_from_the_nearest_and_kept(
     assert kept and solver.started_from == ["in_situ"], "a name decides nothing"
     assert again.task == near()
     assert [path.name for path in tmp_path.iterdir()] == [kept_name(near(), ROBOT)]
-
-
-def test_multipliers_lie_beside_their_plan(tmp_path: Path, good: JumpPlan) -> None:
-    known = Multipliers(np.array([0.5, -2.0]), "a structure")
-    library = PlanLibrary(ROBOT, tmp_path, ())
-    library.plan(near(), Planner(replace(good, multipliers=known)))
-    (beside,) = (tmp_path / "multipliers").iterdir()
-    assert beside.name == f"{near().hash(ROBOT)}.npz"
-    found = library.nearest(near(rise=0.1504))
-    assert found is not None and found[0].multipliers is not None
-    assert found[0].multipliers.structure == "a structure"
-    np.testing.assert_array_equal(found[0].multipliers.values, [0.5, -2.0])
-    beside.write_bytes(b"PK not whole")
-    found = library.nearest(near(rise=0.1504))
-    assert found is not None and found[0].multipliers is None, "a plan is as good without them"
-    library.prune([IN_SITU])
-    assert not beside.exists()
-
-
-def test_multipliers_of_the_plan_before_do_not_stay(tmp_path: Path, good: JumpPlan) -> None:
-    library = PlanLibrary(ROBOT, tmp_path, ())
-    known = Multipliers(np.ones(3), "a structure")
-    library.plan(near(), Planner(replace(good, multipliers=known)))
-    library.plan(near(), Planner(good), anew=True)
-    assert list((tmp_path / "multipliers").iterdir()) == []
 
 
 def test_a_replaced_file_is_read_again(tmp_path: Path, good: JumpPlan) -> None:
@@ -203,3 +187,22 @@ def test_pruning_leaves_the_tasks_that_are_named(tmp_path: Path, good: JumpPlan)
     assert library.prune([near(rise=0.1501)]) == [gone]
     assert sorted(path.name for path in tmp_path.iterdir()) == [kept.name, "notes.txt"]
     assert library.find(IN_SITU) is not None, "other folders are left alone"
+
+
+def test_the_shipped_folder_has_tasks_and_plans():
+    assert (shipped_folder() / "tasks" / "in_situ.yaml").is_file()
+    assert "tasks/in_situ.yaml" in shipped_tasks()
+    assert list((shipped_folder() / "plans").glob("*.npz"))
+
+
+def test_the_folders_given_come_first(tmp_path):
+    assert find_task("tasks/in_situ.yaml", tmp_path).parent == shipped_folder() / "tasks"
+    (tmp_path / "tasks").mkdir()
+    own = tmp_path / "tasks" / "in_situ.yaml"
+    own.write_text("rise: 5 cm\n")
+    assert find_task("tasks/in_situ.yaml", tmp_path) == own
+
+
+def test_a_task_that_is_nowhere_is_refused(tmp_path):
+    with pytest.raises(LookupError, match=r"no task 'mine.yaml' beside the graph or among the sh"):
+        find_task("mine.yaml", tmp_path)

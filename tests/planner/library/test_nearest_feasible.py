@@ -12,12 +12,12 @@ from aloft.planner.library import nearest_feasible as module
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.nearest_feasible import (
     candidates,
+    continuation_path,
     nearest_feasible,
     seconds_left,
     values_towards,
-    ways_together,
 )
-from aloft.planner.task.errors import PlanError
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
@@ -132,7 +132,7 @@ def test_onto_a_step_its_height_and_the_rise_change_together() -> None:
 def test_where_no_single_parameter_helps_all_change_together() -> None:
     asked = {"rise": 0.5, "distance_x": 1.0, "twist": 2.0}
     task = make_task({"recipe": "paper", "name": "far", **asked})
-    (way,) = ways_together(task)
+    (way,) = continuation_path(task)
     assert way[0] == {"rise": 0.08, "distance_x": 0.0, "twist": 0.0}
     assert way[-1] == asked
     solve = Planner(lambda task: (task.rise or 0.0) < 0.3 and task.distance_x < 0.5)
@@ -141,7 +141,7 @@ def test_where_no_single_parameter_helps_all_change_together() -> None:
     assert (found.parameter, found.value, found.beyond) == ("rise", 0.27, 0.29)
     assert set(found.others) == {"distance_x", "twist"}
     assert found.solves == len(solve.asked) <= module.MOST_SOLVES
-    assert ways_together(make_task({"recipe": "paper", "name": "high", "rise": 0.6})) == []
+    assert continuation_path(make_task({"recipe": "paper", "name": "high", "rise": 0.6})) == []
 
 
 def test_a_task_that_took_long_leaves_less_time() -> None:

@@ -9,9 +9,9 @@ import pytest
 from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.library.nearest_feasible import nearest_feasible, seconds_left
-from aloft.planner.solving.bounded import cpu_time
 from aloft.planner.solving.solve import make_problem
-from aloft.planner.task.errors import PlanError
+from aloft.planner.solving.solver_process import cpu_time
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 

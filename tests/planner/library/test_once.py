@@ -1,17 +1,22 @@
-"""A plan is checked and made a table once for the same content, and anew for another."""
+"""A plan is checked and made a table once for the same content, and anew for another.
+
+That a plan has passed its check is remembered between processes, and nothing else is.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from aloft.mathematics.kept_arrays import code_digest
 from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library import once
-from aloft.planner.library.library import PlanLibrary
+from aloft.planner.library.library import PlanLibrary, shipped_folder
+from aloft.planner.library.once import noted_folder, unless_passed
 from aloft.planner.library.reference_table import reference_table
-from aloft.planner.library.shipped import shipped_folder
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -32,7 +37,7 @@ def plan():
 
 def test_the_same_plan_is_checked_once_and_a_changed_one_again(plan, monkeypatch):
     checked = []
-    monkeypatch.setattr(once, "_valid", once.Kept())
+    monkeypatch.setattr(once, "_valid", once.ResultCache())
     monkeypatch.setattr(once, "require_valid", lambda plan, robot: checked.append(plan))
     once.require_valid_once(plan, ROBOT)
     once.require_valid_once(replace(plan, com=plan.com.copy()), ROBOT)
@@ -58,7 +63,7 @@ def test_tables_are_shared_by_what_they_are_made_from(plan):
 
 
 def test_only_the_results_used_last_are_kept():
-    kept = once.Kept[int]()
+    kept = once.ResultCache[int]()
     for key in range(once.KEPT + 1):
         kept.get(key, lambda key=key: key)
     assert kept.get(0, lambda: -1) == -1
@@ -69,9 +74,9 @@ def test_only_the_results_used_last_are_kept():
 def test_a_later_process_finds_the_very_table(task, monkeypatch):
     plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))
     made = reference_table(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.Kept())
+    monkeypatch.setattr(once, "_tables", once.ResultCache())
     once.reference_table_once(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.Kept())
+    monkeypatch.setattr(once, "_tables", once.ResultCache())
     monkeypatch.setattr(once, "reference_table", None)  # not needed any more
     found = once.reference_table_once(plan, ROBOT, 0.2)
     assert {**vars(found), "time": 0, "columns": 0, "contact": 0} == {
@@ -85,3 +90,64 @@ def test_a_later_process_finds_the_very_table(task, monkeypatch):
     assert bool(made.later_jumps) == (task == "hops_forward_10")
     assert (found.contact is None) == (made.contact is None)
     assert made.contact is None or np.array_equal(found.contact, made.contact)
+
+
+@pytest.fixture(autouse=True)
+def _checked_before_own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+class Check:
+    """A check that counts its calls, and fails where it is told to."""
+
+    def __init__(self, fails: bool = False) -> None:
+        self.calls, self.fails = 0, fails
+
+    def __call__(self) -> None:
+        self.calls += 1
+        if self.fails:
+            raise ValueError("not valid")
+
+
+def test_what_has_passed_is_not_checked_again_and_other_content_is() -> None:
+    check = Check()
+    for content in (b"one", b"one", b"other", b"one"):
+        unless_passed(content, check)
+    assert check.calls == 2
+    assert len(list(noted_folder().iterdir())) == 2
+
+
+def test_what_has_failed_is_checked_every_time() -> None:
+    check = Check(fails=True)
+    for _ in range(2):
+        with pytest.raises(ValueError, match="not valid"):
+            unless_passed(b"one", check)
+    assert check.calls == 2
+
+
+def test_another_check_does_not_believe_what_this_one_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    check = Check()
+    unless_passed(b"one", check)
+    monkeypatch.setattr(once, "_code", lambda: b"a changed test")
+    unless_passed(b"one", check)
+    assert check.calls == 2
+
+
+def test_the_code_of_the_check_is_part_of_it() -> None:
+    root = Path(once.__file__).parents[2]
+    for folder in once.FOLDERS:
+        assert list((root / folder).rglob("*.py")), folder
+    assert once._code() == code_digest(*once.FOLDERS)
+
+
+def test_without_a_place_for_notes_it_is_checked_every_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    check = Check()
+    unless_passed(b"one", check)
+    unless_passed(b"one", check)
+    assert check.calls == 2

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.planner.models.symbolic_frames import (
+from aloft.planner.models.symbolic_model import (
+    SymbolicModel,
     base_angular_acceleration,
     base_angular_velocity,
     base_rotation,
 )
-from aloft.planner.models.symbolic_model import SymbolicModel
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 

@@ -12,7 +12,7 @@ import pytest
 from aloft.planner.checking.validity import broken_array, check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.solving.solve import FORMULATIONS, solve_jump
-from aloft.planner.task.errors import PlanError
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import ARRAYS, JumpPlan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

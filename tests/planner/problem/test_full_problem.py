@@ -14,7 +14,7 @@ from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump
-from aloft.planner.task.errors import PlanError
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import JumpPlan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import Knots, make_task

@@ -10,7 +10,7 @@ import casadi as ca
 import pytest
 
 from aloft.planner.models.symbolic_model import SymbolicModel
-from aloft.planner.problem.stage_functions import Piece, derived
+from aloft.planner.problem.stage_functions import StageFunction, derived
 from aloft.planner.solving import compilation
 from aloft.planner.solving.compilation import FunctionSet, load_functions
 from aloft.robots.description import find_robot
@@ -19,7 +19,7 @@ PIECES = ("slow", "quick")
 needs_compiler = pytest.mark.skipif(compilation.find_compiler() is None, reason="no C compiler")
 
 
-def make(name: str) -> Piece:
+def make(name: str) -> StageFunction:
     z, w = ca.SX.sym("z", 2), ca.SX.sym("w")
     return derived(f"test_{name}", z, w, w * z[0] ** 2, ca.vertcat(z[0] * z[1]))
 
@@ -27,7 +27,7 @@ def make(name: str) -> Piece:
 FUNCTIONS = FunctionSet("test", PIECES, (), make)
 
 
-def load(**options: Any) -> dict[str, Piece]:
+def load(**options: Any) -> dict[str, StageFunction]:
     model: Any = type("Model", (SymbolicModel,), {"__init__": lambda self: None})()
     model.robot, model.loads = find_robot("bruce"), ()
     return load_functions(FUNCTIONS, model, **options)
@@ -39,7 +39,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     compiled: list[str] = []
     real = compilation._compile
 
-    def compile_piece(compiler: str, piece: Piece, library: Path) -> bool:
+    def compile_piece(compiler: str, piece: StageFunction, library: Path) -> bool:
         compiled.append(library.stem)
         return real(compiler, piece, library)
 
@@ -49,7 +49,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return compiled
 
 
-def values(pieces: dict[str, Piece]) -> list[list[float]]:
+def values(pieces: dict[str, StageFunction]) -> list[list[float]]:
     return [[float(v) for v in pieces[name].value([3.0, 2.0], 0.5)] for name in PIECES]
 
 
@@ -81,7 +81,7 @@ def test_what_another_process_compiles_is_waited_for_last(
     fcntl.flock(other, fcntl.LOCK_EX)
     counted = compilation._compile
 
-    def and_meanwhile(compiler: str, piece: Piece, made_here: Path) -> bool:
+    def and_meanwhile(compiler: str, piece: StageFunction, made_here: Path) -> bool:
         done = counted(compiler, piece, made_here)
         if made_here.stem == "quick":  # now the other process has made the slow one
             assert counted(compiler, make("slow"), library)

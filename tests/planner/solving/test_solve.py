@@ -1,7 +1,13 @@
-"""Tasks become valid plans; what cannot be planned says why."""
+"""Tasks become valid plans; what cannot be planned says why.
+
+Hard jumps by way of easier ones, and the somersaults that come with aloft.
+
+A plan whose intervals are too long is solved again on finer ones.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,16 +15,27 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.planner.checking.validity import check_plan
-from aloft.planner.library.library import SHIPPED, PlanLibrary
+from aloft.planner.checking.validity import InvalidPlanError, check_plan, checked
+from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.problem.guess import ballistic_guess
-from aloft.planner.solving.given_multipliers import use_given_multipliers
-from aloft.planner.solving.solve import make_problem, solve_jump
-from aloft.planner.task.errors import PlanError
-from aloft.planner.task.plan import ARRAYS
+from aloft.planner.problem.unpacking import can_start
+from aloft.planner.solving.solve import (
+    asks_for_finer,
+    curable,
+    eased,
+    finer_knots,
+    make_problem,
+    solve_jump,
+    tighten,
+    with_impacts,
+)
+from aloft.planner.solving.solver import solve
+from aloft.planner.task.files import PlanError
+from aloft.planner.task.plan import ARRAYS, JumpPlan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import matrices_of_quaternions
 
 from ..independence import smallest_singular_value
 
@@ -81,38 +98,19 @@ def test_a_near_plan_saves_iterations() -> None:
         ("turn_60deg", {"rise": 0.095, "twist": 1.1}),
     ],
 )
-@pytest.mark.skipif(not use_given_multipliers(), reason="fatrop begins without multipliers here")
-def test_a_start_with_multipliers_takes_a_few_iterations_to_a_plan_as_good(
+def test_a_start_from_a_neighbour_takes_fewer_iterations_to_a_plan_as_good(
     tmp_path: Path, neighbour: str, change: dict[str, float]
 ) -> None:
     library = PlanLibrary(ROBOT, tmp_path)
     task = read_task(SHIPPED.parent / "tasks" / f"{neighbour}.yaml").model_copy(update=change)
     found = library.nearest(task)
-    assert found is not None and found[0].multipliers is not None
-    start = found[0]
-    warm = solve_jump(task, ROBOT, warm_start=start)
-    without = solve_jump(task, ROBOT, warm_start=replace(start, multipliers=None))
+    assert found is not None
+    warm = solve_jump(task, ROBOT, warm_start=found[0])
     cold = solve_jump(task, ROBOT)
     assert warm.statistics["warm"]
-    assert warm.statistics["iterations"] <= 0.7 * without.statistics["iterations"]
+    assert warm.statistics["iterations"] <= 0.9 * cold.statistics["iterations"]
     assert warm.statistics["cost"] == pytest.approx(cold.statistics["cost"], rel=0.01)
     assert check_plan(warm, ROBOT).explain() == ""
-    assert warm.multipliers is not None, "the next one can start from it"
-
-
-@pytest.mark.skipif(not use_given_multipliers(), reason="fatrop begins without multipliers here")
-def test_multipliers_of_another_structure_are_not_used(tmp_path: Path) -> None:
-    kept = read_task(SHIPPED.parent / "tasks" / "forward_15cm.yaml")
-    task = kept.model_copy(update={"distance_x": 0.16})
-    found = PlanLibrary(ROBOT, tmp_path).nearest(task)
-    assert found is not None and found[0].multipliers is not None
-    start = replace(found[0], multipliers=replace(found[0].multipliers, structure="other"))
-    other, none = (
-        solve_jump(task, ROBOT, warm_start=plan)
-        for plan in (start, replace(start, multipliers=None))
-    )
-    for name in ARRAYS:
-        assert getattr(other, name).tobytes() == getattr(none, name).tobytes(), name
 
 
 def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
@@ -177,3 +175,161 @@ def test_a_quick_solve_aside_starts_from_the_jump_ahead_not_from_a_plan_in_the_p
     assert not quick.statistics["warm"]
     further = make_task({"recipe": "paper", "name": "further", "rise": 0.1, "distance_y": 0.06})
     assert solve_jump(further, ROBOT, warm_start=quick, quick=True).statistics["warm"]
+
+
+TASK = make_task({"recipe": "paper", "name": "jump", "rise": 0.15, "distance_x": 0.1})
+
+
+def test_only_the_motors_are_made_stronger() -> None:
+    problem = make_problem(TASK, ROBOT)
+    stronger = eased(problem, 1.5)
+    for k, family in enumerate(problem.families):
+        factor = 1.5 if family.startswith("motor") else 1.0
+        assert stronger.row_upper[k] == factor * problem.row_upper[k]
+        assert stronger.row_lower[k] == factor * problem.row_lower[k]
+
+
+def test_limits_come_down_to_the_real_ones() -> None:
+    problem = make_problem(TASK, ROBOT)
+    easy = solve(eased(problem, 1.5), ballistic_guess(problem), solver="fatrop")
+    found = tighten(problem, easy.values, 1.5)
+    assert found is not None
+    assert found.solved
+    direct = solve(problem, ballistic_guess(problem), solver="fatrop")
+    assert found.cost == pytest.approx(direct.cost, rel=1e-4)
+    assert found.cost > easy.cost
+
+
+def test_limits_out_of_reach_are_not_reached() -> None:
+    high = make_problem(make_task({"recipe": "paper", "name": "high", "rise": 0.45}), ROBOT)
+    easy = solve(eased(high, 2.0), ballistic_guess(high), solver="fatrop")
+    assert easy.solved
+    assert tighten(high, easy.values, 2.0) is None
+
+
+def test_a_soft_landing_is_a_start_for_a_hard_one() -> None:
+    soft = solve_jump(TASK, ROBOT)
+    hard = with_impacts(soft)
+    assert len(hard.time) == len(soft.time) + 1
+    problem = make_problem(TASK.model_copy(update={"impact": True}), ROBOT)
+    assert can_start(problem, hard)
+    k = int(np.flatnonzero(np.diff(hard.time) == 0.0)[0])
+    assert hard.time[k] == soft.touchdown_time
+    assert not hard.contact_force[k].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "effort"),
+    [
+        ("somersault_in_place", "koala", 1.0),
+        ("somersault_forward_35cm", "koala", 0.95),
+        ("somersault_backward_35cm", "relaxed", 0.6),
+    ],
+)
+def test_a_shipped_somersault_turns_over_and_is_exact(
+    name: str, profile: str, effort: float, tmp_path: Path
+) -> None:
+    task = read_task(SHIPPED.parent / "tasks" / f"{name}.yaml")
+    assert (task.equipped(ROBOT).motors.profile, task.effort) == (profile, effort)
+    plan = PlanLibrary(ROBOT, tmp_path).find(task)
+    assert plan is not None
+    report = check_plan(plan, ROBOT)
+    assert report.explain() == ""
+    assert report.figures["flight_error_mm"] <= 1.0
+    assert report.figures["flight_error_deg"] <= 0.5
+    assert plan.statistics["violation"] <= 1e-6
+    flying = (plan.time >= plan.lift_off_time - 1e-9) & (plan.time <= plan.touchdown_time + 1e-9)
+    steps = np.diff(plan.time[flying])
+    assert steps.max() <= 0.010
+    # The torso turns over in the air, not only from first knot to last.
+    matrix = matrices_of_quaternions(plan.position[:, 3:7])
+    pitch = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
+    in_air = pitch[flying][-1] - pitch[flying][0]
+    assert abs(pitch[-1] - pitch[0] - task.rotation) < math.radians(1.0)
+    assert abs(in_air) > math.radians(180.0)
+
+
+HIGH = make_task({"recipe": "paper", "name": "high", "rise": 0.2})
+
+
+def failing(plan: JumpPlan, *tests: tuple[str, float, float]) -> JumpPlan:
+    rows = [{"name": n, "value": v, "limit": a, "passed": False} for n, v, a in tests]
+    return plan.with_report({"valid": False, "tests": rows, "figures": {}})
+
+
+@pytest.mark.parametrize(
+    ("tests", "expected"),
+    [
+        ([("flight_position", 1.2e-3, 1e-3)], True),
+        ([("flight_position", 1.2e-3, 1e-3), ("motor_torque", 0.4, 0.3)], True),
+        ([("flight_position", 1.2e-3, 1e-3), ("friction", 0.4, 0.01)], False),
+        ([("flight_position", 0.5, 1e-3)], False),
+        ([], False),
+    ],
+)
+def test_what_finer_intervals_may_cure(
+    by_hand: JumpPlan, tests: list[tuple[str, float, float]], expected: bool
+) -> None:
+    assert curable(failing(by_hand, *tests)) is expected
+
+
+def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: JumpPlan) -> None:
+    failed = failing(replace(by_hand, task=HIGH), ("flight_position", 2e-3, 1e-3))
+    assert asks_for_finer(HIGH, failed)
+    assert asks_for_finer(HIGH.model_copy(update={"name": "other"}), failed)
+    assert not asks_for_finer(make_task({"recipe": "paper", "name": "low", "rise": 0.1}), failed)
+    assert not asks_for_finer(HIGH, replace(by_hand, task=HIGH))
+    assert not asks_for_finer(HIGH, None)
+
+
+def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
+    coarse = checked(solve_jump(HIGH, ROBOT), ROBOT)
+    assert not coarse.valid
+    plan = solve_and_check(HIGH, ROBOT)
+    assert plan.valid
+    assert plan.task.hash(ROBOT) == HIGH.hash(ROBOT)
+    knots = finer_knots(coarse)
+    assert knots.flight == 42
+    assert plan.statistics["knots"] == knots.total + 1 == len(plan.time)
+    error = [report["figures"]["flight_error_mm"] for report in (plan.report, coarse.report)]
+    assert error[0] < 0.6 * error[1]
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        {"rise": 0.1, "distance_x": 0.3},
+        pytest.param({"rise": 0.15, "distance_y": 0.2}, marks=pytest.mark.long),
+        pytest.param({"rise": 0.15, "twist": "60 deg"}, marks=pytest.mark.long),
+    ],
+)
+def test_the_reach_of_the_real_actuators(task: dict[str, Any]) -> None:
+    plan = solve_and_check(make_task({"recipe": "paper", "name": "far", **task}), ROBOT)
+    assert plan.valid
+    assert plan.statistics["violation"] <= 1e-6
+
+
+def test_an_invalid_plan_is_not_refined_without_end(by_hand: JumpPlan) -> None:
+    calls = []
+
+    def make(task: Any, robot: Any, start: JumpPlan | None) -> JumpPlan:
+        calls.append(start)
+        bent = by_hand.position.copy()
+        bent[len(bent) // 2, 0] += 2e-3
+        return replace(by_hand, task=by_hand.task, position=bent)
+
+    with pytest.raises(InvalidPlanError):
+        solve_and_check(by_hand.task, ROBOT, None, make)
+    assert len(calls) <= 3
+
+
+def test_a_plan_on_another_grid_is_a_start() -> None:
+    first = make_task({"recipe": "paper", "name": "low", "rise": 0.14})
+    fine = solve_jump(first, ROBOT, knots=finer_knots(solve_jump(first, ROBOT)))
+    warm = solve_jump(
+        make_task({"recipe": "paper", "name": "near", "rise": 0.15}), ROBOT, warm_start=fine
+    )
+    assert warm.statistics["warm"]
+    assert len(warm.time) < len(fine.time)
+    cold = solve_jump(make_task({"recipe": "paper", "name": "near", "rise": 0.15}), ROBOT)
+    assert np.abs(warm.com - cold.com).max() < 2e-3

@@ -11,8 +11,8 @@ from aloft.blocks.signals import Phase
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.margins import Margins, joint_bounds, unknown_joints
+from aloft.planner.task.read_task import contradictions
 from aloft.planner.task.task import make_task
-from aloft.planner.task.task_checks import contradictions
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

@@ -1,11 +1,27 @@
-"""What a task leaves unsaid suits the robot's size; what it says stays."""
+"""What a task leaves unsaid suits the robot's size; what it says stays.
 
+What follows from a robot alone is computed once for the same content and arguments.
+
+Toes, knees and the room of the joints, from a robot's description alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.task.scaling import scaled_defaults, standing_height
+from aloft.planner.task.scaling import (
+    KEPT,
+    knee_limits,
+    least_distance_to_limits,
+    per_robot,
+    scaled_defaults,
+    standing_height,
+    toe_name_token,
+)
 from aloft.planner.task.task import make_task
-from aloft.robots.description import find_robot
+from aloft.robots.description import RobotDescription, find_robot
 
 HEAVY = quadruped().changed(
     links=tuple(link.model_copy(update={"mass": 4.0 * link.mass}) for link in quadruped().links)
@@ -48,3 +64,60 @@ def test_a_plans_file_says_all_so_that_it_is_never_scaled_again() -> None:
     again = make_task(task.model_dump(mode="json"))
     assert again.hash(HEAVY) == task.hash(HEAVY)
     assert again.resolved(HEAVY).content() == task.content()
+
+
+BRUCE = find_robot("bruce")
+
+
+def test_the_same_robot_is_asked_once_and_another_one_again() -> None:
+    asked: list[tuple[str, float]] = []
+
+    @per_robot
+    def mass(robot: RobotDescription, scale: float) -> float:
+        asked.append((robot.name, scale))
+        return robot.total_mass * scale
+
+    assert mass(BRUCE, 2.0) == mass(BRUCE.model_copy(), 2.0) == 2.0 * BRUCE.total_mass
+    assert len(asked) == 1, "a copy is the same robot"
+    mass(BRUCE, 3.0)
+    mass(BRUCE.model_copy(update={"name": "other"}), 2.0)
+    assert asked == [("bruce", 2.0), ("bruce", 3.0), ("other", 2.0)]
+
+
+def test_only_the_last_results_are_kept() -> None:
+    asked: list[int] = []
+
+    @per_robot
+    def number(robot: RobotDescription, which: int) -> int:
+        asked.append(which)
+        return which
+
+    for which in (*range(KEPT + 1), KEPT, 0):
+        assert number(BRUCE, which) == which
+    assert asked == [*range(KEPT + 1), 0], "the oldest was forgotten"
+
+
+def test_toes_are_the_front_points_of_soles_by_their_common_word() -> None:
+    assert toe_name_token(BRUCE) == "toe"
+    assert toe_name_token(quadruped()) == "", "feet of one point are no soles"
+
+
+def test_front_points_that_have_no_word_of_their_own_are_no_toes() -> None:
+    renamed = tuple(
+        point.model_copy(update={"name": point.name.replace("toe", "heel") + "_" * k})
+        for k, point in enumerate(BRUCE.contacts)
+    )
+    assert toe_name_token(BRUCE.changed(contacts=renamed)) == ""
+
+
+def test_the_knee_is_what_bends_the_leg_most() -> None:
+    assert knee_limits(BRUCE, 0.4) == {"knee": (-2.1, -0.4)}
+    standing = BRUCE.standing_position[[joint.name for joint in BRUCE.joints].index("left_knee")]
+    nearly = knee_limits(BRUCE, 2.0)["knee"]
+    assert nearly[1] == pytest.approx(0.8 * standing, abs=0.01), "no more than where it stands"
+
+
+def test_the_room_is_that_of_the_standing_joint_nearest_to_a_limit() -> None:
+    angles, limits = BRUCE.standing_position, BRUCE.joint_limits
+    nearest = np.minimum(angles - limits[:, 0], limits[:, 1] - angles).min()
+    assert least_distance_to_limits(BRUCE) == pytest.approx(nearest)

@@ -21,6 +21,7 @@ from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.loading.problems import LoadError
+from aloft.runtime.running import timing
 from aloft.runtime.running.chain import Chain
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
@@ -157,6 +158,22 @@ def test_every_block_keeps_its_times() -> None:
         program.fold()
         kept = program._kept[: min(program.ticks, len(program._kept))]
         assert (kept >= 0).all() and kept.sum() > 0
+
+
+def test_a_long_run_without_deadlines_is_timed_now_and_then(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(timing, "FIRST_TIMED", 100)
+    result = Executor(graph()).run(1480)
+    assert [times.calls for times in result.blocks.values()] == [1480, 1480, 740, 1480, 1480, 1480]
+    for times in result.blocks.values():
+        assert 0.0 < times.p50_us <= times.max_us and times.mean_us < 1e6
+    fused = ticker(fuse=True)
+    fused.advance(1480)
+    for program in fused.programs:
+        program.fold()
+        assert program.ticks == 740 - program.untimed == 100 + 740 // 32 - 100 // 32
+        assert (program._kept[: program.ticks] >= 0).all()
 
 
 def test_the_block_that_ran_at_an_instant_is_known() -> None:

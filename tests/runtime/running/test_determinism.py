@@ -14,18 +14,18 @@ from aloft.blocks.general.integrators_and_delays import Integrator
 from aloft.blocks.general.sources import SineWave
 from aloft.blocks.general.arithmetic import Sum
 from aloft.runtime.language.stages import Wire
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
-blocks = {"wave": Use(SineWave, {"n": 5, "frequency": 3.7})}
+blocks = {"wave": BlockUse(SineWave, {"n": 5, "frequency": 3.7})}
 for i in range(30):
     source = f"level{i - 1}.y" if i else "wave.y"
-    blocks[f"error{i}"] = Use(
+    blocks[f"error{i}"] = BlockUse(
         Sum, {"n": 5, "weights": [1.0, -1.0]}, {"a": source, "b": f"level{i}.y"}, 1 + i % 3
     )
-    blocks[f"gain{i}"] = Use(
+    blocks[f"gain{i}"] = BlockUse(
         Gain, {"n": 5, "gain": 9.1}, {"u": Wire(f"error{i}.y", "", i % 3)}, 1 + i % 2
     )
-    blocks[f"level{i}"] = Use(Integrator, {"n": 5}, {"u": f"gain{i}.y"})
+    blocks[f"level{i}"] = BlockUse(Integrator, {"n": 5}, {"u": f"gain{i}.y"})
 result = run(checked_graph(blocks, ticks=400), log=sys.argv[1] == "log")
 assert result.success, result.reason
 print(result.run_hash, " ".join(result.blocks))

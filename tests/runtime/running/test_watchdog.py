@@ -137,7 +137,7 @@ from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.language.block import Block, Output
 from aloft.blocks.general.vectors import Vector
 from aloft.runtime.running.executor import run
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 class Robot(Block):
     "Waits for a lock that nobody opens."
@@ -154,7 +154,7 @@ class Robot(Block):
     def close(self):
         print("close", flush=True)
 
-graph = checked_graph({"robot": Use(Robot)}, dimensions={"n": 1})
+graph = checked_graph({"robot": BlockUse(Robot)}, dimensions={"n": 1})
 run_it = threading.Thread(target=lambda: run(graph, clock=ClockSpec(hangs_after=0.4)))
 run_it.start()  # in another thread than the main one nothing interrupts a lock
 run_it.join()
@@ -178,7 +178,7 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
 from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.stages import ClockSpec
-from aloft.runtime.testing.graphs import Use, checked_graph
+from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 MODE = sys.argv[1]
 if MODE == "burst":  # what comes after the run is not of interest
@@ -208,7 +208,7 @@ class Robot(Block):
     def close(self):
         print("close", flush=True)
 
-graph = checked_graph({"robot": Use(Robot)}, dimensions={"n": 1}, clock=ClockSpec("paced"))
+graph = checked_graph({"robot": BlockUse(Robot)}, dimensions={"n": 1}, clock=ClockSpec("paced"))
 result = run(graph, log=False)
 if MODE == "burst":
     print(*result.stop_problems, sep="\\n", flush=True)

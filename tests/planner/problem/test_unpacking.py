@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.planner.problem.resampling import (
+from aloft.planner.problem.unpacking import (
     matching_times,
     means_over,
     same_phases,

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.models.robot_model import model_of
-from aloft.planner.models.stance import Stance
-from aloft.planner.task.errors import PlanError
+from aloft.planner.models.robot_model import Stance, model_of
+from aloft.planner.task.files import PlanError
 from aloft.robots.description import RobotDescription, find_robot
 
 

@@ -1,18 +1,39 @@
-"""YAML files of the planner, read as graph files are: every value with its line and column."""
+"""The planner's files and its exceptions.
+
+YAML is read as graph files are: every value with its line and column. Files are written as a whole or not at
+all, even if the process is killed meanwhile.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import Position
 from ...runtime.loading.problems import Problems
 from ...runtime.loading.reading.document import read_value
 from ...runtime.loading.reading.nodes import ListNode, MapNode, Node, plain
-from .errors import TaskError
+
+
+class TaskError(AloftError, ValueError):
+    """A task cannot be read, or asks for what contradicts itself; the message has every reason."""
+
+
+class PlanError(AloftError):
+    """A jump that cannot be planned. ``family`` names the constraint family that cannot be met,
+    ``violation`` is how far the best attempt missed it, in that family's unit."""
+
+    def __init__(self, message: str, *, family: str = "", violation: float = 0.0) -> None:
+        super().__init__(message)
+        self.family = family
+        self.violation = violation
+
 
 Key = str | int
 
@@ -41,12 +62,12 @@ class PlacedFile:
     def place_of_words(self, text: str) -> str:
         """Where the last of the file's keys is that a message speaks of; the start of the file
         where it speaks of none."""
-        spoken = [
+        describe_task = [
             entry.key_where
             for entry in self.tree
             if re.search(rf"\b{re.escape(entry.key)}\b", text)
         ]
-        return str(max(spoken, default=self.tree.where))
+        return str(max(describe_task, default=self.tree.where))
 
 
 def read_placed(path: Path, example: str) -> PlacedFile:
@@ -75,3 +96,32 @@ def read_placed(path: Path, example: str) -> PlacedFile:
         where = tree.where if tree else Position(shown, 1, 1)
         raise TaskError(f"{where}: expected keys such as {example!r}, found {found}")
     return PlacedFile(shown, plain(tree), tree)
+
+
+ABANDONED = 3600.0
+"""After that many seconds nobody is still writing a part [s]."""
+
+
+def write_whole(path: Path, data: bytes) -> Path:
+    """Write a file, replacing what is there: readers see the old one or the new one, never half."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the parts that a process left behind which was killed while it wrote one."""
+    for part in folder.glob(".*.part"):
+        try:
+            if time.time() - part.stat().st_mtime > ABANDONED:
+                part.unlink()
+        except FileNotFoundError:
+            continue  # it was not abandoned after all

@@ -1,4 +1,7 @@
-"""A flight's interval is exact: momentum to rounding, attitude to fourth order."""
+"""Derivatives by way of lifted expressions are those of the whole.
+
+A flight's interval is exact: momentum to rounding, attitude to fourth order.
+"""
 
 from functools import lru_cache
 
@@ -10,15 +13,47 @@ from aloft.planner.checking.validity import check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.quaternions import pose_of
 from aloft.planner.models.robot_model import model_of
-from aloft.planner.models.symbolic_model import SymbolicModel
-from aloft.planner.models.symbolic_momentum import centroidal_momentum
-from aloft.planner.problem.exact_flight import flight_interval
-from aloft.planner.problem.lifted import Lifted
-from aloft.planner.problem.stage_functions import make_coordinates
+from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
+from aloft.planner.problem.stage_functions import (
+    IntermediateExpressions,
+    flight_interval,
+    make_coordinates,
+)
 from aloft.planner.problem.unpacking import twist
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
+
+Z = ca.SX.sym("z", 3)
+LIFTED = ca.vertcat(Z[0] * Z[1], Z[2] ** 2 + Z[0])
+
+
+def value(inner: ca.SX) -> ca.SX:
+    return ca.sin(inner[0]) * inner[1] ** 2 + Z[1] * inner[0] + ca.exp(Z[0])
+
+
+def evaluated(expression: ca.SX) -> np.ndarray:
+    return np.array(ca.Function("f", [Z], [ca.densify(expression)])([0.3, -0.7, 1.1]))
+
+
+def test_they_are_the_same() -> None:
+    lift = IntermediateExpressions()
+    lifted, plain = value(lift(LIFTED)), value(LIFTED)
+    hessian, slope = lift.hessian(lifted, Z)
+    wanted, wanted_slope = ca.hessian(plain, Z)
+    np.testing.assert_allclose(evaluated(hessian), evaluated(wanted), rtol=1e-12)
+    np.testing.assert_allclose(evaluated(slope), evaluated(wanted_slope), rtol=1e-12)
+    np.testing.assert_allclose(
+        evaluated(lift.jacobian(lifted, Z)), evaluated(ca.jacobian(plain, Z)), rtol=1e-12
+    )
+    np.testing.assert_allclose(evaluated(lift.put_back([lifted])[0]), evaluated(plain), rtol=1e-12)
+
+
+def test_nothing_lifted_is_nothing_special() -> None:
+    lift = IntermediateExpressions()
+    found = lift.hessian(value(LIFTED), Z)[0]
+    np.testing.assert_allclose(evaluated(found), evaluated(ca.hessian(value(LIFTED), Z)[0]))
+
 
 ROBOT = find_robot("bruce")
 
@@ -53,7 +88,7 @@ def test_the_momentum_is_pinocchios() -> None:
 def interval() -> tuple[ca.Function, ca.Function]:
     """What finds the accelerations and impulses of an interval, by Newton's method, and its end."""
     q, v, a, r = (ca.SX.sym(name, n) for name, n in (("q", 16), ("v", 16), ("a", 16), ("r", 3)))
-    h, lift = ca.SX.sym("h"), Lifted()
+    h, lift = ca.SX.sym("h"), IntermediateExpressions()
     found = flight_interval(model(), make_coordinates(model(), "full"), q, v, h, a, r, lift)
     rows, end = lift.put_back([ca.vertcat(*found.rows), ca.vertcat(found.end, found.end_velocity)])
     unknown = ca.vertcat(a[:6], r)

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.planner.checking.clearance import (
+from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
     capsule_ends,

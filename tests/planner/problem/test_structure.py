@@ -7,10 +7,10 @@ import pytest
 
 from aloft.planner.models.coordinates import Coordinates
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.stance import StanceFinder
+from aloft.planner.models.robot_model import StanceFinder
 from aloft.planner.models.symbolic_model import SymbolicModel
-from aloft.planner.problem.contact_rows import ContactRows, is_mirrored, reduced_contacts
 from aloft.planner.problem.stage_functions import make_coordinates
+from aloft.planner.problem.structure import ContactRows, is_mirrored, reduced_contacts
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
