@@ -184,7 +184,7 @@ def weigh_torso(weighing: Weighing, tree: BodyTree) -> float:
     In small steps, so that the model is a function of the input and rarely changes. All masses scale
     alike, so the terms do; rotors do not.
     """
-    offset, mass = weighing.offset, weighing.mass[()]
+    offset, mass = weighing.offset, float(weighing.mass[()])
     np.divide(weighing.com_offset, LEAST_OFFSET, offset)
     np.rint(offset, offset)
     tree.com[0, :] = weighing.described + offset * LEAST_OFFSET

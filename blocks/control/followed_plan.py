@@ -128,8 +128,8 @@ def share_of_lead(plan: PlannedJoints) -> float:
 
     From its middle on the plan may name the times of the next flight already.
     """
-    since = plan.time[()] - plan.lift_off_time[()]
-    lasts = plan.touchdown_time[()] - plan.lift_off_time[()]
+    since = float(plan.time[()] - plan.lift_off_time[()])
+    lasts = float(plan.touchdown_time[()] - plan.lift_off_time[()])
     if since < 0.0 or lasts <= 0.0:
         return 1.0
     return min(2.0 * since / lasts, 1.0)
@@ -166,7 +166,7 @@ def level_sole(
     """Turn a sole by its last joint against what the base has turned further than the plan's ``pitch``."""
     if level_time <= 0.0 or soles.axis[foot] == 0.0:
         return
-    since = plan.time[()] - plan.touchdown_time[()] + level_time
+    since = float(plan.time[()] - plan.touchdown_time[()] + level_time)
     share, _, _ = minimum_jerk(2.0 * since / level_time)
     joint, error = soles.joint[foot], turned_too_far(foot, soles, pitch)
     angle = target.position[joint] - share * soles.axis[foot] * error
