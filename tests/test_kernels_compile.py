@@ -20,10 +20,15 @@ import pytest
 import aloft
 from aloft.mathematics import arrays
 from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.compiling.kernel_registry import written_code
+from aloft.mathematics.compiling.kernel_registry import is_kernel, written_code
 from aloft.mathematics.kernel import expand, kernel, kernels
+from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
+from aloft.runtime.language.registry import find_block, known_names
+from aloft.runtime.testing.bench import BlockBench
+from aloft.runtime.testing.conformance import misfits, random_inputs
 
+from .hal.sensors.mounting import bruce_with
 from .kernel_samples import UNUSED
 
 ROOT = Path(__file__).parent.parent
@@ -70,6 +75,14 @@ EVERY = 211
 """Of a kernel's calls the first and then every so many are kept, up to so many samples."""
 
 
+SENSORS = {
+    "imu": False,
+    "chest": {"kind": "imu", "link": "torso"},
+    "sole": {"kind": "force_torque", "link": "left_foot", "position": [0.0075, 0.0, -0.024]},
+}
+"""Sensors of a robot that has none of those that every robot may have."""
+
+
 PYTHON = {bool, int, float}
 """Other numbers, such as those of an enumeration, are made plain ones."""
 
@@ -93,21 +106,29 @@ def leaves(arguments):
         yield from leaves(a) if isinstance(a, tuple) else (a,)
 
 
-class AllNames:
-    """Contains every name."""
-
-    def __contains__(self, name):
-        return True
-
-
 def load_all():
     for path in HOT:
         importlib.import_module(".".join(("aloft", *path.relative_to(ROOT).with_suffix("").parts)))
 
 
+def run_alone(name, robot):
+    """Some ticks of a block on a bench, with its example parameters and inputs."""
+    block = find_block(name)
+    if misfits(block, robot=robot):
+        return
+    bench = BlockBench(block, block.example_parameters(), robot=robot, plain=True)
+    random = np.random.default_rng(0)
+    for _ in range(4):
+        inputs = random_inputs(type(bench.block), bench.block.context.dimensions, random)
+        for port, fields in inputs.items():
+            bench.set(port, **fields)
+        bench.step()
+    bench.close()
+
+
 @pytest.fixture(scope="module")
 def calls():
-    """For every kernel the arguments of some of its calls during a jump."""
+    """For every kernel the arguments of some of its calls, during a jump or in a block by itself."""
     load_all()
     functions = kernels()
     samples = {name: [] for name in functions}
@@ -129,12 +150,18 @@ def calls():
         name = name_of.get(id(function))
         return KernelCall(recorder(name, function) if name else function, *arguments)
 
+    used = {}  # which fields a step uses cannot be seen through recorders
+
+    def names_used(function):
+        return used.get(id(function)) or find_names(function)
+
+    find_names = steps.names_used
     for function in functions.values():  # before its calls of other kernels are replaced
         expand(function)
+        used[id(function)] = find_names(function)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(steps, "KernelCall", recorded_call)  # steps of blocks are in no module
-        # which fields a step uses cannot be seen through recorders: it gets all
-        patch.setattr(steps, "names_used", lambda function: AllNames())
+        patch.setattr(steps, "names_used", names_used)
         for module in [m for name, m in sys.modules.items() if name.startswith("aloft.")]:
             for key, value in list(vars(module).items()):
                 if id(value) in name_of:
@@ -150,6 +177,11 @@ def calls():
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
         aloft.load(ROOT / "graphs/jump.yaml", weak).run(duration=0.1)
         aloft.load(ROOT / "graphs/jump.yaml", {**weak, "wbc.cones": "round"}).run(duration=0.1)
+        run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
+        for name in known_names():  # blocks that none of these graphs has
+            own = [name_of[id(f)] for f in find_block(name).named_steps.values() if is_kernel(f)]
+            if not all(samples[each] for each in own):
+                run_alone(name, find_robot("bruce"))
     for name, arguments in UNUSED.items():
         samples[name].append(arguments)
     return samples
