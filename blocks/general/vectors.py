@@ -118,7 +118,7 @@ class Bounds(Signal):
 class Bounded:
     """The base of blocks whose parameters ``lower`` and ``upper`` bound ``n`` elements."""
 
-    Constants = Bounds
+    Constants: ClassVar[type[Signal] | None] = Bounds
 
     @classmethod
     def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
