@@ -78,12 +78,18 @@ def _convert(value: Any, unit: str) -> Any:
     return value
 
 
-if TYPE_CHECKING:  # in a kernel it is an array
+if TYPE_CHECKING:  # in a kernel these are arrays
     ScalarOrVector: TypeAlias = Any
+    Numbers: TypeAlias = Any
+    TwoNumbers: TypeAlias = Any
+    ThreeNumbers: TypeAlias = Any
 else:
     ScalarOrVector = float | list[float]
-"""One number for all elements of a vector, or a list with one number for each of its ``n`` elements.
-A kernel sees a vector of ``n`` elements."""
+    Numbers = list[float]
+    TwoNumbers = tuple[float, float]
+    ThreeNumbers = tuple[float, float, float]
+"""``ScalarOrVector`` is one number for all elements of a vector, or a list with one number for each
+of its ``n`` elements. A kernel sees a vector of ``n`` elements."""
 
 
 class Parameters(BaseModel):
