@@ -4,7 +4,7 @@ import numpy as np
 
 from aloft.blocks.control import followed_plan, frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
-from aloft.blocks.jumping import capture_law, plan_progress, turn_timing
+from aloft.blocks.jumping import plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
 from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
@@ -51,36 +51,37 @@ LANDING = LandingCost(
 )
 SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
 MOVING = BodyMotion(*(NORMAL(shape) for shape in ((2, 3, 3), (2, 3), (1, 6), (2, 6), (2, 6))))
-STEPPING = (
-    capture_law.Terms(
-        np.array([0.02, 0.01, 0.3]), np.array([-0.4, 0.1, 0.0]), NORMAL(3), 4.8 * np.eye(16), SOLES,
-        NORMAL((4, 3)), np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]]), np.tile(np.eye(3), (2, 1, 1)),
-    ),
-    capture_law.Settings._make(
-        np.array(value) for value in (
-            [2], [0.015], [0.006], [0.08], [1.0], [0.13], [0.015], [0.1], [0.2], [0.6, 1.8], [0.35],
-            [0.0005],
-        )
-    ),
-    capture_law.Feet(
-        np.array([0, 0, 1, 1]), np.array([-1.0, 1.0]), np.array([0.16, 0.16]), 0.5 * SOLES, 4.8, 0.002
-    ),
-    capture_law.Memory(
-        np.array(1), np.array(0.05), np.array(0), np.array(0.0), np.array(0.0), np.array(0.0),
-        np.array(0.1), np.array([[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]]),
-    ),
+STEPPING = records(
+    {
+        "com": [0.02, 0.01, 0.3], "com_velocity": [-0.4, 0.1, 0.0], "angular_momentum": NORMAL(3),
+        "mass_matrix": 4.8 * np.eye(16), "contact_position": SOLES, "contact_velocity": NORMAL((4, 3)),
+        "foot_position": [[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]],
+        "foot_rotation": np.tile(np.eye(3), (2, 1, 1)),
+    },
+    {
+        "steps": 2, "margin": 0.015, "confirmation": 0.006, "after": 0.08, "turn": 1.0,
+        "duration": 0.13, "height": 0.015, "beyond": 0.1, "reach": 0.2, "apart": [0.6, 1.8],
+        "settle": 0.35, "flat": 0.0005,
+    },
+    {
+        "foot_of_point": [0, 0, 1, 1], "side": [-1.0, 1.0], "apart": [0.16, 0.16],
+        "offset": 0.5 * SOLES, "mass": 4.8, "period": 0.002, "all": [True, True],
+    },
+    {
+        "foot": 1, "elapsed": 0.05, "taken": 0, "outside": 0.0, "last": 0.0, "ground": 0.0,
+        "heading": 0.1, "foothold": [[0.0, -0.08, 0.0], [0.0, 0.08, 0.0]],
+    },
 )  # fmt: skip
-STEP_SCRATCH = capture_law.Scratch(
-    np.array([-0.1, 0.02]),
-    np.zeros(2),
-    np.zeros(2),
-    np.zeros(3),
-    np.zeros(4, bool),
-    np.ones(2, bool),
-)
-STEP_PHASE = capture_law.PhaseFields(
-    np.array(4), np.array(0.1), np.array(0.0), np.array(0.2), np.array([False, False, True, True]),
-    np.zeros(4, bool), np.zeros((4, 3)),
+STEP_SCRATCH, STEP_PHASE = records(
+    {
+        "capture": [-0.1, 0.02], "nearest": np.zeros(2), "other": np.zeros(2),
+        "middle": np.zeros(3), "standing": np.zeros(4, bool),
+    },
+    {
+        "phase": 4, "time_in_phase": 0.1, "time_to_touchdown": 0.0, "time_since_touchdown": 0.2,
+        "stance": [False, False, True, True], "stepping": np.zeros(4, bool),
+        "step_acceleration": np.zeros((4, 3)),
+    },
 )  # fmt: skip
 PLACE = records(
     {"time": 0.4, "lift_off_time": 0.5, "touchdown_time": 0.8},
@@ -226,12 +227,12 @@ UNUSED = {
     "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
     "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),
     "aloft.blocks.control.balance_target.correct_place": PLACE,
-    "aloft.blocks.jumping.capture_law.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
-    "aloft.blocks.jumping.capture_law.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
-    "aloft.blocks.jumping.capture_law.swing_foot": (
+    "aloft.blocks.jumping.capture_step.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
+    "aloft.blocks.jumping.capture_step.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
+    "aloft.blocks.jumping.capture_step.swing_foot": (
         STEP_PHASE, *STEPPING, STEP_PHASE, STEP_SCRATCH, 5.7,
     ),
-    "aloft.blocks.jumping.capture_law.leave_hovering": (
+    "aloft.blocks.jumping.capture_step.leave_hovering": (
         SOLES + np.tile([[0.0], [0.002]], (2, 3)), np.array([0, 0, 1, 1]), 0.0005,
         np.array([True, True, False, True]), np.zeros(4, bool),
     ),

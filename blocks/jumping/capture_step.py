@@ -2,16 +2,72 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array2D, Flags1D, Indices1D
+from ...mathematics.capture_step import (
+    capture_point,
+    choose_foothold,
+    farthest_foot,
+    limit_foothold,
+    spread_to_feet,
+    support_margin,
+    swing_points,
+)
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import mean_heading
 from ...robots.kinematics import foot_sides, standing_feet
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, JumpReference, PhaseState
-from .capture_law import Feet, Memory, PhaseFields, Scratch, Settings, Terms, take_steps
+from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState
+
+_EARLIEST, _LATEST = 0.6, 1.5
+"""The share of a step's duration after which a contact ends it, and that at which it ends anyway."""
+_AIMED = 0.25
+"""The last share of a step in which the foothold stays as it is."""
+_NEARER = 0.005
+"""A foot is preferred if it comes nearer to its foothold by more than this [m]."""
+
+
+class StepParams(Parameters):
+    """The parameters of ``CaptureStep``."""
+
+    steps: int = live_parameter(0, ge=0, le=20, text="the most steps it takes; 0: it only stands")
+    margin: float = live_parameter(
+        0.015, unit="m", ge=0.0, text="how far outside the support the capture point must be"
+    )
+    confirmation: float = live_parameter(0.006, unit="s", ge=0.0, text="how long it must be there")
+    after: float = live_parameter(
+        0.08, unit="s", ge=0.0, text="time after touchdown before which no foot steps"
+    )
+    turn: float = live_parameter(
+        1.0, ge=0.0, le=1.0, text="share of the angular momentum that counts"
+    )
+    duration: float = live_parameter(0.13, unit="s", gt=0.04, le=1.0, text="of a step")
+    height: float = live_parameter(
+        0.015, unit="m", gt=0.0, le=0.2, text="how high the foot is lifted"
+    )
+    beyond: float = live_parameter(
+        0.1, ge=0.0, le=1.0, text="how much farther the foot goes than the capture point"
+    )
+    reach: float = live_parameter(
+        0.2, unit="m", gt=0.0, text="farthest place ahead of or behind the other feet"
+    )
+    apart: tuple[float, float] = live_parameter(
+        (0.6, 1.8), text="least and largest distance aside, in distances of the standing feet"
+    )
+    settle: float = live_parameter(
+        0.35, unit="s", ge=0.0, text="time from a step until the robot rises again"
+    )
+    flat: float = live_parameter(
+        0.0005,
+        unit="m",
+        ge=0.0,
+        text="height up to which the other points of a foot carry load while another foot steps",
+    )
 
 
 class StepMemory(Signal):
@@ -29,7 +85,29 @@ class StepMemory(Signal):
     foothold = Field(("n_feet", 3), unit="m", frame="world", text="where each foot last went")
 
 
-class CaptureStep(KernelBlock):
+class StepConstants(Signal):
+    """What steps need to know of the robot."""
+
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    side = Field("n_feet", unit="", text="1: the foot is on the left, -1: right, 0: in the middle")
+    apart = Field("n_feet", unit="m", text="distance aside from the other feet in standing")
+    offset = Field(("n_contacts", 3), unit="m", frame="body", text="the points from their soles")
+    all = Field("n_feet", dtype="bool", text="true")
+    mass = Field(unit="kg", text="that of the description")
+    period = Field(unit="s", text="of a tick")
+
+
+class StepScratch(Signal):
+    """What a tick computes on its way."""
+
+    capture = Field(2, unit="m", frame="world", text="the capture point")
+    nearest = Field(2, unit="m", frame="world", text="where the other feet are nearest to it")
+    other = Field(2, unit="m", frame="world", text="for a moment")
+    middle = Field(3, unit="m", frame="world", text="of the other feet")
+    standing = Field("n_contacts", dtype="bool", text="points of feet that stand")
+
+
+class CaptureStep(Block):
     """Takes a step after touchdown, or several, where the feet can no longer hold the robot.
 
     It passes the phase on unchanged unless a foot steps. After the last planned touchdown it
@@ -67,47 +145,12 @@ class CaptureStep(KernelBlock):
     stood. A robot with a single foot takes none.
     """
 
-    class Params(Parameters):
-        steps: int = live_parameter(
-            0, ge=0, le=20, text="the most steps it takes; 0: it only stands"
-        )
-        margin: float = live_parameter(
-            0.015, unit="m", ge=0.0, text="how far outside the support the capture point must be"
-        )
-        confirmation: float = live_parameter(
-            0.006, unit="s", ge=0.0, text="how long it must be there"
-        )
-        after: float = live_parameter(
-            0.08, unit="s", ge=0.0, text="time after touchdown before which no foot steps"
-        )
-        turn: float = live_parameter(
-            1.0, ge=0.0, le=1.0, text="share of the angular momentum that counts"
-        )
-        duration: float = live_parameter(0.13, unit="s", gt=0.04, le=1.0, text="of a step")
-        height: float = live_parameter(
-            0.015, unit="m", gt=0.0, le=0.2, text="how high the foot is lifted"
-        )
-        beyond: float = live_parameter(
-            0.1, ge=0.0, le=1.0, text="how much farther the foot goes than the capture point"
-        )
-        reach: float = live_parameter(
-            0.2, unit="m", gt=0.0, text="farthest place ahead of or behind the other feet"
-        )
-        apart: tuple[float, float] = live_parameter(
-            (0.6, 1.8), text="least and largest distance aside, in distances of the standing feet"
-        )
-        settle: float = live_parameter(
-            0.35, unit="s", ge=0.0, text="time from a step until the robot rises again"
-        )
-        flat: float = live_parameter(
-            0.0005,
-            unit="m",
-            ge=0.0,
-            text="height up to which the other points of a foot carry load while another foot steps",
-        )
-
+    Params = StepParams
+    Constants = StepConstants
+    Scratch = StepScratch
     needs = ("feet",)
-    params: Params
+    params: StepParams
+    constants: StepConstants
     before = Input(PhaseState, text="the phase and the stance points by plan and contacts")
     reference = Input(JumpReference, text="the plan, for whether another jump follows")
     terms = Input(DynamicsTerms, text="the present state")
@@ -115,46 +158,241 @@ class CaptureStep(KernelBlock):
     memory = State(StepMemory, text="the step under way, and those taken")
 
     def setup(self) -> None:
-        robot = self.robot
+        robot, constants = self.robot, self.constants
         stance = standing_feet(robot)
-        n_feet, n_contacts = len(robot.feet), len(robot.contacts)
-        foot_of_point = np.array(robot.foot_of_contact(), dtype=np.int64)
-        apart = np.zeros(n_feet)
+        constants.foot_of_point[:] = robot.foot_of_contact()
+        constants.side[:] = foot_sides(stance)
+        constants.all[:] = True
+        constants.mass, constants.period = robot.total_mass, self.period
         for foot, place in enumerate(stance):
             others = np.delete(stance, foot, axis=0)
             if len(others):
-                apart[foot] = abs(float(place[1]) - float(others[:, 1].mean()))
-        offset = np.array(
-            [
-                np.array(point.position) - np.array(robot.feet[foot].sole)
-                for point, foot in zip(robot.contacts, foot_of_point, strict=True)
-            ]
-        )
-        self._settings = Settings._make(
-            np.zeros(2 if name == "apart" else 1, np.int64 if name == "steps" else np.float64)
-            for name in Settings._fields
-        )
-        self.on_parameters()
-        stepping = KernelCall(
-            take_steps,
-            PhaseFields(*(getattr(self.before, name) for name in PhaseFields._fields)),
-            self.reference.time,
-            self.reference.lift_off_time,
-            Terms(*(getattr(self.terms, name) for name in Terms._fields)),
-            self._settings,
-            Feet(
-                foot_of_point, np.array(foot_sides(stance)), apart, offset, robot.total_mass,
-                self.period,
-            ),
-            Memory(*(getattr(self.memory, name) for name in Memory._fields)),
-            PhaseFields(*(getattr(self.phase, name) for name in PhaseFields._fields)),
-            Scratch(
-                np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(3), np.zeros(n_contacts, np.bool_),
-                np.ones(n_feet, np.bool_),
-            ),
-        )  # fmt: skip
-        self.kernel_calls = (stepping,)
+                constants.apart[foot] = abs(float(place[1]) - float(others[:, 1].mean()))
+        for k, (point, foot) in enumerate(
+            zip(robot.contacts, robot.foot_of_contact(), strict=True)
+        ):
+            constants.offset[k] = np.array(point.position) - np.array(robot.feet[foot].sole)
 
-    def on_parameters(self) -> None:
-        for name in Settings._fields:
-            getattr(self._settings, name)[:] = getattr(self.params, name)
+    @kernel
+    @staticmethod
+    def step(
+        before: PhaseState,
+        reference: JumpReference,
+        terms: DynamicsTerms,
+        phase: PhaseState,
+        memory: StepMemory,
+        params: StepParams,
+        constants: StepConstants,
+        scratch: StepScratch,
+    ) -> None:
+        phase.phase = before.phase
+        phase.time_in_phase = before.time_in_phase
+        phase.time_to_touchdown = before.time_to_touchdown
+        phase.time_since_touchdown = before.time_since_touchdown
+        phase.stance[:] = before.stance
+        phase.stepping[:] = False
+        phase.step_acceleration[:] = 0.0
+        lands = before.phase == Phase.LANDING or before.phase == Phase.RECOVER
+        goes_on = reference.lift_off_time > reference.time
+        if not lands or goes_on or constants.side.shape[0] < 2:
+            memory.foot = 0
+            memory.taken = 0
+            memory.outside = 0.0
+            return
+        rate = find_capture_point(before, terms, params, constants, memory, scratch)
+        if memory.foot == 0:
+            judge_support(before, terms, params, constants, memory, scratch, rate)
+        if memory.foot > 0:
+            swing_foot(before, terms, params, constants, memory, phase, scratch, rate)
+        hold_low(before, params, memory, phase, before.phase)
+
+
+@kernel
+def find_capture_point(
+    before: PhaseState,
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    scratch: StepScratch,
+) -> float:
+    """Compute the capture point; returns the pendulum's frequency [1/s]."""
+    any_stance = False
+    for i in range(before.stance.shape[0]):
+        any_stance = any_stance or before.stance[i]
+    ground, count = 0.0, 0
+    for i in range(before.stance.shape[0]):
+        if before.stance[i] or not any_stance:
+            ground += terms.contact_position[i, 2]
+            count += 1
+    ground /= count
+    if memory.foot == 0:
+        memory.ground = ground
+    mass = terms.mass_matrix[0, 0]
+    return capture_point(
+        terms.com, terms.com_velocity, terms.angular_momentum,
+        mass if mass != 0.0 else constants.mass, terms.com[2] - ground,
+        float(params.turn), scratch.capture,
+    )  # fmt: skip
+
+
+@kernel
+def judge_support(
+    before: PhaseState,
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    scratch: StepScratch,
+    rate: float,
+) -> None:
+    """Begin a step where the capture point has been outside the support for long enough."""
+    n_feet = constants.side.shape[0]
+    stands = spread_to_feet(before.stance, constants.foot_of_point, n_feet, scratch.standing)
+    margin = support_margin(
+        terms.contact_position, scratch.standing, scratch.capture[0],
+        scratch.capture[1],
+    )  # fmt: skip
+    since = before.time_since_touchdown
+    if stands < n_feet or since < params.after or margin > -params.margin:
+        memory.outside = 0.0
+        return
+    memory.outside = memory.outside + constants.period
+    short = memory.outside < params.confirmation
+    if memory.taken >= params.steps or short:
+        return
+    if memory.taken == 0:
+        memory.heading = mean_heading(terms.foot_rotation, constants.all)
+    memory.foot = 1 + best_foot(terms, params, constants, memory, scratch, rate)
+    memory.elapsed = 0.0
+    memory.outside = 0.0
+
+
+@kernel
+def best_foot(
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    scratch: StepScratch,
+    rate: float,
+) -> int:
+    """The foot that comes nearest to its foothold; of equals the one that carries least."""
+    n_feet, best, least = constants.side.shape[0], 0, math.inf
+    first = farthest_foot(
+        terms.contact_position, constants.foot_of_point, n_feet, scratch.capture, scratch.other
+    )
+    for number in range(n_feet):
+        foot = (first + number) % n_feet
+        left = params.duration
+        missing = aim_step(terms, params, constants, memory, scratch, foot, rate, left)
+        if missing < least - _NEARER:
+            best, least = foot, missing
+    return best
+
+
+@kernel
+def aim_step(
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    scratch: StepScratch,
+    foot: int,
+    rate: float,
+    left: float,
+) -> float:
+    """Choose the foothold of a foot that has ``left`` seconds to go; returns how far it is from where
+    it should be [m]."""
+    place, n_feet, middle = memory.foothold[foot], constants.side.shape[0], scratch.middle
+    choose_foothold(
+        scratch.capture, rate, left, params.beyond, terms.contact_position,
+        constants.foot_of_point, foot, n_feet, scratch.nearest, scratch.other, place,
+    )  # fmt: skip
+    chosen_x, chosen_y = place[0], place[1]
+    for k in range(3):
+        middle[k] = 0.0
+        for other in range(n_feet):
+            if other != foot:
+                middle[k] = middle[k] + terms.foot_position[other, k] / (n_feet - 1)
+    apart = constants.apart[foot]
+    limit_foothold(
+        middle, memory.heading, constants.side[foot], params.reach,
+        params.apart[0] * apart, params.apart[1] * apart, place,
+    )  # fmt: skip
+    x, y = place[0] - chosen_x, place[1] - chosen_y
+    return math.sqrt(x * x + y * y)
+
+
+@kernel
+def swing_foot(
+    before: PhaseState,
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    out: PhaseState,
+    scratch: StepScratch,
+    rate: float,
+) -> None:
+    """Move the foot of the step under way, or end the step."""
+    foot, duration = memory.foot - 1, params.duration
+    elapsed = memory.elapsed + constants.period
+    memory.elapsed = elapsed
+    left = duration - elapsed
+    touched = False
+    for i in range(before.stance.shape[0]):
+        if constants.foot_of_point[i] == foot and before.stance[i]:
+            touched = True
+    if (touched and elapsed > _EARLIEST * duration) or elapsed > _LATEST * duration:
+        memory.foot = 0
+        memory.taken = memory.taken + 1
+        memory.last = before.time_since_touchdown
+        return
+    if left > _AIMED * duration:
+        aim_step(terms, params, constants, memory, scratch, foot, rate, left)
+    place = memory.foothold[foot]
+    place[2] = memory.ground
+    swing_points(
+        foot, constants.foot_of_point, constants.offset, place, memory.heading, elapsed, duration,
+        params.height, terms.contact_position, terms.contact_velocity, out.stance,
+        out.stepping, out.step_acceleration,
+    )  # fmt: skip
+    leave_hovering(
+        terms.contact_position, constants.foot_of_point, params.flat, out.stance,
+        scratch.standing,
+    )  # fmt: skip
+
+
+@kernel
+def leave_hovering(
+    position: Array2D, foot_of_point: Indices1D, flat: float, stance: Flags1D, standing: Flags1D
+) -> None:
+    """Take points out of the ``stance`` that are higher than the lowest point of their foot in it by
+    more than ``flat`` [m]; ``standing`` is scratch, and all are (n_contacts,)."""
+    n = stance.shape[0]
+    for i in range(n):
+        standing[i] = stance[i]
+        for j in range(n):
+            if foot_of_point[j] == foot_of_point[i] and stance[j]:
+                low = position[j, 2]
+                standing[i] = standing[i] and position[i, 2] <= low + flat
+    for i in range(n):
+        stance[i] = standing[i]
+
+
+@kernel
+def hold_low(
+    before: PhaseState, params: StepParams, memory: StepMemory, out: PhaseState, phase: int
+) -> None:
+    """Stay in LANDING while the robot steps and until it has settled."""
+    stepping = memory.foot > 0
+    if (not stepping and memory.taken == 0) or phase != Phase.RECOVER:
+        return
+    since = before.time_since_touchdown
+    risen = since - memory.last - params.settle
+    if stepping or risen < 0.0:
+        out.phase = Phase.LANDING
+        out.time_in_phase = since
+    else:
+        out.time_in_phase = min(before.time_in_phase, risen)
