@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,11 @@ from ...runtime.language.block import Block, Clock, Context, Input, Misfit, Outp
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
+
+if TYPE_CHECKING:
+    Numbers = Any  # a kernel sees an array, other methods a list
+else:
+    Numbers = list[float]
 
 
 def unsorted_points(name: str, points: Sequence[float]) -> Iterable[Misfit]:
@@ -44,8 +49,8 @@ class LookupTable(UnitFromParameters, Block):
     class Params(VectorParameters, SourceParameters):
         in_unit = ("values",)
 
-        points: list[float] = parameter(text="inputs, rising", min_length=2)
-        values: list[float] = parameter(text="the output at each of them", min_length=2)
+        points: Numbers = parameter(text="inputs, rising", min_length=2)
+        values: Numbers = parameter(text="the output at each of them", min_length=2)
         beyond: Literal["clamp", "extrapolate"] = parameter(
             "clamp", text="what holds beyond the first and last point"
         )
@@ -101,7 +106,7 @@ class LookupGrid(UnitFromParameters, Block):
         axes: list[list[float]] = parameter(
             text="for every variable its points, rising", min_length=1, max_length=8
         )
-        values: list[float] = parameter(text="the table, the last variable fastest")
+        values: Numbers = parameter(text="the table, the last variable fastest")
         beyond: Literal["clamp", "extrapolate"] = parameter(
             "clamp", text="what holds beyond the first and last points"
         )

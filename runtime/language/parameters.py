@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
@@ -78,7 +78,10 @@ def _convert(value: Any, unit: str) -> Any:
     return value
 
 
-ScalarOrVector = float | list[float]
+if TYPE_CHECKING:
+    ScalarOrVector = Any  # a kernel sees an array, other methods what pydantic has read
+else:
+    ScalarOrVector = float | list[float]
 """One number for all elements of a vector, or a list with one number for each of its ``n`` elements.
 A kernel sees a vector of ``n`` elements."""
 
