@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,8 @@ from pydantic import AfterValidator, ValidationInfo, field_validator, model_vali
 
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Misfit
-from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import ScalarOrVector as ScalarOrVector  # noqa: PLC0414
 from ...runtime.language.quantities import Carried, Given, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
@@ -228,7 +229,10 @@ class UnitOfProduct:
         return {"y": u and u.times(read_unit(params.unit))}
 
 
-Matrix = list[list[float]]
+if TYPE_CHECKING:
+    Matrix = Any  # a kernel sees an array, other methods a list
+else:
+    Matrix = list[list[float]]
 """A list of rows."""
 
 
