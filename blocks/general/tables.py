@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,6 @@ from ...runtime.language.block import Block, Clock, Context, Input, Misfit, Outp
 from ...runtime.language.parameters import Numbers, Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
-
-if TYPE_CHECKING:
-    Numbers = Any  # a kernel sees an array, other methods a list
-else:
-    Numbers = list[float]
 
 
 def unsorted_points(name: str, points: Sequence[float]) -> Iterable[Misfit]:

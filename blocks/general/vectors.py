@@ -11,8 +11,7 @@ from pydantic import AfterValidator, ValidationInfo, field_validator, model_vali
 
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Misfit
-from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.parameters import ScalarOrVector as ScalarOrVector  # noqa: PLC0414
+from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.quantities import Carried, Given, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit

@@ -78,7 +78,7 @@ def _convert(value: Any, unit: str) -> Any:
     return value
 
 
-if TYPE_CHECKING:  # in a kernel these are arrays
+if TYPE_CHECKING:  # arrays in a kernel, what pydantic has read elsewhere
     ScalarOrVector: TypeAlias = Any
     Numbers: TypeAlias = Any
     TwoNumbers: TypeAlias = Any
