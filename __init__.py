@@ -1,4 +1,4 @@
-"""aloft: a block-diagram control framework for robots that leave the ground.
+"""aloft: a block-diagram control framework for robots and other feedback loops.
 
 What users need is here; it is imported when it is first asked for, so ``import aloft`` is free.
 """

@@ -233,7 +233,7 @@ def violation(n: int, program: Program, row: int, x: Array1D) -> float:
     total = -program.bound[row]
     for k in range(n):
         total += program.matrix[row, k] * x[k]
-    return total
+    return float(total)
 
 
 @kernel

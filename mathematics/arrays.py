@@ -6,7 +6,7 @@ vector, ``Array2D`` a matrix, ``Vector3`` a vector of three. ``Array``, ``Flags`
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,19 @@ Indices: TypeAlias = NDArray[np.int64]
 Counts: TypeAlias = NDArray[np.int64]
 """As ``Indices``, for numbers that say how many."""
 
-Array0D: TypeAlias = Annotated[Array, Rank(0, float)]
+if TYPE_CHECKING:  # a type checker takes the number x[()] for an array
+    Array0D: TypeAlias = Any
+    Flags0D: TypeAlias = Any
+    Indices0D: TypeAlias = Any
+else:
+    Array0D: TypeAlias = Annotated[Array, Rank(0, float)]
+    Flags0D: TypeAlias = Annotated[Flags, Rank(0, bool)]
+    Indices0D: TypeAlias = Annotated[Indices, Rank(0, int)]
 Array1D: TypeAlias = Annotated[Array, Rank(1, float)]
 Array2D: TypeAlias = Annotated[Array, Rank(2, float)]
 Array3D: TypeAlias = Annotated[Array, Rank(3, float)]
-Flags0D: TypeAlias = Annotated[Flags, Rank(0, bool)]
 Flags1D: TypeAlias = Annotated[Flags, Rank(1, bool)]
 Flags2D: TypeAlias = Annotated[Flags, Rank(2, bool)]
-Indices0D: TypeAlias = Annotated[Indices, Rank(0, int)]
 Indices1D: TypeAlias = Annotated[Indices, Rank(1, int)]
 Indices2D: TypeAlias = Annotated[Indices, Rank(2, int)]
 

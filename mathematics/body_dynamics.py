@@ -249,7 +249,7 @@ def turn_inertia(inertia: Array1D, rotation: Matrix3, turned: Matrix3, out: Arra
 def _product(a: Array2D, b: Array2D, row: int, other: int) -> float:
     """Row ``row`` of ``a`` times row ``other`` of ``b``, both (3, 3)."""
     first = a[row, 0] * b[other, 0] + a[row, 1] * b[other, 1]
-    return first + float(a[row, 2]) * float(b[other, 2])
+    return float(first + a[row, 2] * b[other, 2])
 
 
 @kernel

@@ -37,7 +37,7 @@ def interpolate(points: Array1D, values: Array1D, at: float, clamp: bool) -> flo
     share = (at - x0) / (x1 - x0)
     if clamp:
         share = min(max(share, 0.0), 1.0)
-    return float(values[k]) * (1.0 - share) + float(values[k + 1]) * share
+    return float(values[k] * (1.0 - share) + values[k + 1] * share)
 
 
 @kernel

@@ -99,7 +99,7 @@ def lowest_height(points: Array2D) -> float:
     lowest = points[0, 2]
     for i in range(1, points.shape[0]):
         lowest = min(lowest, points[i, 2])
-    return lowest
+    return float(lowest)
 
 
 @kernel

@@ -181,7 +181,7 @@ def follow_foot(
         angles,
     )
     target.reachable[number] = inside
-    velocity[:] = min(max(foot.velocity, -_FASTEST), _FASTEST)
+    velocity[:] = min(max(foot.velocity, -_FASTEST), _FASTEST)  # type: ignore[assignment]  # of each element
     if settings.slides[0] and not inside:
         slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,

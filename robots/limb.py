@@ -226,7 +226,7 @@ def aim(position: Vector3, rotation: Matrix3, target: Rows3) -> None:
         rotation: from foot to base (3, 3); its first and then its second axis are kept.
         target: out, the place and then the rows of the rotation matrix, (4, 3).
     """
-    target[0, :] = min(max(position, -_FAR), _FAR)
+    target[0, :] = min(max(position, -_FAR), _FAR)  # type: ignore[assignment]  # of each element
     x0, x1, x2 = unit(rotation[0, 0], rotation[1, 0], rotation[2, 0], 1.0, 0.0, 0.0)
     y0, y1, y2 = unit(rotation[0, 1], rotation[1, 1], rotation[2, 1], 0.0, 1.0, 0.0)
     part = x0 * y0 + x1 * y1 + x2 * y2
@@ -308,7 +308,7 @@ def foot_error(
     scale = length if sine < 1e-7 else length * math.atan2(sine, cosine) / sine
     tx, ty, tz = scale * tx, scale * ty, scale * tz
     error[0], error[1], error[2], error[3], error[4], error[5] = ex, ey, ez, tx, ty, tz
-    return ex * ex + ey * ey + ez * ez + tx * tx + ty * ty + tz * tz
+    return float(ex * ex + ey * ey + ez * ez + tx * tx + ty * ty + tz * tz)
 
 
 @kernel

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Field,
     SerializationInfo,
     SerializerFunctionWrapHandler,
     model_serializer,
@@ -225,7 +226,7 @@ class Sensors(Part):
 
     model_config = ConfigDict(extra="allow")
 
-    __pydantic_extra__: dict[str, MountedSensorPart]
+    __pydantic_extra__: dict[str, MountedSensorPart] = Field(init=False)
 
     imu: bool = True
     switches: bool = True

@@ -79,7 +79,7 @@ def make_runs(
     run's process is an error here, but it is not kept, so the run is tried again the next time.
 
     Raises:
-        AloftError: as ``runtime.jobs.job_results``.
+        AloftError: as ``batch.jobs.job_results``.
     """
     missing = {run.key: run for run in runs if run.key not in journal.outcomes}
     for key in dict.fromkeys(run.key for run in runs if run.key not in missing):

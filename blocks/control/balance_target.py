@@ -20,11 +20,9 @@ from ...mathematics.rotations import (
 )
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, ThreeNumbers, live_parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference, Phase, PhaseState, WholeBodyTarget
-
-Vector = tuple[float, float, float]
 
 
 class BalanceMemory(Signal):
@@ -82,12 +80,12 @@ class BalanceParameters(Parameters):
     trim_limit: float = live_parameter(
         0.08, unit="rad", ge=0.0, le=0.5, text="largest trim about each axis"
     )
-    velocity_correction: Vector = live_parameter(
+    velocity_correction: ThreeNumbers = live_parameter(
         (0.0, 0.0, 0.0),
         unit="m/s",
         text="added to the planned velocity of the centre of mass at lift-off, in the plan's axes",
     )
-    momentum_correction: Vector = live_parameter(
+    momentum_correction: ThreeNumbers = live_parameter(
         (0.0, 0.0, 0.0),
         unit="N m s",
         text="added to the planned angular momentum at lift-off, in the plan's axes",
@@ -323,11 +321,11 @@ def correct_lift_off(
     duration = max(elapsed + left, period)
     share = min(elapsed / duration, 1.0)
     vector = scratch.vector
-    turn_about_vertical(params.momentum_correction, turn, vector)  # type: ignore[arg-type]  # an array here
+    turn_about_vertical(params.momentum_correction, turn, vector)
     add_quadratic_growth(
         vector, share, duration, target.angular_momentum, target.angular_momentum_rate
     )
-    turn_about_vertical(params.velocity_correction, turn, vector)  # type: ignore[arg-type]  # likewise
+    turn_about_vertical(params.velocity_correction, turn, vector)
     add_quadratic_growth(vector, share, duration, target.com_velocity, target.com_acceleration)
     target.com[:] = target.com + vector * (duration * share * share * share / 3.0)
 

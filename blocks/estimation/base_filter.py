@@ -140,7 +140,7 @@ class Estimator(NamedTuple):
 @kernel
 def limit(values: Array1D, largest: float, out: Array1D) -> None:
     """Values within plus and minus ``largest``; what is not a number stays so."""
-    out[:] = max(min(values, largest), -largest)
+    out[:] = max(min(values, largest), -largest)  # type: ignore[assignment]  # of each element
 
 
 @kernel

@@ -9,7 +9,7 @@ from ...runtime.language.signals import Field, Signal
 
 
 class InvariantEstimate(Signal):
-    """The state of the filter. The order of the error is that of ``invariant_contacts``."""
+    """The state of the filter. The order of the error is that of ``mathematics/invariant_filter``."""
 
     orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
     vectors = Field(

@@ -11,14 +11,13 @@ import numpy as np
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter, parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
     InUnit,
     Matrix,
-    ScalarOrVector,
     SourceParameters,
     UnitOfProduct,
     Vector,

@@ -300,7 +300,7 @@ class TransferFunction(UnitOfProduct, Block):
             constants.a,
             constants.b,
             constants.c,
-            constants.d,
+            float(constants.d),
             u.value,
             x.value,
             scratch.next,

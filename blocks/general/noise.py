@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from ...runtime.language.block import Block, Output, State
-from ...runtime.language.parameters import live_parameter, parameter
+from ...runtime.language.parameters import ScalarOrVector, live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
-    ScalarOrVector,
     SourceParameters,
     UnitFromParameters,
     Vector,

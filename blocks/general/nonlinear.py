@@ -9,13 +9,12 @@ import numpy as np
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
     Bounded,
     Bounds,
     Flags,
-    ScalarOrVector,
     SourceParameters,
     UnitFromParameters,
     UnitOfInput,

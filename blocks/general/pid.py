@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter
 from ...runtime.language.quantities import Carried, Given
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
@@ -14,7 +14,6 @@ from .vectors import (
     Bounds,
     Flag,
     InUnit,
-    ScalarOrVector,
     Vector,
     VectorParameters,
 )

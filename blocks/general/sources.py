@@ -9,10 +9,9 @@ from typing import Any, Literal
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Output
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
-    ScalarOrVector,
     SourceParameters,
     UnitFromParameters,
     Vector,

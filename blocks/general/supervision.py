@@ -12,14 +12,13 @@ from ...mathematics.arrays import Flags1D, Indices1D
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Input, Metric, Misfit, Output, State
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
     Bounded,
     Bounds,
     Flag,
     Flags,
-    ScalarOrVector,
     Seconds,
     Vector,
     VectorParameters,

@@ -16,7 +16,7 @@ from ...mathematics.interpolation import interpolate, interpolate_grid, interval
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Context, Input, Misfit, Output
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Numbers, Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
 
@@ -44,8 +44,8 @@ class LookupTable(UnitFromParameters, Block):
     class Params(VectorParameters, SourceParameters):
         in_unit = ("values",)
 
-        points: list[float] = parameter(text="inputs, rising", min_length=2)
-        values: list[float] = parameter(text="the output at each of them", min_length=2)
+        points: Numbers = parameter(text="inputs, rising", min_length=2)
+        values: Numbers = parameter(text="the output at each of them", min_length=2)
         beyond: Literal["clamp", "extrapolate"] = parameter(
             "clamp", text="what holds beyond the first and last point"
         )
@@ -101,7 +101,7 @@ class LookupGrid(UnitFromParameters, Block):
         axes: list[list[float]] = parameter(
             text="for every variable its points, rising", min_length=1, max_length=8
         )
-        values: list[float] = parameter(text="the table, the last variable fastest")
+        values: Numbers = parameter(text="the table, the last variable fastest")
         beyond: Literal["clamp", "extrapolate"] = parameter(
             "clamp", text="what holds beyond the first and last points"
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +118,7 @@ class Bounds(Signal):
 class Bounded:
     """The base of blocks whose parameters ``lower`` and ``upper`` bound ``n`` elements."""
 
-    Constants = Bounds
+    Constants: ClassVar[type[Signal] | None] = Bounds
 
     @classmethod
     def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
@@ -228,7 +228,10 @@ class UnitOfProduct:
         return {"y": u and u.times(read_unit(params.unit))}
 
 
-Matrix = list[list[float]]
+if TYPE_CHECKING:
+    Matrix = Any  # a kernel sees an array, other methods a list
+else:
+    Matrix = list[list[float]]
 """A list of rows."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import pydantic
 
@@ -35,7 +35,7 @@ from ...mathematics.rotations import (
 from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Block, Input, Misfit, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
 from .landing_prediction import (
@@ -57,7 +57,10 @@ def _three(value: object) -> object:
 
 
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
-Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
+if TYPE_CHECKING:  # in a kernel this is an array
+    Shares: TypeAlias = Any
+else:
+    Shares = Annotated[tuple[Share, Share, Share], pydantic.BeforeValidator(_three)]
 
 
 class LandingParams(PredictionGains):
@@ -67,16 +70,16 @@ class LandingParams(PredictionGains):
         "deviation",
         text="feed back the measured momentum, or its deviation from the plan; or predict",
     )
-    w_l: tuple[float, float] = live_parameter(
+    w_l: TwoNumbers = live_parameter(
         (0.03, 0.04), unit="s/kg", text="W_l: metres per linear momentum along x and y"
     )
-    w_k: tuple[float, float] = live_parameter(
+    w_k: TwoNumbers = live_parameter(
         (0.0, 0.0), unit="s/(kg m)", text="W_k: metres per angular momentum about y and x"
     )
     w_c: float = live_parameter(
         0.04, unit="s/kg", ge=0.0, text="W_c: sideways clearance per lateral momentum"
     )
-    p_max: tuple[float, float] = live_parameter(
+    p_max: TwoNumbers = live_parameter(
         (0.15, 0.16), unit="m", text="farthest places ahead and aside the leg can reach"
     )
     limits_about: Literal["com", "stance"] = parameter(

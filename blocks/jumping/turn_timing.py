@@ -67,7 +67,7 @@ class Pose(NamedTuple):
 
 
 class Rotation(NamedTuple):
-    """The fields of ``planner.library.flight_rotation.FlightRotation``."""
+    """The fields of ``planner.library.jump_table.FlightRotation``."""
 
     time: Array
     rate: Array

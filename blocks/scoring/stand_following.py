@@ -128,7 +128,7 @@ def largest_of(values: Array1D) -> float:
     largest = values[0]
     for k in range(1, values.shape[0]):
         largest = max(largest, values[k])
-    return largest
+    return float(largest)
 
 
 @kernel
@@ -137,7 +137,7 @@ def largest_magnitude(values: Array1D) -> float:
     largest = abs(values[0])
     for k in range(1, values.shape[0]):
         largest = max(largest, abs(values[k]))
-    return largest
+    return float(largest)
 
 
 @kernel

@@ -59,7 +59,7 @@ from .row_codec import unpack, unpack_bytes
 
 MOST_THREADS = 4
 """Threads that unpack rows: most of the work is done outside of Python."""
-StageFunction = tuple[NDArray[np.int64], NDArray[np.uint8]]
+TickRows = tuple[NDArray[np.int64], NDArray[np.uint8]]
 """Ticks (n,) and rows (n, bytes)."""
 
 
@@ -101,7 +101,7 @@ class PackedRows:
         found = [np.arange(m.first, m.last + 1, dtype=np.int64) for m in self._messages]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
 
-    def pieces(self, first: int, last: int) -> Iterator[StageFunction]:
+    def pieces(self, first: int, last: int) -> Iterator[TickRows]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
         begin = bisect_left(self._lasts, first)
         for message in self._messages[begin:]:
@@ -247,7 +247,7 @@ class RecordedRun:
         """
         return self._source.rows()
 
-    def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[StageFunction]:
+    def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[TickRows]:
         """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
         a time and each read from the file when it is asked for."""
         ticks = self.ticks
@@ -258,7 +258,7 @@ class RecordedRun:
 
     def batches(self, least: int = 1) -> Iterator[RecordedRows]:
         """All ticks in order, at least ``least`` at a time but for the last batch; none is kept."""
-        waiting: list[StageFunction] = []
+        waiting: list[TickRows] = []
         for piece in self.pieces():
             waiting.append(piece)
             if sum(len(ticks) for ticks, _ in waiting) >= least:
@@ -271,12 +271,12 @@ class RecordedRun:
         """A batch without ticks."""
         return self._batch([(np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8))])
 
-    def _batch(self, pieces: list[StageFunction]) -> RecordedRows:
+    def _batch(self, pieces: list[TickRows]) -> RecordedRows:
         ticks, rows = zip(*pieces, strict=True)
         layout = self.header.bus.layout()
         return RecordedRows(self.header, np.concatenate(ticks), np.concatenate(rows), layout)
 
-    def window(self, first: int, last: int) -> StageFunction:
+    def window(self, first: int, last: int) -> TickRows:
         """The ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n, bytes)."""
         found = list(self.pieces(first, last))
         if not found:

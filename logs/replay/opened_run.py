@@ -248,7 +248,7 @@ def _folder(recording: Path, source: Path) -> Path:
 
 
 class TickValues:
-    """See ``runtime.drawing.values.Values``.
+    """See ``runtime.drawing.page.Values``.
 
     Args:
         run: a recording with one tick or more.

@@ -62,7 +62,11 @@ class Expressions:
         if isinstance(node, ast.UnaryOp):
             return self._kind(node.operand)
         if isinstance(node, ast.IfExp):
-            return self._kind(node.body)
+            return self._widest([node.body, node.orelse, node.test])
+        if isinstance(node, ast.Compare):
+            return self._widest([node.left, *node.comparators])
+        if isinstance(node, ast.BoolOp):
+            return self._widest(node.values)
         if isinstance(node, ast.Call):
             if self._is_cross(node):
                 return ArrayKind((3,))
@@ -70,7 +74,16 @@ class Expressions:
             if self._applies_to_elements(node) and kinds:
                 return max(kinds, key=lambda kind: kind.rank)
             return NUMBER
-        return NUMBER if isinstance(node, ast.Constant | ast.Compare | ast.BoolOp) else None
+        return NUMBER if isinstance(node, ast.Constant) else None
+
+    def _widest(self, nodes: list[ast.expr]) -> Kind:
+        """The kind of what is made of each element of some expressions: an array if one is."""
+        arrays = [kind for each in nodes if isinstance(kind := self._kind(each), ArrayKind)]
+        arrays = [kind for kind in arrays if kind.rank]
+        if arrays:
+            return max(arrays, key=lambda kind: kind.rank)
+        kind = self._kind(nodes[0])
+        return NUMBER if isinstance(kind, ArrayKind) else kind
 
     def _kind_of_part(self, node: ast.Subscript) -> Kind:
         whole = self._kind(node.value)

@@ -475,7 +475,7 @@ class ExactDynamics:
         self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
     ) -> list[tuple[float, Array, Array]]:
         """The motion over one interval from the state (q, v) under constant contact forces, see
-        ``pushing``, or without any, see ``coasting``.
+        ``push``, or without any, see ``coast``.
 
         Returns time since the interval began [s], q and v after every step; ``q`` is followed as
         position and quaternion, and the joints' part of both is the planned one.

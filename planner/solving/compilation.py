@@ -243,7 +243,7 @@ class SolveOptions:
     Attributes:
         warm_start: a plan of a near task, on any grid; one that goes through other phases is not
             used. A plan of this very task that failed the validity check is solved again on finer
-            intervals (see ``refinement``).
+            intervals (see ``solve.finer_knots``).
         progress: is told when functions are compiled, once for each robot.
         compiled: whether functions are compiled where there is a compiler.
         solver: ``fatrop`` or ``ipopt`` to insist on one of them.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
@@ -78,9 +78,18 @@ def _convert(value: Any, unit: str) -> Any:
     return value
 
 
-ScalarOrVector = float | list[float]
-"""One number for all elements of a vector, or a list with one number for each of its ``n`` elements.
-A kernel sees a vector of ``n`` elements."""
+if TYPE_CHECKING:  # arrays in a kernel, what pydantic has read elsewhere
+    ScalarOrVector: TypeAlias = Any
+    Numbers: TypeAlias = Any
+    TwoNumbers: TypeAlias = Any
+    ThreeNumbers: TypeAlias = Any
+else:
+    ScalarOrVector = float | list[float]
+    Numbers = list[float]
+    TwoNumbers = tuple[float, float]
+    ThreeNumbers = tuple[float, float, float]
+"""``ScalarOrVector`` is one number for all elements of a vector, or a list with one number for each
+of its ``n`` elements. A kernel sees a vector of ``n`` elements."""
 
 
 class Parameters(BaseModel):

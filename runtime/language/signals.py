@@ -90,12 +90,13 @@ class Field:
         self.name = name
 
     # A field is a non-data descriptor: on a bound signal the view in the instance's own
-    # dictionary wins at full speed, and this method is only what tells a type checker so.
+    # dictionary wins at full speed, and this method is only what tells a type checker so. It says
+    # Any, because in a kernel a scalar field is a number.
     @overload
     def __get__(self, instance: None, owner: type) -> Field: ...
     @overload
-    def __get__(self, instance: Signal, owner: type) -> NDArray[Any]: ...
-    def __get__(self, instance: Signal | None, owner: type) -> Field | NDArray[Any]:
+    def __get__(self, instance: Signal, owner: type) -> Any: ...
+    def __get__(self, instance: Signal | None, owner: type) -> Any:
         if instance is None:
             return self
         raise AttributeError(f"{owner.__name__}.{self.name} is not bound to memory")

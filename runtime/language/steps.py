@@ -295,7 +295,9 @@ def _parameter_array(params: Parameters, name: str, kind: Kind) -> NDArray[Any]:
     value = getattr(params, name)
     if kind.words:
         return np.array(kind.words.index(value), np.int64)
-    array = np.array(value, {int: np.int64, bool: np.bool_, float: np.float64}[kind.element])
+    array: NDArray[Any] = np.array(
+        value, {int: np.int64, bool: np.bool_, float: np.float64}[kind.element]
+    )
     if array.ndim < kind.rank:  # one number for all elements of a vector
         return np.full(getattr(params, "n"), value, array.dtype)  # noqa: B009  declared by subclasses
     return array

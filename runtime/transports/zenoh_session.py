@@ -68,7 +68,7 @@ def prefix_of(graph: str) -> str:
 
 
 WATCH = "watch"
-"""What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``; see ``showing``."""
+"""What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``; see ``links.observer``."""
 
 
 def keys_from(placed: PlacedGraph, sender: str, receiver: str) -> list[str]:

@@ -49,6 +49,13 @@ def elementwise(a: Array1D, b: Array1D, s: float, out: Array1D) -> None:
 
 
 @kernel
+def choices(a: Array1D, contact: Flags1D, out: Array1D) -> None:
+    """A condition on each element chooses between numbers, and between elements."""
+    out[:] = 1.0 if contact else 0.0
+    out[:] += a if a > 0.5 and contact else -a
+
+
+@kernel
 def product(R: Array2D, v: Array1D, x: Array1D, out: Array1D) -> None:
     """Products of a matrix with an expression, on both sides."""
     out[:] = R @ (v - x) + R.T @ x - v @ R
@@ -105,6 +112,13 @@ def test_elementwise_statements_are_numpys() -> None:
     expected = a + s * b - (1.0 - s) * a / 3.0
     expected += np.abs(np.minimum(a, b)) / 2.0
     assert both(elementwise, make).tobytes() == expected.tobytes()
+
+
+def test_a_condition_holds_for_each_element() -> None:
+    def make() -> tuple[Any, ...]:
+        return np.array([0.2, 0.7, 0.9]), np.array([True, False, True]), np.zeros(3)
+
+    assert both(choices, make).tolist() == [1.0 - 0.2, -0.7, 1.0 + 0.9]
 
 
 def test_products_sum_from_the_first_to_the_last() -> None:
