@@ -34,7 +34,7 @@ class PseudoTerminal:
         self.path = os.ttyname(theirs)
         self._theirs = theirs
         self._write_lock = threading.Lock()
-        self._close_lock, self._closed = threading.Lock(), False
+        self._close_lock, self._stop_lock, self._closed = threading.Lock(), threading.Lock(), False
         self._wake, self._woken = os.pipe()
         self._thread = threading.Thread(target=self._serve, name=f"twin {self.path}", daemon=True)
         self._thread.start()
@@ -56,7 +56,9 @@ class PseudoTerminal:
 
     def stop(self) -> None:
         """Serve no more: from now on nothing is received, and what waits to be sent is dropped."""
-        os.write(self._woken, b"x")
+        with self._stop_lock:
+            if not self._closed:
+                os.write(self._woken, b"x")
 
     def close(self) -> None:
         """Close both sides: from now on reading and writing fail, as with an unplugged cable.
@@ -66,11 +68,12 @@ class PseudoTerminal:
         with self._close_lock:
             if self._closed:
                 return
-            self._closed = True
             self.stop()
             self._thread.join()
-            for descriptor in (self._ours, self._theirs, self._wake, self._woken):
-                os.close(descriptor)
+            with self._stop_lock:
+                self._closed = True
+                for descriptor in (self._ours, self._theirs, self._wake, self._woken):
+                    os.close(descriptor)
 
     def __enter__(self) -> Self:
         return self

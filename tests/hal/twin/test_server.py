@@ -115,3 +115,9 @@ def test_a_server_ends_while_its_packets_are_not_read() -> None:
     closing.start()
     closing.join(10.0)
     assert not closing.is_alive()
+
+
+def test_it_can_be_stopped_after_it_was_closed() -> None:
+    cable = PseudoTerminal(lambda sent: b"")
+    cable.close()
+    cable.stop()
