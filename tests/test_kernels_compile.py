@@ -34,7 +34,7 @@ from .kernel_samples import UNUSED
 ROOT = Path(__file__).parent.parent
 ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
-PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)}
+PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
     "blocks.signals.drive_conditions.conditions": "of an error byte, for people",
     "blocks.signals.drive_conditions.describe": "of an error byte, for people",
