@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,7 +226,10 @@ class Sensors(Part):
 
     model_config = ConfigDict(extra="allow")
 
-    __pydantic_extra__: dict[str, MountedSensorPart] = Field(init=False)
+    if TYPE_CHECKING:  # Pydantic takes no value for this name before 2.9; type checkers need one
+        __pydantic_extra__: dict[str, MountedSensorPart] = Field(init=False)
+    else:
+        __pydantic_extra__: dict[str, MountedSensorPart]
 
     imu: bool = True
     switches: bool = True
