@@ -323,7 +323,10 @@ class WholeBodyController(KernelBlock):
             first, tasks = 0, []
             for chosen, count, each in zip(self._chosen, counts, params[kind], strict=True):
                 rows = TaskRows(*(array[first : first + count] for array in self._rows))
-                ports = {name: getattr(self, name) for name in Task.inputs}
+                ports: dict[str, Any] = {
+                    "terms": self.terms, "target": self.target, "phase": self.phase,
+                    "joints": self.joints,
+                }  # fmt: skip
                 ports |= {own: getattr(self, name) for own, name in chosen.inputs.items()}
                 tasks.append(chosen.kind(each, rows, ports, self._frames, self.context))
                 first += count
