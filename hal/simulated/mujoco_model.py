@@ -35,10 +35,11 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet, contact_centres, joints_above
+from ...robots.kinematics import ball_feet, contact_centres
 from ..random_streams import Purpose, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
+from .geared_rotors import shared_motors, unsupported_motor
 from .scenes import Scene
 from .simulated_robot import SimulatorParameters
 
@@ -357,7 +358,7 @@ it takes longer than anything else before a run. Callers get copies."""
 
 def joint_armature(robot: RobotDescription) -> Array:
     """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
-    armature, shared = np.zeros(len(robot.joints)), _shared_motors(robot)
+    armature, shared = np.zeros(len(robot.joints)), shared_motors(robot)
     for motor, inertia in enumerate(robot.motors.rotor_inertia.tolist()):
         if motor not in shared:
             armature += inertia * robot.joint_to_motor[motor] ** 2
@@ -381,7 +382,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
     complaint = unsupported_motor(robot)
     if complaint:
         raise ValueError(f"{robot.name}: {complaint}")
-    for motor in _shared_motors(robot):
+    for motor in shared_motors(robot):
         tendon = spec.add_tendon(
             name=f"rotor/{robot.transmission.motors[motor]}",
             armature=float(robot.motors.rotor_inertia[motor]),
@@ -389,37 +390,3 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
         for joint, weight in zip(robot.joints, robot.joint_to_motor[motor].tolist(), strict=True):
             if weight:
                 tendon.wrap_joint(joint.name, weight)
-
-
-def unsupported_motor(robot: RobotDescription) -> str:
-    """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
-    names = [joint.name for joint in robot.joints]
-    above = [joints_above(robot, joint.child) for joint in robot.joints]
-    for motor in _shared_motors(robot):
-        geared = np.flatnonzero(robot.joint_to_motor[motor]).tolist()
-        for first in geared:
-            for second in geared:
-                if first < second and not (above[second][first] or above[first][second]):
-                    return (
-                        f"motor {robot.transmission.motors[motor]} is geared to {names[first]} and "
-                        f"{names[second]}, and neither joint carries the other; the simulator "
-                        "cannot express the inertia of such a rotor"
-                    )
-    return ""
-
-
-def _shared_motors(robot: RobotDescription) -> list[int]:
-    """The motors that need a tendon: those geared to several joints, unless the couplings of all
-    motors that have joints in common cancel, as in a differential of two equal motors."""
-    geared, inertia = robot.joint_to_motor != 0.0, robot.motors.rotor_inertia
-    coupling = np.abs(robot.rotor_matrix - np.diag(np.diag(robot.rotor_matrix)))
-    small = 1e-12 * float(np.abs(robot.rotor_matrix).max(initial=0.0))
-    found = []
-    for motor in range(len(inertia)):
-        joints = geared[motor]
-        for _ in range(len(inertia)):  # all joints that are geared to these over any motor
-            joints = geared[(geared & joints).any(axis=1)].any(axis=0)
-        joined = coupling[np.ix_(joints, joints)].max(initial=0.0) > small
-        if inertia[motor] and geared[motor].sum() > 1 and joined:
-            found.append(motor)
-    return found

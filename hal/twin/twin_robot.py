@@ -14,7 +14,7 @@ from ..bear.driven_robot import DrivenRobot, DriveParameters, missing_sensors, r
 from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
-from ..simulated.mujoco_model import unsupported_motor
+from ..simulated.geared_rotors import unsupported_motor
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
 from ..simulated.stance import uneven_contacts

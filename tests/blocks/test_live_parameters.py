@@ -281,6 +281,7 @@ SCENES: Mapping[str, list[Scene]] = {
 
 
 IDLE = {
+    "blocks.CircleTarget": ["radius"],  # it grows from zero at the start, where the scene ends
     "blocks.WholeBodyController": [
         *(
             f"{phase}.rolling_{name}"
@@ -288,7 +289,7 @@ IDLE = {
             for name in ("damping", "stiffness", "weight")
         ),
         "thrust.swing_stiffness",
-    ]
+    ],
 }
 """One set of gains serves all phases: feet roll off only in the thrust, and there none swings down."""
 

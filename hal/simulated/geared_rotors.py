@@ -1,0 +1,42 @@
+"""Which rotors are geared to several joints, and which of these MuJoCo cannot express."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...robots.description import RobotDescription
+from ...robots.kinematics import joints_above
+
+
+def unsupported_motor(robot: RobotDescription) -> str:
+    """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
+    names = [joint.name for joint in robot.joints]
+    above = [joints_above(robot, joint.child) for joint in robot.joints]
+    for motor in shared_motors(robot):
+        geared = np.flatnonzero(robot.joint_to_motor[motor]).tolist()
+        for first in geared:
+            for second in geared:
+                if first < second and not (above[second][first] or above[first][second]):
+                    return (
+                        f"motor {robot.transmission.motors[motor]} is geared to {names[first]} and "
+                        f"{names[second]}, and neither joint carries the other; the simulator "
+                        "cannot express the inertia of such a rotor"
+                    )
+    return ""
+
+
+def shared_motors(robot: RobotDescription) -> list[int]:
+    """The motors that need a tendon: those geared to several joints, unless the couplings of all
+    motors that have joints in common cancel, as in a differential of two equal motors."""
+    geared, inertia = robot.joint_to_motor != 0.0, robot.motors.rotor_inertia
+    coupling = np.abs(robot.rotor_matrix - np.diag(np.diag(robot.rotor_matrix)))
+    small = 1e-12 * float(np.abs(robot.rotor_matrix).max(initial=0.0))
+    found = []
+    for motor in range(len(inertia)):
+        joints = geared[motor]
+        for _ in range(len(inertia)):  # all joints that are geared to these over any motor
+            joints = geared[(geared & joints).any(axis=1)].any(axis=0)
+        joined = coupling[np.ix_(joints, joints)].max(initial=0.0) > small
+        if inertia[motor] and geared[motor].sum() > 1 and joined:
+            found.append(motor)
+    return found
