@@ -21,7 +21,6 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
 from .base import BASES, FixedBase
-from .mujoco_model import body_name
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
@@ -213,6 +212,8 @@ def _solve_positive(square: Array, right: Array, solution: Array) -> None:
 
 def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
     import mujoco
+
+    from .mujoco_model import body_name  # not for a check
 
     middle, offset = np.zeros(3), np.zeros(3)
     soles = [np.array(foot.sole) for foot in robot.feet]
