@@ -205,6 +205,7 @@ def long_legged(tick: int) -> Inputs:
 
 
 SCENES: Mapping[str, list[Scene]] = {
+    "blocks.CircleTarget": [Scene({"start": 0.0})],
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
     "blocks.PID": [
@@ -281,7 +282,6 @@ SCENES: Mapping[str, list[Scene]] = {
 
 
 IDLE = {
-    "blocks.CircleTarget": ["radius"],  # it grows from zero at the start, where the scene ends
     "blocks.WholeBodyController": [
         *(
             f"{phase}.rolling_{name}"
