@@ -196,9 +196,13 @@ def _complete(data: object) -> None:
 
 @lru_cache(maxsize=1)
 def robot_names() -> tuple[str, ...]:
-    """The names a graph may give after ``robot:``, sorted."""
-    found = Path(__file__).parent.glob("*/*.yaml")
-    return tuple(sorted(path.stem for path in found if path.stem == path.parent.name))
+    """The names a graph may give after ``robot:``, sorted, after BRUCE.
+
+    All files of BRUCE are in this package; those of most others come with ``example-robot-data``.
+    """
+    files = Path(__file__).parent.glob("*/*.yaml")
+    names = (path.stem for path in files if path.stem == path.parent.name)
+    return tuple(sorted(names, key=lambda name: (name != "bruce", name)))
 
 
 __all__ = [

@@ -22,7 +22,7 @@ def test_bytes_do_not_depend_on_the_split(address: str) -> None:
     rng = np.random.default_rng(len(address))
     places = {spec.path: str(rng.choice(list(MACHINES))) for spec in graph.blocks}
     alone = run(graph, TICKS)
-    spread_out = run_spread(spread(graph, MACHINES, places), TICKS, patience=60.0, wall_time=200.0)
+    spread_out = run_spread(spread(graph, MACHINES, places), TICKS, timeout=60.0, wall_time=200.0)
     assert spread_out.ticks == alone.ticks
     assert spread_out.run_hash == alone.run_hash
 
@@ -31,4 +31,4 @@ def test_bytes_do_not_depend_on_the_split(address: str) -> None:
 @pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "graphs/machines").glob("*")))
 def test_shipped_placements(path: Path) -> None:
     graph = load(path)
-    assert run_spread(graph, TICKS, patience=60.0).run_hash == run(graph, TICKS).run_hash
+    assert run_spread(graph, TICKS, timeout=60.0).run_hash == run(graph, TICKS).run_hash
