@@ -138,11 +138,13 @@ class BearBus:
         """Give the port back."""
         self.port.close()
 
-    def overhear(self, received: bytes | bytearray | memoryview, own: bytes = b"") -> None:
+    def overhear(
+        self, received: bytes | bytearray | memoryview, own: bytes | None = None
+    ) -> None:
         """Look for instructions among bytes that are no answers to a question of ours.
 
         An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data
-        of an instruction of ours, which some adapters send back.
+        of an instruction of ours, if one was sent: some adapters send it back.
         """
         for frame in self._listener.feed(received):
             if _is_instruction(frame) and frame.data != own:
