@@ -138,9 +138,7 @@ class BearBus:
         """Give the port back."""
         self.port.close()
 
-    def overhear(
-        self, received: bytes | bytearray | memoryview, own: bytes | None = None
-    ) -> None:
+    def overhear(self, received: bytes | bytearray | memoryview, own: bytes | None = None) -> None:
         """Look for instructions among bytes that are no answers to a question of ours.
 
         An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data

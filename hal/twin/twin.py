@@ -15,7 +15,7 @@ from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
 from ..random_streams import Purpose
 from ..sensors.sensor import mounted_sensors
-from ..simulated.drives import Drives
+from ..simulated.drives import SimulatedDrives
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
@@ -82,7 +82,7 @@ class Twin:
         self.exchanges = 0
         self.zero = 0
         """The exchange in which the gantry let go."""
-        self._gantry = Drives(robot, self.plant.damping, gantry, record)
+        self._gantry = SimulatedDrives(robot, self.plant.damping, gantry, record)
         self._held = np.zeros(len(robot.joints))
         self._standing = self.plant.simulating(self._gantry, 1)
         self._step = self.plant.simulating(self, 1)
