@@ -16,7 +16,7 @@ from .configuration import Hardware, HardwareError
 from .driven_robot import DrivenRobot, DriveParameters, missing_sensors, read_hardware
 from .driver import DriveLaw, Driver
 from .motor_loop import CommandQueue, MotorThread
-from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
+from .watchdog import AlwaysHeld, DeadMansSwitch, DriveWatchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""
@@ -102,7 +102,7 @@ class BearRobot(DrivenRobot):
         gains = joint_gains(self.params, self.robot)
         self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
         self._thread: MotorThread | None = None
-        self._watchdog: Watchdog | None = None
+        self._watchdog: DriveWatchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()
         self._queue: CommandQueue | None = None
         self._opened_at = self._cycle = 0.0
@@ -129,7 +129,7 @@ class BearRobot(DrivenRobot):
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
-                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout, silence)
+                self._watchdog = DriveWatchdog(descriptor, devices, params.graph_timeout, silence)
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":

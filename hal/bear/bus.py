@@ -13,7 +13,7 @@ from .protocol import (
     BROADCAST,
     CONFIG,
     STATUS,
-    Frame,
+    BusFrame,
     FrameReader,
     Instruction,
     Register,
@@ -265,14 +265,14 @@ class BearBus:
                     return Reply(device, frame.code, frame.data)
                 self.counts.stray += 1
 
-    def _read_frames(self, size: int) -> list[Frame]:
+    def _read_frames(self, size: int) -> list[BusFrame]:
         before = self._reader.damaged
         frames = self._reader.feed(self.port.read(size))
         self.counts.damaged += self._reader.damaged - before
         return frames
 
 
-def _is_instruction(frame: Frame) -> bool:
+def _is_instruction(frame: BusFrame) -> bool:
     """Whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a
     right checksum by chance."""
     size = len(frame.data)

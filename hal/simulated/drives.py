@@ -26,7 +26,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
-from ...runtime.language.steps import as_record
+from ...runtime.language.steps import signal_call
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops
 from .state import DriveState, TickRecord, update_maximum, update_minimum
 
@@ -279,7 +279,7 @@ class MotorLimits:
         )
         n = len(robot.joints)
         self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
-        self.record = as_record(record)
+        self.record = record
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
 
@@ -310,7 +310,6 @@ class SimulatedDrives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
-        self._commands = as_record(state)
         self._damping = damping
         self._motors = limits.motors, limits.scratch, limits.record
 
@@ -323,10 +322,10 @@ class SimulatedDrives:
             velocity: the joint velocity [rad/s], (n_joints,).
         """
         joints = Joints(step, np.zeros(1, np.bool_), position, velocity, out)
-        first = self._commands, self._damping
+        first = self._state, self._damping
         if self._feedback is None:
-            return KernelCall(drive_joints, *first, joints, *self._motors)
-        return KernelCall(drive_loops, *first, self._feedback.loops, joints, *self._motors)
+            return signal_call(drive_joints, *first, joints, *self._motors)
+        return signal_call(drive_loops, *first, self._feedback.loops, joints, *self._motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -355,4 +354,4 @@ class SimulatedDrives:
 
     def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Sends a command in the physics step ``step``, a count without a dimension."""
-        return KernelCall(send_command, as_record(command), step, latency, self._commands)
+        return signal_call(send_command, command, step, latency, self._state)

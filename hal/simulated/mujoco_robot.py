@@ -13,11 +13,10 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
 from ..drive_control import gain_misfits, lost_gains
-from .geared_rotors import unsupported_motor
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters
-from .stance import uneven_contacts
 from .state import DriveState, TickRecord
+from .unsupported import uneven_contacts, unsupported_motor
 
 
 class MujocoRobot(SimulatedRobot):

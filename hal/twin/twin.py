@@ -21,7 +21,7 @@ from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
-from .faults import ANSWERS, Fault, Faults, apply_fault, corrupt_byte
+from .faults import ANSWERS, Faults, InjectedFault, apply_fault, corrupt_byte
 from .snapshot import Attributes
 
 BRAKING = 0.5
@@ -61,7 +61,7 @@ class Twin:
 
     def __init__(
         self, robot: RobotDescription, params: SimulatorParameters, hardware: Hardware, tick: float,
-        physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[Fault, ...] = (),
+        physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[InjectedFault, ...] = (),
         sensed: SensorMemory | None = None,
     ) -> None:  # fmt: skip
         period = hardware.bus.period
@@ -324,7 +324,7 @@ class Twin:
 
 def standing_twin(
     robot: RobotDescription, params: SimulatorParameters, hardware: Hardware,
-    tick: float = 0.002, faults: tuple[Fault, ...] = (),
+    tick: float = 0.002, faults: tuple[InjectedFault, ...] = (),
 ) -> Twin:  # fmt: skip
     """A twin that stands in its gantry.
 
