@@ -57,7 +57,7 @@ def height_of_ground(floor: Array1D, boxes: Array2D, x: float, y: float) -> floa
         inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
         if boxes[box, 4] > height and inside:
             height = boxes[box, 4]
-    return height
+    return float(height)
 
 
 @kernel
