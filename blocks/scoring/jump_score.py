@@ -153,7 +153,7 @@ class JumpScore(Block):
         elif series.made != 0:
             record_row(truth, record, series, params, constants, scratch)
         record.vertical_speed = truth.com_velocity[2]
-        return scratch.ending != Ending.NONE
+        return bool(scratch.ending != Ending.NONE)
 
     def on_event(self) -> None:
         """Ask for the end of the run."""
