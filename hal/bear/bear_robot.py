@@ -133,11 +133,16 @@ class BearRobot(DrivenRobot):
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
-            age = min(params.command_age, self.context.clock.command_limit or params.command_age)
-            self._thread = MotorThread(driver.loop, age, self._stop_reason)
+            self._thread = MotorThread(driver.loop, self.oldest_command, self._stop_reason)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
+
+    @property
+    def oldest_command(self) -> float:
+        """The age of a command at which the drives are damped [s]: also that of a silent link."""
+        limit = self.context.clock.command_limit
+        return min(self.params.command_age, limit) if limit else self.params.command_age
 
     def now(self) -> float:
         """The time since ``open`` [s]: of the clock, or of the exchanges."""

@@ -287,6 +287,13 @@ def test_why_the_motor_thread_must_not_go_on() -> None:
     assert reason(robot).endswith("or no commands came over the links for 15 ms")
 
 
+@pytest.mark.parametrize(("limit", "age"), [(0.0, 0.02), (0.015, 0.015), (0.05, 0.02)])
+def test_a_command_may_be_as_old_as_the_stricter_limit(limit: float, age: float) -> None:
+    robot = block()
+    robot.context.clock.command_limit = limit
+    assert BearRobot.oldest_command.fget(robot) == age  # type: ignore[attr-defined]
+
+
 @pytest.mark.parametrize("phase", [DrivePhase.OFF, DrivePhase.DRIVING])
 def test_damping_waits_for_two_cycles_and_leaves_drives_that_are_off(phase: DrivePhase) -> None:
     waited: list[int] = []
