@@ -43,7 +43,7 @@ from result_tables import (
 
 from aloft.benchmarks.tick.chart import tick_chart
 from aloft.planner.task.margins import Margins
-from aloft.planner.task.sequence import Hop, RoughGround, Span
+from aloft.planner.task.sequence import Hop, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
 from aloft.robots.importing.urdf_text import find_file
 from aloft.runtime.language.parameters import Parameters
@@ -183,7 +183,7 @@ def task_parameter_tables() -> str:
     for title, owner in (
         ("", JumpTask),
         ("One of `jumps`", Hop),
-        ("One of `phases`", Span),
+        ("One of `phases`", PhaseSpec),
         ("`rough`", RoughGround),
         ("`knots`", Knots),
         ("`weights`", Weights),
