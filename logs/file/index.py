@@ -53,7 +53,7 @@ class Index:
 
     def __init__(self, grown: int) -> None:
         self._grown = grown
-        self._pieces: list[tuple[bytes, dict[int, int]]] = []
+        self._pieces: list[tuple[bytes, Mapping[int, int]]] = []
 
     def add(self, piece: bytes, places: Mapping[int, int]) -> None:
         """Add the index of a piece; ``places`` are those in the file of the bodies of messages, by

@@ -260,7 +260,7 @@ class _Scanner:
         end = place + HEAD.size + length
         if kind == END and length:
             end += FOOTER_SIZE
-        return kind > _LAST_KIND or end <= self._size
+        return bool(kind > _LAST_KIND or end <= self._size)
 
     def _ends_closed(self, place: int, size: int) -> bool:
         """Whether the last ``size`` bytes, those after a seal behind ``place``, close the file.

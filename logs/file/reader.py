@@ -78,12 +78,14 @@ class PackedRows:
 
     def __init__(self, found: Scan, header: Header) -> None:
         self._found, self._header = found, header
-        if found.sealed:
-            each = (_PackedPiece(m, 0, m.first, m.last) for m in found.of(Content.ROWS))
-        else:
-            each = self._without_seals()
-        self._pieces = sorted(each, key=lambda piece: piece.first)
+        pieces = self._sealed() if found.sealed else self._without_seals()
+        self._pieces = sorted(pieces, key=lambda piece: piece.first)
         self._lasts = [piece.last for piece in self._pieces]
+
+    def _sealed(self) -> Iterator[_PackedPiece]:
+        """The pieces of a file with seals, which say what is in each message."""
+        for message in self._found.of(Content.ROWS):
+            yield _PackedPiece(message, 0, message.first, message.last)
 
     def _without_seals(self) -> Iterator[_PackedPiece]:
         """The pieces of a file that another program has written again, which may have put several

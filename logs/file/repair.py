@@ -92,7 +92,7 @@ def repair(path: str | PathLike[str]) -> Repair:
 def _close_gaps(file: BinaryIO, found: Scan) -> tuple[int, bytes]:
     """Move what is behind damage forward. Returns the end of the last message, and the file's index,
     which is empty if there was none."""
-    index, places = Index(0), {}
+    index, places = Index(0), dict[int, int]()
     index.add(index_of(file, found), places)
     end = FILE_HEAD
     for number, message in enumerate(found.messages):
