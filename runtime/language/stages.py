@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from ...robots.description import RobotDescription
 from .block import Block
@@ -20,8 +20,7 @@ from .parameters import Parameters
 from .quantities import Quantity
 
 
-@dataclass(frozen=True, order=True)
-class Position:
+class Position(NamedTuple):
     """A place in a file; lines and columns count from one. Printed as ``file:line:col``.
 
     Line zero stands for the file as a whole, or for an override.
