@@ -7,11 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...language.stages import Position
-from ..problems import Code, Problems, listing, nearest
-from ..reading.document import read_file, read_mapping
+from ....files.document import read_file, read_mapping
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, plain
+from ....files.problems import Code, Position, Problems, listing, nearest
 from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
-from ..reading.nodes import Entry, MapNode, Node, ScalarNode, plain
 from ..reading.overrides import (
     Override,
     Overrides,

@@ -9,9 +9,8 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from ...language.stages import Position
-from ..problems import Code, Problems, fix_for_key, listing, nearest
-from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
+from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
+from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
 from ..reading.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
 from .flat import FlatBlock, FlatWire, WireElement, WirePart

@@ -15,9 +15,8 @@ from typing import Any
 
 import yaml
 
-from ...language.stages import Position
-from ..problems import Code, Problems, nearest
 from .nodes import Entry, ListNode, MapNode, Node, Plain, ScalarNode
+from .problems import Code, Position, Problems, nearest
 
 _PREFIX = "tag:yaml.org,2002:"
 _LIMIT = 200_000  # values in one file, counting an alias each time it is used
