@@ -8,6 +8,7 @@ from typing import Literal
 from ...mathematics.arrays import Array1D, Array2D, Matrix3
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import pitch_angle
 from ...planner.library.jump_table import FlightRotation, locate
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -273,7 +274,6 @@ def value_at(times: Array1D, values: Array1D, time: float) -> float:
 def turned_beyond(rotation: Matrix3, orientation: Array1D) -> float:
     """By how much [rad] a body of this ``rotation`` has turned further about its y axis than one
     of the planned ``orientation``, a quaternion x, y, z, w."""
-    x, y, z, w = orientation[0], orientation[1], orientation[2], orientation[3]
-    planned = math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
+    planned = pitch_angle(orientation)
     measured = math.atan2(-rotation[2, 0], rotation[0, 0])
     return math.atan2(math.sin(measured - planned), math.cos(measured - planned))
