@@ -43,7 +43,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
-        "runtime/links", "runtime/transports", "robots", "mathematics/compiling",
+        "runtime/links", "runtime/transports", "robots", "mathematics",
     ),
     "runtime": (
         "files", "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
@@ -81,14 +81,14 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
-    "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics/arrays", "robots", "runtime/language"),
+    "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
-        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language", "runtime/running",
+        "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
