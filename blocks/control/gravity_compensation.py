@@ -9,7 +9,7 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.block import Block, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..signals import JointState, JointTorque
 
@@ -32,10 +32,12 @@ class GravityCompensation(Block):
     torque = Output(JointTorque, text="torques that hold the robot still")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Iterable[UnmetRequirement]:
         """Report a base that is not fixed."""
         if robot is not None and robot.base_joint != "fixed":
-            yield Misfit(
+            yield UnmetRequirement(
                 f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",
                 fix="use: blocks.WholeBodyController",
             )

@@ -23,7 +23,7 @@ from ...robots.five_joint_track import (
 )
 from ...robots.limb import chain_to
 from ...robots.limb_inverse import follow_limb, limb_geometry, limb_memory, watch_foot
-from ...runtime.language.block import Input, Misfit, Output, State
+from ...runtime.language.block import Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
@@ -169,14 +169,16 @@ class LegInverseKinematics(KernelBlock):
     memory = State(LegMemory, text="the last targets and the last solution")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Iterable[UnmetRequirement]:
         """Report joints that two legs share."""
         assert robot is not None
         uses = Counter(joint for foot in robot.feet for joint in chain_to(robot, foot.link))
         for joint, count in uses.items():
             name = robot.joints[joint].name
             if count > 1 and name not in robot.held:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"joint {name} of {robot.name} carries {count} feet; the inverse kinematics "
                     "solves every leg by itself, so it can only hold such a joint",
                     fix=f"in the robot's description: held: {{{name}: 0.0}}",

@@ -29,7 +29,7 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
-from ...runtime.language.block import Misfit
+from ...runtime.language.block import UnmetRequirement
 from ...runtime.language.errors import BlockError
 
 _STEP = 0.002
@@ -66,12 +66,12 @@ def missing_joints(robot: RobotDescription) -> int:
     return max(0, rows - (len(robot.joints) - len(robot.held)))
 
 
-def too_few_joints(robot: RobotDescription | None) -> Iterator[Misfit]:
-    """The misfit of a robot that lacks joints to move its centre of mass and base while it stands."""
+def too_few_joints(robot: RobotDescription | None) -> Iterator[UnmetRequirement]:
+    """The unmet requirement of a robot that lacks joints to move its centre of mass and base while it stands."""
     assert robot is not None
     missing = missing_joints(robot)
     if missing:
-        yield Misfit(
+        yield UnmetRequirement(
             f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
             "all feet on the ground",
             expected=f"{len(robot.joints) + missing} joints that are not held",

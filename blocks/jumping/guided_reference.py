@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from ...planner.library.jump_table import JumpTable, JumpTableReader
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.block import Block, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
 from .guided_motion import too_few_joints
@@ -31,7 +31,9 @@ class GuidedReference(Block):
     reference = Output(JumpReference, text="the plan at the present instant")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Iterable[UnmetRequirement]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
         return too_few_joints(robot)
 

@@ -34,7 +34,7 @@ from ...mathematics.rotations import (
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
@@ -210,7 +210,9 @@ class LandingHeuristic(Block):
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Iterable[UnmetRequirement]:
         """Report limits within which the robot cannot stand."""
         assert isinstance(params, LandingParams) and robot is not None
         if params.limits_about == "stance":
@@ -218,7 +220,7 @@ class LandingHeuristic(Block):
         for foot, place in zip(robot.feet, standing_feet(robot), strict=True):
             x, y = abs(float(place[0])), abs(float(place[1]))
             if x > params.p_max[0] or y > params.p_max[1]:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{foot.name} of {robot.name} stands {x:.3f} m ahead or behind and {y:.3f} m "
                     "beside the centre of mass, which is beyond p_max",
                     parameter="p_max",

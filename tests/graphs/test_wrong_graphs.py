@@ -11,7 +11,7 @@ import pytest
 
 from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import ExitCode
-from aloft.runtime.language.fit import fix_without_robot
+from aloft.runtime.language.requirements import fix_without_robot
 from aloft.runtime.loading import Code, LoadError, Report, check, load
 from aloft.runtime.loading.problems import listing
 

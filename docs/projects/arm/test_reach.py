@@ -32,8 +32,8 @@ def test_begins_at_the_measured_joints_and_ends_at_the_target():
 
 
 def test_a_target_beyond_a_limit_is_refused():
-    (misfit,) = Reach.requires(Reach.Params(target=[0.0, 3.0, 0.0, 0.0]), ARM)
-    assert (misfit.message, misfit.expected) == ("shoulder cannot go there", "-1.8 to 1.8 rad")
+    (unmet,) = Reach.requires(Reach.Params(target=[0.0, 3.0, 0.0, 0.0]), ARM)
+    assert (unmet.message, unmet.expected) == ("shoulder cannot go there", "-1.8 to 1.8 rad")
 
 
 @pytest.mark.parametrize("case", conformance_cases())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
-from ...language.fit import fix_without_robot
+from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec, Position
 from ..flattening.flat import ROBOT_FILES, FlatGraph
 from ..problems import Code, Problems, listing, nearest

@@ -133,10 +133,10 @@ def test_limits_are_about_the_stance_of_each_foot_where_asked_for():
 def test_limits_in_which_a_robot_cannot_stand_are_in_the_load_report():
     Params = LandingHeuristic.Params
     assert not list(LandingHeuristic.requires(Params(), ROBOT))
-    (misfit,) = LandingHeuristic.requires(Params(), quadruped())
-    assert misfit.message.startswith("front_left of quadruped stands 0.")
-    assert misfit.message.endswith("beside the centre of mass, which is beyond p_max")
-    assert (misfit.parameter, misfit.fix) == ("p_max", "limits_about: stance")
+    (unmet,) = LandingHeuristic.requires(Params(), quadruped())
+    assert unmet.message.startswith("front_left of quadruped stands 0.")
+    assert unmet.message.endswith("beside the centre of mass, which is beyond p_max")
+    assert (unmet.parameter, unmet.fix) == ("p_max", "limits_about: stance")
     assert not list(LandingHeuristic.requires(Params(limits_about="stance"), quadruped()))
 
 

@@ -72,6 +72,6 @@ def test_a_squat_too_deep_names_the_joint():
 def test_too_few_joints_are_in_the_load_report():
     robot = quadruped()
     held = robot.model_copy(update={"held": {"front_left_knee": -1.5}})
-    (misfit,) = StandReference.requires(StandReference.Params(), held)
-    assert "quadruped lacks 1 joints to move its centre of mass" in misfit.message
+    (unmet,) = StandReference.requires(StandReference.Params(), held)
+    assert "quadruped lacks 1 joints to move its centre of mass" in unmet.message
     assert not list(StandReference.requires(StandReference.Params(), robot))

@@ -130,8 +130,8 @@ def test_a_rotor_geared_to_two_limbs_is_reported_at_load(quadruped: Data) -> Non
         "motor front_left_hip_joint_motor is geared to front_left_hip_joint and "
         "front_right_hip_joint, and neither joint carries the other"
     )
-    (misfit,) = MujocoRobot.requires(MujocoRobot.Params(), robot)
-    assert misfit.message == unsupported_motor(robot)
+    (unmet,) = MujocoRobot.requires(MujocoRobot.Params(), robot)
+    assert unmet.message == unsupported_motor(robot)
 
 
 def test_two_equal_motors_on_two_joints_need_no_tendon(quadruped: Data) -> None:
