@@ -55,7 +55,7 @@ class UnitBlock(Block):
     memory = State(Remembered, text="what the FMU remembers")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report start values that the FMU does not have."""
         assert isinstance(params, FmuParameters)
         try:

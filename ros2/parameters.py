@@ -81,10 +81,9 @@ class Ros2Block(Block):
         return {}
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a type that is not known, and sizes and texts that do not fit it."""
+        robot = context.robot
         assert isinstance(params, Ros2Parameters)
         sizes = {} if robot is None else dict(robot.dimensions)
         try:

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Input, Output, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..signals import JointState, JointTorque
 
@@ -32,10 +31,9 @@ class GravityCompensation(Block):
     torque = Output(JointTorque, text="torques that hold the robot still")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a base that is not fixed."""
+        robot = context.robot
         if robot is not None and robot.base_joint != "fixed":
             yield UnmetRequirement(
                 f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",

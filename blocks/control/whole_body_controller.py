@@ -207,10 +207,9 @@ class WholeBodyController(KernelBlock):
     memory = State(SolverMemory, text="used when the solver fails")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
-        """Report a solver that is not installed, and feet that can carry no load."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a solver that is not installed, feet that can carry no load, and wrong tasks."""
+        robot = context.robot
         assert isinstance(params, cls.Params) and robot is not None
         if not robot.contacts:
             yield UnmetRequirement(
@@ -233,20 +232,12 @@ class WholeBodyController(KernelBlock):
                 yield UnmetRequirement(
                     f"foot {foot.name} of {robot.name} is part of the base, not of a leg"
                 )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report unknown tasks, and gains that a task does not have or that do not suit the robot."""
-        assert isinstance(params, cls.Params)
         try:
             for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
                 found: dict[str, None] = {}
                 for kind in PHASE_KINDS:
                     gains = chosen.params(kind, getattr(params, kind))
-                    if context.robot is not None:
-                        found.update(
-                            dict.fromkeys(chosen.kind.unmet_requirements(gains, context.robot))
-                        )
+                    found.update(dict.fromkeys(chosen.kind.unmet_requirements(gains, robot)))
                 for reason in found:
                     yield UnmetRequirement(f"task {chosen.entry.task}: {reason}", parameter="tasks")
         except TaskChoiceError as error:

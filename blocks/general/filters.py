@@ -82,7 +82,7 @@ class Butterworth(LinearFilter):
     params: ButterworthParameters
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The cutoff must be below half of the block's rate."""
         assert isinstance(params, ButterworthParameters)
         return too_fast("cutoff", params.cutoff, context.period)
@@ -142,7 +142,7 @@ class BandStop(LinearFilter):
     params: Params
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The centre must be below half of the block's rate."""
         assert isinstance(params, cls.Params)
         return too_fast("centre", params.centre, context.period)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_systems import advance_transfer_function, controllable_form, discretise
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, State, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
@@ -118,9 +118,7 @@ class LinearSystem(UnitFromParameters, Block):
         return params.sizes()
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The matrices must fit each other."""
         assert isinstance(params, SystemParameters)
         return params.wrong_sizes()
@@ -191,9 +189,7 @@ class StateSpaceWithFeedthrough(LinearSystem):
     params: Params
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The matrices must fit each other."""
         assert isinstance(params, cls.Params)
         yield from params.wrong_sizes()
@@ -265,9 +261,7 @@ class TransferFunction(UnitOfProduct, Block):
         return {"n": params.n, "order": len(params.denominator) - 1}
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """It must be proper, and its denominator have the degree it seems to have."""
         assert isinstance(params, cls.Params)
         if params.denominator[0] == 0.0:

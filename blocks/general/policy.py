@@ -71,7 +71,7 @@ class Policy(UnitFromParameters, Block):
     memory = State(Memory, text="the states of a recurrent network")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The file must be a network with these inputs and outputs."""
         assert isinstance(params, cls.Params)
         try:

@@ -11,7 +11,16 @@ from pydantic import Field as Key
 from ...mathematics.arrays import Flags1D, Indices1D
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Clock, Input, Metric, Output, State, UnmetRequirement
+from ...runtime.language.block import (
+    Block,
+    Clock,
+    Context,
+    Input,
+    Metric,
+    Output,
+    State,
+    UnmetRequirement,
+)
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
@@ -101,9 +110,7 @@ class StateMachine(Block):
         return {"n": len(params.conditions), "n_states": len(params.states)}
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every name of a transition must be one of a state or of a condition."""
         assert isinstance(params, cls.Params)
         for key, names in (("states", params.states), ("conditions", params.conditions)):
@@ -207,12 +214,10 @@ class Assertion(Bounded, Block):
     x = State(Violations, text="what was broken")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The bounds must not cross, and one must be there."""
         assert isinstance(params, cls.Params)
-        yield from super().requires(params, robot)
+        yield from super().requires(params, context)
         if params.lower is None and params.upper is None:
             yield UnmetRequirement("it has no bound", fix="with: {upper: 1.0}")
 

@@ -55,9 +55,7 @@ class LookupTable(UnitFromParameters, Block):
     y = Output(Vector, text="the table's values there")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The points must rise and each must have a value."""
         assert isinstance(params, cls.Params)
         yield from unsorted_points("points", params.points)
@@ -125,9 +123,7 @@ class LookupGrid(UnitFromParameters, Block):
         return {"n": len(params.axes)}
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every axis must rise, and the grid have as many values as points."""
         assert isinstance(params, cls.Params)
         for k, axis in enumerate(params.axes):
@@ -205,7 +201,7 @@ class TablePlayback(UnitFromParameters, Block):
         return {"n": len(params.columns)}
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The table must be there and be one."""
         assert isinstance(params, cls.Params)
         try:

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import field_validator
 
 from ...mathematics.expression import parse_expression
-from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import UnitError
 from ...runtime.language.parameters import Parameters, parameter
@@ -140,10 +139,8 @@ class Expression(Block):
     y = Output(Vector, text="the formula's value")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
-        """The formula must be one."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """The formula must be one, and every input that it reads must be wired."""
         assert isinstance(params, cls.Params)
         for name in params.constants:
             if name in (*INPUTS, "t", "pi") or not name.isidentifier():
@@ -156,18 +153,10 @@ class Expression(Block):
                     expected=", ".join(params.constants) or "constants",
                 )
         try:
-            parse_expression(params.expression, (*INPUTS, "t", *params.constants))
+            names = parse_expression(params.expression, (*INPUTS, "t", *params.constants)).names
         except ValueError as error:
             yield UnmetRequirement(str(error), "expression", found=params.expression)
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Every input that the formula reads must be wired."""
-        assert isinstance(params, cls.Params)
-        try:
-            names = parse_expression(params.expression, (*INPUTS, "t", *params.constants)).names
-        except ValueError:
-            return  # reported by ``requires``
+            return
         for name in names:
             if name in INPUTS and name not in context.wired:
                 yield UnmetRequirement(

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, ValidationInfo, field_validator, model_validator
 
-from ...robots.description import RobotDescription
-from ...runtime.language.block import UnmetRequirement
+from ...runtime.language.block import Context, UnmetRequirement
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
@@ -121,7 +120,7 @@ class Bounded:
     Constants: ClassVar[type[Signal] | None] = Bounds
 
     @classmethod
-    def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Any, context: Context) -> Iterable[UnmetRequirement]:
         """The bounds must not cross."""
         return crossed_bounds(params.lower, params.upper, params.n)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import UNCHECKED, InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
@@ -118,9 +118,7 @@ class Selector(UnitOfInput, Block):
         return {"n": params.n, "m": len(params.elements)}
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every element that is selected must be there."""
         assert isinstance(params, cls.Params)
         for element in params.elements:

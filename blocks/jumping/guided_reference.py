@@ -6,8 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable
 
 from ...planner.library.jump_table import JumpTable, JumpTableReader
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
 from .guided_motion import too_few_joints
@@ -31,10 +30,9 @@ class GuidedReference(Block):
     reference = Output(JumpReference, text="the plan at the present instant")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
+        robot = context.robot
         return too_few_joints(robot)
 
     @abstractmethod

@@ -156,7 +156,7 @@ class JumpPlan(KernelBlock):
     progress = State(PlanProgress, text="how late the plan is")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.library import shipped_tasks
         from ...planner.task.task import JumpTaskError

@@ -32,9 +32,8 @@ from ...mathematics.rotations import (
     to_matrix,
     yaw,
 )
-from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
-from ...runtime.language.block import Block, Input, Output, State, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
@@ -210,10 +209,9 @@ class LandingHeuristic(Block):
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report limits within which the robot cannot stand."""
+        robot = context.robot
         assert isinstance(params, LandingParams) and robot is not None
         if params.limits_about == "stance":
             return

@@ -74,9 +74,10 @@ class BearRobot(DrivenRobot):
     params: BearParameters
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report a wrong file of the hardware."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report gains that no drives can give the joints, and a wrong file of the hardware."""
         assert isinstance(params, BearParameters) and context.robot is not None
+        yield from super().requires(params, context)
         try:
             hardware = read_hardware(params.hardware, context, context.robot)
         except HardwareError as error:

@@ -30,10 +30,9 @@ class DrivenRobot(Robot):
     params: DriveParameters
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report gains that no drives can give the joints."""
+        robot = context.robot
         assert isinstance(params, DriveParameters) and robot is not None
         yield from gain_requirements(params, robot)
 

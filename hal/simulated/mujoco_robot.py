@@ -83,11 +83,10 @@ class MujocoRobot(SimulatedRobot):
         }  # fmt: skip
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a transmission that the simulator cannot express, gains that no drives can give, and
         feet that cannot stand."""
+        robot = context.robot
         assert isinstance(params, SimulatorParameters) and robot is not None
         complaint = unsupported_motor(robot)
         if complaint:
@@ -102,11 +101,6 @@ class MujocoRobot(SimulatedRobot):
                 uneven,
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report periods that do not divide each other."""
-        assert isinstance(params, SimulatorParameters)
         bus = params.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"

@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output, State, UnmetRequirement
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 
@@ -62,10 +61,9 @@ class Push(Block):
     progress = State(PushState, text="the progress of the push")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a point that the robot does not have."""
+        robot = context.robot
         assert isinstance(params, cls.Params) and robot is not None
         if params.point not in robot.points:
             points = list(robot.points)

@@ -125,12 +125,12 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     rest = State(Registers, text="registers, counters and commands on their way, for a snapshot")
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
-        """Report what the simulator cannot express, and gains that the drives cannot give."""
-        assert robot is not None
-        yield from super().requires(params, robot)
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report what neither simulator nor drives can do, periods that do not divide each other,
+        and a wrong file of the hardware."""
+        robot = context.robot
+        assert isinstance(params, TwinParameters) and robot is not None
+        yield from super().requires(params, context)
         complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
             yield UnmetRequirement(complaint, fix="correct the robot's description")
@@ -143,11 +143,6 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             yield UnmetRequirement(
                 f"{robot.name} has {len(robot.joints)} motors, and one exchange has room for 18"
             )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report periods that do not divide each other, and a wrong file of the hardware."""
-        assert isinstance(params, TwinParameters) and context.robot is not None
         period = 0.001
         if params.hardware:
             try:

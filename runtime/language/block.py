@@ -253,22 +253,12 @@ class Block:
         return cls
 
     @classmethod
-    def requires(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Iterable[UnmetRequirement]:
-        """The unmet requirements between this block and its parameters and robot; none if all is well.
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """What the block needs of its parameters, robot and graph and does not have.
 
-        Loading calls this, and puts them into its report. It is called only if the robot has
-        everything in ``needs``, so ``robot`` is never ``None`` for a block that needs a robot.
-        """
-        return ()
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The unmet requirements between this block and the graph it is in; called together with ``requires``.
-
-        ``context`` is the one that the block will be constructed with. It has the period of the
-        block, the names of its wired inputs, and the folder to which its files are relative.
+        Loading reports it. ``context`` is the one that the block will be constructed with: it has
+        the robot, the period of the block, the names of its wired inputs, and the folder to which
+        its files are relative. This is called only if the robot has everything in ``needs``.
         """
         return ()
 
@@ -279,8 +269,8 @@ class Block:
         A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is said twice;
         ``name`` may also be a parameter of the block. Loading puts the value in its place.
         A ``UnmetRequirement`` in place of a value says why there is none; it is reported where a graph uses
-        it. ``context`` is as for ``requires_of_graph``, but has no dimensions and no wired inputs.
-        What this raises should be an unmet requirement of ``requires_of_graph`` as well.
+        it. ``context`` is as for ``requires``, but has no dimensions and no wired inputs.
+        What this raises should be an unmet requirement of ``requires`` as well.
         """
         return {}
 

@@ -70,8 +70,8 @@ def unmet_requirements(
     """All unmet requirements between a block and the robot and graph it is in.
 
     First come the entries of ``needs`` that the robot lacks. If it lacks none, there follow values
-    per joint that do not fit the robot's joints, and the unmet requirements that ``requires`` and
-    ``requires_of_graph`` return. An error raised by the block's code is one too.
+    per joint that do not fit the robot's joints, and the unmet requirements that ``requires``
+    returns. An error raised by the block's code is one too.
     """
     robot = context.robot
     unmet = unmet_needs(block_type, robot)
@@ -80,8 +80,7 @@ def unmet_requirements(
     try:
         return (
             *(_per_joint_requirements(params, robot) if robot is not None else ()),
-            *block_type.requires(params, robot),
-            *block_type.requires_of_graph(params, context),
+            *block_type.requires(params, context),
         )
     except Exception as error:  # noqa: BLE001  the block's own code must not hide other problems
         return (

@@ -6,7 +6,7 @@ import numpy as np
 
 from aloft import Block, Field, Input, Output, Parameters, Signal, State, live_parameter, parameter
 from aloft.blocks.signals import CommandMode, JointCommand, JointState, JointTorque
-from aloft.runtime.language.block import UnmetRequirement
+from aloft.runtime.language.block import Context, UnmetRequirement
 
 
 class Departure(Signal):
@@ -40,8 +40,9 @@ class Reach(Block):
     departure = State(Departure, text="where the motion began")
 
     @classmethod
-    def requires(cls, params, robot) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """One target for every joint, inside its limits."""
+        robot = context.robot
         count = len(robot.joints)
         if len(params.target) != count:
             found = f"{len(params.target)} angles"

@@ -46,7 +46,7 @@ def test_a_block_learns_the_period_and_the_folder() -> None:
         """Says what it was told."""
 
         @classmethod
-        def requires_of_graph(cls, params: Parameters, context: Context) -> list[UnmetRequirement]:
+        def requires(cls, params: Parameters, context: Context) -> list[UnmetRequirement]:
             seen.append(context)
             return []
 
