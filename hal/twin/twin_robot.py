@@ -146,9 +146,9 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         period = 0.001
         if params.hardware:
             try:
-                hardware = read_hardware(params.hardware, context, context.robot)
+                hardware = read_hardware(params.hardware, context, robot)
                 period = hardware.bus.period
-                yield from missing_sensors(hardware, context.robot)
+                yield from missing_sensors(hardware, robot)
             except Exception as error:  # noqa: BLE001  # said in the load report
                 yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
         for what, longer, shorter in (
