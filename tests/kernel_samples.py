@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aloft.blocks.control import followed_plan, frames
+from aloft.blocks.control import frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
 from aloft.blocks.jumping import plan_progress, turn_timing
 from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
@@ -94,7 +94,7 @@ LIMB_GEOMETRY = limb_geometry(find_robot("bruce"), 0, 0.05)
 FOOT = FootMotion(np.array([0.03, -0.07, -0.28]), np.array([0.5, -0.2, 0.9]), np.eye(3))
 FOLLOWING = (
     LegSettings(
-        *np.array([[0.005], [0.3], [3e-4], [0.3], [30.0]]), np.zeros(1, np.bool_)
+        *(np.array(value) for value in (0.005, 0.3, 3e-4, 0.3, 30.0)), np.array(False)
     ),
     limb_memory(5)._replace(target=TARGET.copy(), twist=0.1 * NORMAL(6)),
     LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
@@ -134,28 +134,24 @@ SERIES = jump_series.Series(
 )  # fmt: skip
 BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
 TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
-FOLLOWED = (
-    followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),
-    followed_plan.Soles(
-        np.tile(np.eye(3), (2, 1, 1)),
-        np.array([4, 9]),
-        np.array([1.0, -1.0]),
-        -2.0 * np.ones(2),
-        2.0 * np.ones(2),
-    ),
-    followed_plan.PlannedJoints(
-        np.array(3),
-        np.array(1.0),
-        np.array(0.7),
-        np.array(1.05),
-        np.array([0.02, 0.2, -0.03, 0.98]),
-        DRAW(10),
-        DRAW(10),
-        DRAW(10),
-    ),
-)
-FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
-LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
+FOLLOWED = records(
+    {"rotation": np.tile(np.eye(3), (2, 1, 1))},
+    {
+        "time": 1.0, "lift_off_time": 0.7, "touchdown_time": 1.05, "phase": 3,
+        "orientation": [0.02, 0.2, -0.03, 0.98], "joint_position": DRAW(10),
+        "joint_velocity": DRAW(10), "joint_acceleration": DRAW(10),
+    },
+    {"position": np.zeros(10), "velocity": np.zeros(10), "reachable": np.zeros(2, bool)},
+    {"plan_lead": 0.009, "level_time": 0.08, "late_time": 0.005},
+    {
+        "sole_joint": [4, 9], "sole_axis": [1.0, -1.0], "sole_lowest": [-2.0, -2.0],
+        "sole_highest": [2.0, 2.0],
+    },
+    {
+        "flew": True, "flown_time": 0.998, "flown_position": DRAW(10), "flown_velocity": DRAW(10),
+        "flown_acceleration": DRAW(10),
+    },
+)  # fmt: skip
 FALLING = (
     np.array([1.23, 0.002, 0.002]),
     *(
@@ -219,13 +215,16 @@ UNUSED = {
     "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
     "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
     "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),
-    "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
-    "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
-    "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),
-    "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
-    "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),
+    "aloft.blocks.control.leg_inverse_kinematics.follow_plan": FOLLOWED,
+    "aloft.blocks.control.leg_inverse_kinematics.continue_flight": (*FOLLOWED[1:4], FOLLOWED[5]),
+    "aloft.blocks.control.leg_inverse_kinematics.extrapolate": (*DRAW((3, 10)), 0.01, FOLLOWED[2]),
+    "aloft.blocks.control.leg_inverse_kinematics.keeps_acceleration": (
+        FOLLOWED[1], FOLLOWED[3], FOLLOWED[5],
+    ),
+    "aloft.blocks.control.leg_inverse_kinematics.lead_share": FOLLOWED[1:2],
+    "aloft.blocks.control.leg_inverse_kinematics.planned_pitch": (np.array([0.02, 0.2, -0.03, 0.98]),),
+    "aloft.blocks.control.leg_inverse_kinematics.excess_pitch": (np.eye(3), 0.1),
+    "aloft.blocks.control.leg_inverse_kinematics.level_sole": (1, *FOLLOWED[:5], 0.1),
     "aloft.blocks.control.balance_target.correct_place": PLACE,
     "aloft.blocks.jumping.capture_step.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_step.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
