@@ -191,7 +191,7 @@ UNUSED = {
     "aloft.blocks.control.frames.update_frame": (
         MODEL[0], TREE, body_motion(10), 5, np.array([0.1, -0.2, 0.3]), FRAME,
     ),
-    "aloft.blocks.control.frames.write_rotation_jacobian": (
+    "aloft.mathematics.body_dynamics.rotation_jacobian": (
         TREE, body_motion(10), 5, np.zeros((3, 16)),
     ),
     "aloft.blocks.control.tasks.frame_position.FramePosition.error": (
