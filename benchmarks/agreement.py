@@ -26,7 +26,7 @@ from ..mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
 from ..mathematics.quadratic_program import ConeProgramSolver
 from ..mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ..mathematics.whole_body_qp import RigidBodyTerms, TaskRows, joint_torque
-from ..mathematics.whole_body_solution import SOLVED, Solution
+from ..mathematics.whole_body_solution import SOLVED, WholeBodySolution
 from ..runtime.graph import load
 from ..runtime.loading.reading.files import FOLDER
 from ..runtime.running.executor import Executor
@@ -362,7 +362,7 @@ class Methods:
         self._block = block
         n, contacts = len(block.command.acceleration), len(block.command.force)
         self._n = n
-        self._solution = Solution(
+        self._solution = WholeBodySolution(
             np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
         )
         arguments = block._solve.arguments

@@ -9,7 +9,7 @@ from typing import Any
 from marks import refresh
 
 from aloft.planner.task.margins import Margins
-from aloft.planner.task.sequence import Hop, RoughGround, Span
+from aloft.planner.task.sequence import Hop, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
 from aloft.runtime.language.parameters import Parameters
 
@@ -23,7 +23,7 @@ def task_tables() -> str:
     for title, owner in (
         ("", JumpTask),
         ("One of `jumps`", Hop),
-        ("One of `phases`", Span),
+        ("One of `phases`", PhaseSpec),
         ("`rough`", RoughGround),
         ("`knots`", Knots),
         ("`weights`", Weights),

@@ -76,7 +76,7 @@ class FrictionCone(NamedTuple):
     force_max: float
 
 
-class Bounds(NamedTuple):
+class TorqueBounds(NamedTuple):
     """Lower and upper bounds of the limited torques [N m], (n_joints,) each."""
 
     lower: Array1D
@@ -168,7 +168,7 @@ def torque_limits(
     terms: RigidBodyTerms,
     active: Indices1D,
     transmission: Array2D,
-    bounds: Bounds,
+    bounds: TorqueBounds,
     scratch: TorqueScratch,
     rows: Constraints,
 ) -> None:
@@ -196,7 +196,7 @@ def torque_limits(
 
 
 @kernel
-def motor_limits(speed: Array1D, curves: TorqueSpeedCurves, bounds: Bounds) -> None:
+def motor_limits(speed: Array1D, curves: TorqueSpeedCurves, bounds: TorqueBounds) -> None:
     """The torque bounds of each motor at its speed [rad/s], (n_motors,).
 
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.

@@ -28,7 +28,7 @@ import numpy as np
 from .arrays import Array1D, Array2D, Indices1D
 from .kernel import kernel
 from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
-from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
+from .whole_body_qp import RigidBodyTerms, TaskRows, TorqueBounds
 
 
 class Reduction(NamedTuple):
@@ -272,7 +272,7 @@ def torque_rows(
     active: Indices1D,
     count: int,
     transmission: Array2D,
-    bounds: Bounds,
+    bounds: TorqueBounds,
     first: int,
     matrix: Array2D,
     bound: Array1D,
@@ -323,7 +323,7 @@ def torque_rows(
 
 
 @kernel
-def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> bool:
+def within_limits(torque: Array1D, transmission: Array2D, bounds: TorqueBounds) -> bool:
     """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
     for motor in range(torque.shape[0]):
         total = 0.0

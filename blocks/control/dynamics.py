@@ -204,7 +204,7 @@ def apply_payload(
     np.rint(scratch.offset, scratch.offset)
     tree.com[0, :] = constants.torso_com + scratch.offset * LEAST_OFFSET
     if mass.mass > 0.0:
-        return round(mass.mass / constants.mass / LEAST_SCALE) * LEAST_SCALE
+        return float(round(mass.mass / constants.mass / LEAST_SCALE) * LEAST_SCALE)
     return 1.0
 
 

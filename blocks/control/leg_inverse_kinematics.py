@@ -382,7 +382,7 @@ def keeps_acceleration(reference: JumpReference, params: LegParams, memory: LegM
     """
     if params.late_time == 0.0 or not memory.flew:
         return False
-    return abs(reference.touchdown_time - reference.time) <= LOOKAHEAD
+    return bool(abs(reference.touchdown_time - reference.time) <= LOOKAHEAD)
 
 
 @kernel
@@ -395,7 +395,7 @@ def lead_share(reference: JumpReference) -> float:
     duration = reference.touchdown_time - reference.lift_off_time
     if since < 0.0 or duration <= 0.0:
         return 1.0
-    return min(2.0 * since / duration, 1.0)
+    return float(min(2.0 * since / duration, 1.0))
 
 
 @kernel

@@ -22,7 +22,7 @@ from ...mathematics.whole_body_qp import (
     friction_pyramids,
     torque_limits,
 )
-from ...mathematics.whole_body_solution import Motors, Weights
+from ...mathematics.whole_body_solution import MotorLimits, ProgramWeights
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class FullProgram:
         solver: str,
         rows: TaskRows,
         model: RigidBodyTerms,
-        motors: Motors,
-        weights: Weights,
+        motors: MotorLimits,
+        weights: ProgramWeights,
         *,
         limited: bool,
         n_contacts: int,

@@ -30,7 +30,7 @@ from .turn_timing import Body, Pose, Rotation, Turning, TurnProgress, TurnSettin
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
     from ...planner.library.library import PlanLibrary
-    from ...planner.task.plan import JumpPlan as Plan
+    from ...planner.task.plan import PlannedJump
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
@@ -159,13 +159,13 @@ class JumpPlan(KernelBlock):
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.library import shipped_tasks
-        from ...planner.task.task import TaskError
+        from ...planner.task.task import JumpTaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
         robot = context.robot
         try:
             task = read_or_make_task(params.task, context)
-        except TaskError as error:
+        except JumpTaskError as error:
             for line in str(error).splitlines():
                 place, _, rest = line.partition(": ")
                 key = rest.partition(": ")[0] if place == "task" else ""
@@ -210,13 +210,13 @@ class JumpPlan(KernelBlock):
     def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """The ground and the score's expectation that follow from the task."""
         from ...planner.task.ground import scene_of
-        from ...planner.task.task import TaskError
+        from ...planner.task.task import JumpTaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
         task = read_or_make_task(params.task, context)
         try:
             scene = scene_of(task, context.robot)
-        except TaskError as error:
+        except JumpTaskError as error:
             scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
         end, hops = task.places()[-1], task.hops()
         velocity, momentum = cls._corrections(task, params, context)
@@ -318,7 +318,7 @@ class JumpPlan(KernelBlock):
             + report.explain(),
         )
 
-    def _report_validity(self, plan: Plan) -> ValidityReport | None:
+    def _report_validity(self, plan: PlannedJump) -> ValidityReport | None:
         """The validity report of a plan that need not be valid; ``None`` if it must be valid."""
         if self.params.check == "required":
             return None
@@ -330,8 +330,8 @@ class JumpPlan(KernelBlock):
             raise BlockError(f"the plan {plan.task.name!r} is broken: {broken[0].where}")
         return report
 
-    def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.task.files import TaskError
+    def _plan(self, task: JumpTask, robot: RobotDescription) -> PlannedJump:
+        from ...planner.task.files import JumpTaskError
         from ...planner.task.plan import PlanFileError
 
         library = plan_library(self.params, robot)
@@ -345,7 +345,7 @@ class JumpPlan(KernelBlock):
                 plan = library.attempt(task)
             else:
                 plan, _ = library.plan(task)
-        except (TaskError, PlanFileError) as error:
+        except (JumpTaskError, PlanFileError) as error:
             raise BlockError(str(error)) from error
         kept = library.path_of(task)
         self.files_read = (kept,) if kept is not None else ()
@@ -363,7 +363,7 @@ def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
     """The task of a block, in the formulation that is planned.
 
     Raises:
-        LookupError, TaskError: as ``read_or_make_task``.
+        LookupError, JumpTaskError: as ``read_or_make_task``.
     """
     return _as_planned(read_or_make_task(params.task, context), params.formulation)
 
@@ -381,7 +381,7 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
-        TaskError: it cannot be read as a task.
+        JumpTaskError: it cannot be read as a task.
     """
     from ...planner.library.library import find_task
     from ...planner.task.read_task import changed_task, read_task, spoken_name

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...robots.description import Link, Look, Mesh, RobotDescription, Shape
+from ...robots.description import Appearance, Link, Mesh, RobotDescription, Shape
 from ...robots.importing.meshes import mesh_triangles, simplified
 from ...robots.importing.urdf_text import find_file
 from ...robots.kinematics import link_poses, matrices_of_quaternions
@@ -159,7 +159,7 @@ def read_meshes(robot: RobotDescription) -> RobotMeshes:
     return result
 
 
-def _joined(link: str, look: Look, most: int, known: dict[Path, Surface]) -> Surface:
+def _joined(link: str, look: Appearance, most: int, known: dict[Path, Surface]) -> Surface:
     """All meshes of a link as one. Raises ``OSError`` or ``ValueError`` with the sentence to tell."""
     corners: list[Array] = []
     triangles: list[NDArray[np.int64]] = []

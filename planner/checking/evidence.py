@@ -27,7 +27,7 @@ from ...robots.kinematics import (
 )
 from ...robots.welding import welded
 from ..models.symmetry import mirrored_pairs, symmetrised
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from ..task.sequence import edge_of
 from ..task.task import JumpTask
 from .replay import Replay
@@ -173,7 +173,7 @@ MILLIMETRE = 1e-3
 
 
 @dataclass(frozen=True)
-class Found:
+class PlanTestResult:
     """What a test found: it passes where ``value`` is at most ``limit``."""
 
     name: str
@@ -188,7 +188,7 @@ class Found:
 class Evidence:
     """A plan, its replay, and what several tests need of them."""
 
-    plan: JumpPlan
+    plan: PlannedJump
     robot: RobotDescription
     replay: Replay
 

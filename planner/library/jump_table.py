@@ -79,7 +79,7 @@ class JumpTable:
         )  # fmt: skip
 
 
-class Rows(NamedTuple):
+class TableRows(NamedTuple):
     """The columns of a table side by side, in the order of ``Fields``.
 
     ``time`` (n,) [s]; ``rows`` (n, width); ``sums`` (n, width), the integrals of what is ``fed`` (width,)
@@ -153,7 +153,7 @@ class JumpTableReader:
         self.instant = np.zeros(3)
         self.call = KernelCall(
             read_table,
-            Rows(
+            TableRows(
                 np.ascontiguousarray(table.time, dtype=np.float64), rows,
                 integral(table.time, rows), fed, np.array([table.squat_time, table.recover_time]),
                 jumps, jumps[:, 2].copy(), lands_in_part(table.time, contact, jumps[:, 2]),
@@ -180,7 +180,7 @@ class JumpTableReader:
 
 
 @kernel
-def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
+def sum_to(table: TableRows, time: float, sign: float, out: Array1D) -> None:
     """Add ``sign`` times the integral of what is fed forward, from the first row to ``time``.
 
     Between its rows a column is linear.
@@ -202,7 +202,7 @@ def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
 
 
 @kernel
-def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Array1D) -> None:
+def interpolate_rows(table: TableRows, time: float, lead: float, hold: float, out: Array1D) -> None:
     """All columns at ``time``, and what is fed forward as ``JumpTableReader.read`` says."""
     rows = table.rows
     here, part = locate(table.time, time)
@@ -251,7 +251,7 @@ def write_fields(values: Array1D, fields: Fields) -> None:
 
 
 @kernel
-def write_marks(table: Rows, time: float, marks: Marks) -> None:
+def write_marks(table: TableRows, time: float, marks: Marks) -> None:
     """Write the phase, the times of the flight, and which points carry load."""
     jump = present_jump(time, table.touchdowns)
     thrust, lift_off = table.jumps[jump, 0], table.jumps[jump, 1]
@@ -275,7 +275,7 @@ def write_marks(table: Rows, time: float, marks: Marks) -> None:
 
 @kernel
 def read_table(
-    table: Rows, instant: Array1D, values: Array1D, fields: Fields, marks: Marks
+    table: TableRows, instant: Array1D, values: Array1D, fields: Fields, marks: Marks
 ) -> None:
     """The reference at an instant.
 

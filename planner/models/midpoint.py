@@ -12,7 +12,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
 from ...robots.kinematics import matrices_of_quaternions
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from .exact_dynamics import ExactDynamics
 
 
@@ -68,7 +68,7 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def midpoint_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> tuple[Array, Array]:
+def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
     """What is left over in every interval, zero at impacts.
 
     Returns the gap, how far the coordinates miss those of a constant acceleration [m or rad],

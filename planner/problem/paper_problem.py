@@ -44,7 +44,7 @@ from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask
 from .assembly import Knot
-from .program import BoundsBuilder, Grid, Program, ballistic_flight, uniform_grid
+from .program import BoundsBuilder, Grid, SimpleProblem, ballistic_flight, uniform_grid
 from .stage_functions import StageFunction, derived
 
 NAME = "paper"
@@ -191,7 +191,7 @@ class PaperProblemBuilder:
         self.last = len(self.grid.phases)
         self.q_start, self.q_end = pose_of(start.coordinates), pose_of(end.coordinates)
 
-    def build(self) -> Program:
+    def build(self) -> SimpleProblem:
         """The problem with its bounds, parameters and guess."""
         sizes = parameter_sizes(self.model)
         self.fill = BoundsBuilder(self._knots(), self.pieces, sizes)

@@ -217,7 +217,7 @@ def bind_steps(block: Block) -> None:
             block.kernel_calls = (call,)
 
 
-def call_of(block: Block, function: FunctionType) -> KernelCall | PythonCall:
+def call_of(block: Block, function: Callable[..., object]) -> KernelCall | PythonCall:
     """The call of a function that names what it takes of a block.
 
     Raises:
@@ -227,6 +227,7 @@ def call_of(block: Block, function: FunctionType) -> KernelCall | PythonCall:
         return PythonCall(
             function, tuple(_python_argument(block, n) for n in arguments_of(function))
         )
+    assert isinstance(function, FunctionType)
     used = names_used(function)
     arguments = [_kernel_argument(block, function, each, used) for each in arguments_of(function)]
     if reports_event(function):

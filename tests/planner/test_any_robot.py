@@ -14,7 +14,7 @@ from aloft.planner.models.quaternions import pose_of
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.problem.structure import ContactRows
 from aloft.planner.solving.solve import solve_jump
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import RobotDescription
 
@@ -28,7 +28,7 @@ BIPED = legged_robot(
 
 
 @lru_cache(maxsize=2)
-def planned(robot_name: str) -> JumpPlan:
+def planned(robot_name: str) -> PlannedJump:
     robot = {"quadruped": QUADRUPED, "biped": BIPED}[robot_name]
     asked = {
         "recipe": "paper",
