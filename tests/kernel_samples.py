@@ -186,6 +186,7 @@ UNUSED = {
     "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
     "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
     "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),
+    "aloft.blocks.control.safety_monitor.first_bad_switch": records({"fault": [0, 0, 2, 0]}),
     "aloft.blocks.control.leg_inverse_kinematics.follow_plan": FOLLOWED,
     "aloft.blocks.control.leg_inverse_kinematics.continue_flight": (*FOLLOWED[1:4], FOLLOWED[5]),
     "aloft.blocks.control.leg_inverse_kinematics.extrapolate": (*DRAW((3, 10)), 0.01, FOLLOWED[2]),
