@@ -13,10 +13,10 @@ from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
-from aloft.robots.contact_kinematics import body_tree
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
+from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 from aloft.runtime.language.steps import as_record

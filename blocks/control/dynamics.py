@@ -28,9 +28,8 @@ from ...mathematics.compiling.equations import cross
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
-from ...robots.contact_kinematics import body_tree
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet
+from ...robots.kinematics import ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Input, Misfit, Output
 from ...runtime.language.parameters import Parameters

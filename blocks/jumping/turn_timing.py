@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import pitch_angle
 from ...planner.library.jump_table import locate
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import Phase
@@ -170,8 +171,6 @@ def value_at(times: Array, values: Array, time: float) -> float:
 def turned_beyond(rotation: Array, orientation: Array) -> float:
     """By how much [rad] a body of this ``rotation`` (3, 3) has turned further about its y axis than one
     of the planned ``orientation``, a quaternion x, y, z, w."""
-    x, y = float(orientation[0]), float(orientation[1])
-    z, w = float(orientation[2]), float(orientation[3])
-    planned = math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
+    planned = pitch_angle(orientation)
     measured = math.atan2(-float(rotation[2, 0]), float(rotation[0, 0]))
     return math.atan2(math.sin(measured - planned), math.cos(measured - planned))
