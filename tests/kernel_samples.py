@@ -11,7 +11,6 @@ from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
-from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
@@ -313,16 +312,22 @@ UNUSED = {
     ),
     "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
     "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
-    "aloft.mathematics.joint_feedback.integrate_accelerations": (
-        0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
+    "aloft.blocks.control.joint_pd.add_friction": (
+        *records(
+            {"velocity": POSE[0]}, {"torque": np.ones(3)}, {"friction_speed": 0.3},
+            {"friction": np.ones(3), "viscous_friction": POSE[1]},
+        ),
     ),
-    "aloft.mathematics.joint_feedback.add_friction": (
-        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.ones(10),
-    ),
-    "aloft.mathematics.joint_feedback.add_soft_stops": (
-        np.linspace(-1.0, 1.0, 5),
-        SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
-        Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
+    "aloft.blocks.control.joint_pd.add_soft_stops": (
+        *records(
+            {"position": [-1.02, 0.2, 0.99]},
+            {name: np.ones(3) for name in ("stiffness", "position", "damping", "velocity")},
+            {"stop_margin": 0.05, "stop_gain": 2.0},
+            {
+                "limits": np.tile([-1.0, 1.0], (3, 1)), "flight_stiffness": np.ones(3),
+                "flight_damping": np.ones(3),
+            },
+        ),
     ),
     "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
