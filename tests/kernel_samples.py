@@ -212,10 +212,10 @@ UNUSED = {
     "aloft.mathematics.capture_step.farthest_foot": (
         SOLES, np.array([0, 0, 1, 1]), 2, np.array([0.1, 0.02]), np.zeros(2),
     ),
-    "aloft.mathematics.capture_step.choose_foothold": (
-        np.array([-0.1, 0.02]), 6.0, 0.1, 0.1, SOLES, np.array([0, 0, 1, 1]), 1, 2, np.zeros(2),
-        np.zeros(2), np.zeros(3),
+    "aloft.blocks.jumping.capture_step.choose_foothold": (
+        *STEPPING[:3], STEP_SCRATCH, 1, 6.0, 0.1, np.zeros(3),
     ),
+    "aloft.blocks.jumping.capture_step.swing_points": (*STEPPING, STEP_PHASE, 1),
     "aloft.mathematics.capture_step.limit_foothold": (
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
@@ -240,11 +240,6 @@ UNUSED = {
         ),
     ),
     "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
-    "aloft.mathematics.capture_step.swing_points": (
-        1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
-        np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
-        np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
-    ),
     "aloft.mathematics.landing_law.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
         np.eye(3), 4.8, 0.5, flight_map(10, 4),
