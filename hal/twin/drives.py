@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
 from ..bear.configuration import Hardware
 from ..bear.protocol import Mode
 from ..simulated.drives import MotorLimits, drive_motors
@@ -49,7 +49,7 @@ class EmulatedDrives:
     ) -> None:  # fmt: skip
         n = len(actuators)
         self.actuators = tuple(actuators)
-        self._transmission = Transmission(robot)
+        self._transmission = TransmissionMap(robot)
         limits = MotorLimits(robot, record)
         self._motor_torque = limits.motor_torque
         self._moving_at, self._limited = np.zeros(n), np.zeros(n)
