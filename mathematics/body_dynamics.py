@@ -210,19 +210,12 @@ def turn_inertia(inertia: Array1D, rotation: Matrix3, turned: Matrix3, out: Arra
         turned[row, 0] = a * xx + b * xy + c * xz
         turned[row, 1] = a * xy + b * yy + c * yz
         turned[row, 2] = a * xz + b * yz + c * zz
-    out[0] = _product(turned, rotation, 0, 0)
-    out[1] = _product(turned, rotation, 1, 1)
-    out[2] = _product(turned, rotation, 2, 2)
-    out[3] = _product(turned, rotation, 0, 1)
-    out[4] = _product(turned, rotation, 0, 2)
-    out[5] = _product(turned, rotation, 1, 2)
-
-
-@kernel
-def _product(a: Array2D, b: Array2D, row: int, other: int) -> float:
-    """Row ``row`` of ``a`` times row ``other`` of ``b``, both (3, 3)."""
-    first = a[row, 0] * b[other, 0] + a[row, 1] * b[other, 1]
-    return float(first + a[row, 2] * b[other, 2])
+    out[0] = turned[0] @ rotation[0]
+    out[1] = turned[1] @ rotation[1]
+    out[2] = turned[2] @ rotation[2]
+    out[3] = turned[0] @ rotation[1]
+    out[4] = turned[0] @ rotation[2]
+    out[5] = turned[1] @ rotation[2]
 
 
 @kernel

@@ -282,7 +282,6 @@ UNUSED = {
     "aloft.robots.limb.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
     "aloft.robots.limb._along": (POSE, LIMB.tip),
-    "aloft.robots.limb._product": (POSE, TARGET, 1, 2),
     "aloft.mathematics.rotations.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_leg.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
@@ -291,6 +290,7 @@ UNUSED = {
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.mathematics.rotations.pitch_angle": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
