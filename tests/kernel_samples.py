@@ -5,7 +5,8 @@ import numpy as np
 from aloft.blocks.control import followed_plan, frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
 from aloft.blocks.jumping import plan_progress, turn_timing
-from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
+from aloft.blocks.scoring.footing import Footing
+from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
@@ -19,6 +20,8 @@ from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 from aloft.runtime.language.steps import as_record
+
+from .robots.limbed_robots import quadruped
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -100,40 +103,8 @@ FOLLOWING = (
     LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
 )  # fmt: skip
 DRAW = np.random.default_rng(4).standard_normal
-STANDING = stand_following.Stand(
-    now=np.array(1.2), ticks=np.array(3), fall_time=np.array(-1.0), fall_tilt=np.array(0.0),
-    fall_height=np.array(0.0), standing_height=np.array(0.3), foot=0.1 * DRAW((2, 2)),
-    landed_foot=0.1 * DRAW((2, 2)), foot_slip=np.array(0.01), lifted_time=np.array([0.03, 0.0]),
-    steps=np.array(0), step_end=np.array([1.198, 0.0]), longest_lift=np.array(0.01),
-    peak_tilt=np.array(0.1), judged_time=np.array(-1.0), tilt=np.array(0.0), com_speed=np.array(0.0),
-    angular_speed=np.array(0.0), margin=np.array(0.0), load_share=np.array(0.0),
-    points_unloaded=np.array(0), forbidden=np.array(0), forbidden_time=np.array(-1.0),
-    violation=np.array(0.0), overload=np.array(0.0), peak_torque=np.array(1.0),
-    peak_speed=np.array(2.0), saturated=np.array(0.5), failures=np.array(0),
-)  # fmt: skip
-SEEN = stand_following.Truth(
-    np.array([0.0, 0.0, 0.35]), np.array([0.1, 0.0, 0.0, 0.99]), *0.02 * DRAW((1, 3)),
-    np.array([0.01, 0.0, 0.3]), 0.01 * DRAW(3), SOLES, np.tile([0.0, 0.0, 12.0], (4, 1)),
-    np.array([False, False, True, True]), np.zeros(4), np.array(1), np.array(0.01), np.array(0.0),
-    np.array(0.1), DRAW(10), DRAW(10),
-)  # fmt: skip
-STAND_LIMITS = stand_following.Limits(1.2, 0.1, 0.02, 1, 0.15, 0.002, 50.0, np.array([0, 0, 1, 1]))
-LANDED = jump_series.Jump(
-    DRAW((2, 2)), np.array(0.5), np.array(1.1), DRAW(3), np.array(0.5), np.array(1.3), DRAW(3),
-    np.array(0.7), np.array(1.0), np.array(-1.0), np.array(0.2), np.array(0.45), DRAW((2, 2)),
-    DRAW((2, 2)), np.array(0.0), np.array(0.0),
-)  # fmt: skip
-PLANNED = jump_series.Planned(
-    np.array(0.3), np.array(1.2), np.array(0.5), np.array(0.31), np.array(0.43), *DRAW((2, 2, 2)),
-    np.array(0.1), np.array(0.3),
-)  # fmt: skip
-SERIES = jump_series.Series(
-    np.array(1), np.array(0.4), np.array(0.5), np.array(0.9), np.array(1), np.array(0.05),
-    np.array(1), np.array(0.02), np.array(1), np.array(0.01), np.array(0.02), np.array(1),
-    np.array(0.05), np.array(0.03), np.array(1),
-)  # fmt: skip
 BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
-TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
+ROW = tuple(as_record(each.allocate({"n_feet": 2})) for each in (JumpRecord, JumpSeries))
 FOLLOWED = (
     followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),
     followed_plan.Soles(
@@ -250,25 +221,15 @@ UNUSED = {
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
     "aloft.blocks.scoring.footing.unroll": (
-        footing.Ball(
-            1, 0.02, np.array(LIMB.joints), LIMB.links, LIMB.tip, np.zeros(5), np.zeros((5, 6)),
-            np.zeros((4, 3)), np.zeros(3),
-        ),
-        0.2 * DRAW(10), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((2, 2)),
+        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
     ),
-    "aloft.blocks.scoring.jump_series.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
-    "aloft.blocks.scoring.jump_series.keep_place": (SERIES,),
-    "aloft.blocks.scoring.jump_series.note_landing": (0.3, LANDED, PLANNED, SERIES, True),
-    "aloft.blocks.scoring.jump_series.note_place": (DRAW((2, 2)), LANDED, PLANNED, SERIES),
-    "aloft.blocks.scoring.jump_following.follow_row": (
-        1.0, True, DRAW((2, 2)), LANDED._replace(lift_off_time=np.array(-1.0)), PLANNED, SERIES,
-        TIMES, jump_following.Verdict(np.zeros(1, np.int64), np.zeros(1)),
+    "aloft.blocks.scoring.jump_score.record_row": (
+        BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
     ),
-    "aloft.blocks.scoring.stand_score.follow_stand": (
-        np.array([600]), 0.002, SEEN, np.array([0.0, 0.0, 0.28]), np.array(2), STANDING,
-        stand_score.Squat(np.array(0.31), np.array(0.31), np.array(0.29)), STAND_LIMITS, 0.3, 1.0,
-        np.zeros(1, np.int64),
-    ),
+    "aloft.blocks.scoring.jump_score.record_jump": (*ROW, True),
+    "aloft.blocks.scoring.jump_score.compare_place": ROW,
+    "aloft.blocks.scoring.jump_score.keep_place": (ROW[1],),
+    "aloft.blocks.scoring.jump_score.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
     "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
