@@ -34,7 +34,7 @@ class DelayMemory(Signal):
     matched = Field(unit="", text="share of the measured changes that this delay explains")
 
 
-class DelayParameters(Parameters):
+class DelayEstimatorParameters(Parameters):
     """The parameters of ``DelayEstimator``."""
 
     told: float = parameter(0.002, unit="s", ge=0.0, le=0.02, text="the delay that the graph says")
@@ -111,11 +111,11 @@ class DelayEstimator(Block):
     It is a Moore block, so the plan that leads by its output may be what the command follows from.
     """
 
-    Params = DelayParameters
+    Params = DelayEstimatorParameters
     Constants = DelayConstants
     Scratch = DelayScratch
     needs = ("robot",)
-    params: DelayParameters
+    params: DelayEstimatorParameters
     constants: DelayConstants
     command = Input(JointCommand, text="what the drives were sent")
     joints = Input(JointState, text="the torques that they report")
@@ -131,7 +131,9 @@ class DelayEstimator(Block):
 
     @kernel
     @staticmethod
-    def emit(memory: DelayMemory, estimate: DelayEstimate, params: DelayParameters) -> None:
+    def emit(
+        memory: DelayMemory, estimate: DelayEstimate, params: DelayEstimatorParameters
+    ) -> None:
         estimate.measured = max(memory.delay, 0.0)
         estimate.known = memory.delay >= 0.0
         estimate.delay = params.told
@@ -145,7 +147,7 @@ class DelayEstimator(Block):
         command: JointCommand,
         joints: JointState,
         memory: DelayMemory,
-        params: DelayParameters,
+        params: DelayEstimatorParameters,
         constants: DelayConstants,
         scratch: DelayScratch,
         period: float,
@@ -196,7 +198,7 @@ def correlate_changes(torque_change: Array1D, memory: DelayMemory) -> None:
 
 
 @kernel
-def solve_delay(memory: DelayMemory, params: DelayParameters, period: float) -> None:
+def solve_delay(memory: DelayMemory, params: DelayEstimatorParameters, period: float) -> None:
     """Find the delay, a number of periods and a share of one, that leaves the least unexplained."""
     energy, square, product = memory.energy, memory.square, memory.product
     if energy <= 0.0:
@@ -214,6 +216,6 @@ def solve_delay(memory: DelayMemory, params: DelayParameters, period: float) -> 
         error += rest * rest * newer + 2.0 * share * rest * both
         error += share * share * older
         if error < least:
-            least, delay = error, (float(j) + share) * period
+            least, delay = error, (j + share) * period
     memory.matched = 1.0 - least / energy
     memory.delay = delay if memory.matched >= params.least_match else -1.0

@@ -21,7 +21,7 @@ class CommandMemory(Signal):
     loaded = Field(COMMANDS, dtype="bool", text="whether a point was in stance in these ticks")
 
 
-class PredictionScratch(Signal):
+class StatePredictorScratch(Signal):
     """What a tick of ``StatePredictor`` computes on its way."""
 
     fall = Field(3, unit="m/s^2", frame="body", text="acceleration of the base in free fall")
@@ -51,7 +51,7 @@ class StatePredictor(Block):
     of a velocity adds a times itself to a position. With ``ahead`` 0 the output is the input.
     """
 
-    Scratch = PredictionScratch
+    Scratch = StatePredictorScratch
     needs = ("floating base",)
 
     measured_base = Input(BaseState, text="pose and velocity of the base")
@@ -74,7 +74,7 @@ class StatePredictor(Block):
         base: BaseState,
         joints: JointState,
         memory: CommandMemory,
-        scratch: PredictionScratch,
+        scratch: StatePredictorScratch,
         period: float,
     ) -> None:
         remember_command(command, phase, memory)
@@ -97,7 +97,7 @@ def remember_command(command: WholeBodyCommand, phase: PhaseState, memory: Comma
 
 
 @kernel
-def fall_freely(base: BaseState, scratch: PredictionScratch) -> None:
+def fall_freely(base: BaseState, scratch: StatePredictorScratch) -> None:
     """The rate of the base's velocity in its own axes in free fall: R' g - w x (R' v)."""
     fall, velocity = scratch.fall, scratch.vector
     fall[0], fall[1], fall[2] = 0.0, 0.0, -GRAVITY
@@ -112,7 +112,7 @@ def add_commands(
     delay: DelayEstimate,
     period: float,
     memory: CommandMemory,
-    scratch: PredictionScratch,
+    scratch: StatePredictorScratch,
 ) -> None:
     """The changes of velocity and position within ``ahead`` by the commands that act then.
 
@@ -138,7 +138,7 @@ def add_commands(
 
 @kernel
 def predict_base(
-    measured: BaseState, ahead: float, base: BaseState, scratch: PredictionScratch
+    measured: BaseState, ahead: float, base: BaseState, scratch: StatePredictorScratch
 ) -> None:
     """Move the base on by its velocity and by what the commands change."""
     velocity, position, vector = scratch.velocity_change, scratch.position_change, scratch.vector
@@ -156,7 +156,7 @@ def predict_base(
 
 @kernel
 def predict_joints(
-    measured: JointState, ahead: float, joints: JointState, scratch: PredictionScratch
+    measured: JointState, ahead: float, joints: JointState, scratch: StatePredictorScratch
 ) -> None:
     """Move the joints on likewise; their torques are as measured."""
     joints.velocity[:] = measured.velocity + scratch.velocity_change[6:]
