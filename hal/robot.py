@@ -16,7 +16,7 @@ from ..blocks.signals import (
     JointState,
     RobotHealth,
 )
-from ..blocks.signals.drive_conditions import HEALTHY
+from ..blocks.signals.robot import HEALTHY
 from ..mathematics.arrays import (
     Indices1D,
 )

@@ -26,6 +26,7 @@ from .arrays import (
 )
 from .constants import GRAVITY
 from .kernel import kernel
+from .rotations import rotate_about_axis
 
 
 class BodyTree(NamedTuple):
@@ -78,21 +79,6 @@ def body_motion(n_joints: int) -> BodyMotion:
 
 
 @kernel
-def turn_about(base: Matrix3, axis: Vector3, angle: float, out: Matrix3) -> None:
-    """``base`` (3, 3) times the rotation by ``angle`` [rad] about the unit vector ``axis``."""
-    x, y, z = axis[0], axis[1], axis[2]
-    cos, sin = math.cos(angle), math.sin(angle)
-    rest = 1.0 - cos
-    xx, yy, zz = cos + x * x * rest, cos + y * y * rest, cos + z * z * rest
-    xy, xz, yz = x * y * rest, x * z * rest, y * z * rest
-    for row in range(3):
-        a, b, c = base[row, 0], base[row, 1], base[row, 2]
-        out[row, 0] = a * xx + b * (xy + z * sin) + c * (xz - y * sin)
-        out[row, 1] = a * (xy - z * sin) + b * yy + c * (yz + x * sin)
-        out[row, 2] = a * (xz + y * sin) + b * (yz - x * sin) + c * zz
-
-
-@kernel
 def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
     """Where all bodies are at the joints' positions [rad, or m for a slide], (n_joints,)."""
     for k in range(position.shape[0]):
@@ -113,7 +99,8 @@ def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
                 place[row] = place[row] + joint[row] * angle
                 joint[3 + row] = 0.0
             continue
-        turn_about(rotation, tree.axis[k], angle, motion.rotation[k + 1])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        rotate_about_axis(rotation, tree.axis[k], cosine, sine, motion.rotation[k + 1])
         x, y, z = place[0], place[1], place[2]
         u, v, w = joint[3], joint[4], joint[5]
         joint[0], joint[1], joint[2] = y * w - z * v, z * u - x * w, x * v - y * u

@@ -35,7 +35,7 @@ from .active_set import (
 )
 from .arrays import Array, Array1D, Array2D, Array3D, Flags, Indices, Indices1D
 from .kernel import kernel
-from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows
+from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows, TorqueLimits
 from .whole_body_reduction import (
     Reduction,
     force_gradient,
@@ -45,7 +45,6 @@ from .whole_body_reduction import (
     reduction_memory,
 )
 from .whole_body_solution import (
-    MotorLimits,
     ProgramWeights,
     WholeBodySolution,
     exceeds_limits,
@@ -309,7 +308,7 @@ def solve_whole_body_cones(
     joint_velocity: Array,
     weights: ProgramWeights,
     limits: int,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     memory: ConeSolutionMemory,
     solution: WholeBodySolution,
 ) -> None:
@@ -333,7 +332,7 @@ def solve_whole_body_cones(
 def solve_cone_forces(
     terms: RigidBodyTerms,
     weights: ProgramWeights,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     memory: ConeSolutionMemory,

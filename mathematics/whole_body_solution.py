@@ -11,13 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .active_set import ActiveSetMemory, QuadraticProgram, active_set_memory, polish, solve_program
-from .arrays import Array1D, Array2D, Flags1D, Indices1D, Rows3
+from .arrays import Array1D, Flags1D, Indices1D, Rows3
 from .kernel import kernel
 from .whole_body_qp import (
     RigidBodyTerms,
     TaskRows,
-    TorqueBounds,
-    TorqueSpeedCurves,
+    TorqueLimits,
     motor_limits,
 )
 from .whole_body_reduction import (
@@ -59,19 +58,6 @@ class ProgramWeights(NamedTuple):
     friction: Array1D
     force_min: Array1D
     force_max: Array1D
-
-
-class MotorLimits(NamedTuple):
-    """The motors: speeds from joint velocities, torques from joint torques, and their limits.
-
-    ``to_speed`` and ``to_torque`` are (n, n); ``speed`` (n,) is scratch.
-    """
-
-    to_speed: Array2D
-    to_torque: Array2D
-    curves: TorqueSpeedCurves
-    speed: Array1D
-    bounds: TorqueBounds
 
 
 class WholeBodySolution(NamedTuple):
@@ -116,7 +102,7 @@ def solve_whole_body(
     joint_velocity: Array1D,
     weights: ProgramWeights,
     limits: int,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     memory: SolutionMemory,
     solution: WholeBodySolution,
 ) -> None:
@@ -154,7 +140,7 @@ def reduce_program(
     joint_velocity: Array1D,
     weights: ProgramWeights,
     limits: int,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     reduction: Reduction,
     active: Indices1D,
     solution: WholeBodySolution,
@@ -182,10 +168,10 @@ def reduce_program(
 
 @kernel
 def exceeds_limits(
-    limits: int, motors: MotorLimits, reduction: Reduction, solution: WholeBodySolution
+    limits: int, motors: TorqueLimits, reduction: Reduction, solution: WholeBodySolution
 ) -> bool:
     """Whether the solution's torques exceed their limits; if so, prepares the larger program."""
-    if limits == NO_LIMITS or within_limits(solution.torque, motors.to_torque, motors.bounds):
+    if limits == NO_LIMITS or within_limits(solution.torque, motors):
         return False
     free_motions(reduction)
     return True
@@ -211,7 +197,7 @@ def write_forces(
 def solve_forces(
     terms: RigidBodyTerms,
     weights: ProgramWeights,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     memory: SolutionMemory,
@@ -246,7 +232,7 @@ def solve_forces(
 def limit_rows(
     terms: RigidBodyTerms,
     weights: ProgramWeights,
-    motors: MotorLimits,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     reduction: Reduction,
@@ -260,23 +246,21 @@ def limit_rows(
         weights.force_max[0], matrix, bound,
     )  # fmt: skip
     if extra > 0:
-        rows = torque_rows(
-            reduction, terms, active, count, motors.to_torque, motors.bounds, rows, matrix, bound
-        )
+        rows = torque_rows(reduction, terms, active, count, motors, rows, matrix, bound)
     return rows
 
 
 @kernel
-def limit_motors(joint_velocity: Array1D, limits: int, motors: MotorLimits) -> None:
+def limit_motors(joint_velocity: Array1D, limits: int, motors: TorqueLimits) -> None:
     """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
     for i in range(motors.speed.shape[0]):
         if limits == JOINT_LIMITS:
-            motors.bounds.upper[i] = motors.curves.peak[i]
-            motors.bounds.lower[i] = -motors.curves.peak[i]
+            motors.upper[i] = motors.peak[i]
+            motors.lower[i] = -motors.peak[i]
             continue
         total = 0.0
         for j in range(joint_velocity.shape[0]):
             total += motors.to_speed[i, j] * joint_velocity[j]
         motors.speed[i] = total
     if limits == MOTOR_LIMITS:
-        motor_limits(motors.speed, motors.curves, motors.bounds)
+        motor_limits(motors)

@@ -4,7 +4,6 @@ import numpy as np
 
 from aloft.blocks.control import followed_plan, frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
-from aloft.blocks.jumping import plan_progress, turn_timing
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import RobotTruth
@@ -13,10 +12,11 @@ from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
-from aloft.robots.contact_kinematics import body_tree
+from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
+from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 from aloft.runtime.language.steps import as_record
@@ -127,32 +127,22 @@ FOLLOWED = (
 )
 FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
 LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
-FALLING = (
-    np.array([1.23, 0.002, 0.002]),
-    *(
-        plan_progress.Motion(np.array([0.1, 0.0, z]), np.array([0.1, 0.0, -0.9]), np.zeros((2, 3)))
-        for z in (0.4, 0.41)
-    ),
-    plan_progress.Flight(np.array(3), np.array(1.35), np.array(True)),
-    plan_progress.FallSettings(5.0, 0.5, 0.002),
-    plan_progress.Progress(np.array(0.001), np.array(0.0)),
-)
-TURNING = (
-    np.array([1.23, 0.002, 0.002]),
-    turn_timing.Body(
-        np.eye(3), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]), np.array([0.0, 0.9, 0.0]),
-        NORMAL((6, 16)),
-    ),
-    turn_timing.Pose(
-        np.array(3), np.array(1.35), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]),
-        np.array([0.0, 0.1, 0.0, 0.99]),
-    ),
-    turn_timing.Rotation(
-        np.array([1.0, 1.1, 1.25, 1.35]), np.array([10.0, 20.0, 20.0, 11.0]),
-        np.array([6.0, 4.5, 1.5, 0.0]), np.array([1.08, 1.29, 20.0, 1.0]),
-    ),
-    turn_timing.TurnSettings(50.0, 0.04, 0.005, -0.04, 0.002),
-    turn_timing.TurnProgress(np.array(0.001), np.array(1.01)),
+FALLING = records(
+    {
+        "com": [0.1, 0.0, 0.5], "com_velocity": [0.1, 0.0, -0.9], "angular_momentum": [0.0, 0.9, 0.0],
+        "base_rotation": np.eye(3), "centroidal_matrix": NORMAL((6, 16)),
+    },
+    {
+        "phase": 3, "touchdown_time": 1.35, "toes_first": True, "com": [0.1, 0.0, 0.5],
+        "com_velocity": [0.1, 0.0, -0.9], "orientation": [0.0, 0.1, 0.0, 0.99],
+    },
+    {"late": 0.001, "before": 0.0, "spin": 1.01},
+    {"toes_gain": 5.0},
+    {"gain": 50.0, "early": 0.04, "late": 0.005, "aim": -0.04, "period": 0.002},
+)  # fmt: skip
+ROTATION = FlightRotation(
+    np.array([1.0, 1.1, 1.25, 1.35]), np.array([10.0, 20.0, 20.0, 11.0]),
+    np.array([6.0, 4.5, 1.5, 0.0]), np.array([1.08, 1.29, 20.0, 1.0]),
 )  # fmt: skip
 MODEL = records(
     {"base_position": NORMAL(3), "base_rotation": np.eye(3), "velocity": NORMAL(16)},
@@ -185,11 +175,13 @@ UNUSED = {
             {"tick": 400, "base_period": 0.002},
         ),
     ),
-    "aloft.blocks.jumping.plan_progress.follow_fall": FALLING,
+    "aloft.blocks.jumping.plan_progress.follow_fall": (1.23, *FALLING),
     "aloft.blocks.jumping.plan_progress.time_to_fall": (0.35, -0.8),
-    "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
-    "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
-    "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),
+    "aloft.blocks.jumping.plan_progress.follow_turn": (
+        1.23, *FALLING[:2], ROTATION, FALLING[2], FALLING[4],
+    ),
+    "aloft.blocks.jumping.plan_progress.value_at": (*ROTATION[:2], 1.23),
+    "aloft.blocks.jumping.plan_progress.turned_beyond": (np.eye(3), np.array([0.0, 0.1, 0.0, 0.99])),
     "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
     "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),

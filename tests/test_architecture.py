@@ -42,7 +42,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
-        "runtime/links", "runtime/transports", "robots", "mathematics/compiling",
+        "runtime/links", "runtime/transports", "robots", "mathematics",
     ),
     "runtime": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
@@ -80,14 +80,14 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
-    "logs/viewing": ("logs/file", "hal/sensors", "mathematics/arrays", "robots", "runtime/language"),
+    "logs/viewing": ("logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
-        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language", "runtime/running",
+        "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),

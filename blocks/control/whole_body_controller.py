@@ -18,8 +18,7 @@ from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_bo
 from ...mathematics.whole_body_qp import (
     RigidBodyTerms,
     TaskRows,
-    TorqueBounds,
-    TorqueSpeedCurves,
+    TorqueLimits,
     joint_torque,
     share_weight,
 )
@@ -29,7 +28,6 @@ from ...mathematics.whole_body_solution import (
     NO_CONTACT,
     NO_LIMITS,
     SOLVED,
-    MotorLimits,
     ProgramWeights,
     WholeBodySolution,
     limit_motors,
@@ -269,14 +267,11 @@ class WholeBodyController(KernelBlock):
         limited, by_motor = p.limits != "none", p.limits == "motor"
         limits = MOTOR_LIMITS if by_motor else JOINT_LIMITS if limited else NO_LIMITS
         motors = robot.motors
-        curves = TorqueSpeedCurves(np.zeros(n_joints), motors.corner_speed, motors.no_load_speed)
-        self._motors = MotorLimits(
-            robot.joint_to_motor,
-            robot.torque_to_motor if by_motor else np.eye(n_joints),
-            curves,
-            np.zeros(n_joints),
-            TorqueBounds(np.zeros(n_joints), np.zeros(n_joints)),
-        )
+        self._motors = TorqueLimits(
+            robot.joint_to_motor, robot.torque_to_motor if by_motor else np.eye(n_joints),
+            np.zeros(n_joints), motors.corner_speed, motors.no_load_speed,
+            *(np.zeros(n_joints) for _ in range(3)),
+        )  # fmt: skip
         self._product, self._zero_acceleration = np.zeros(n_joints), np.zeros(n)
         self._model = RigidBodyTerms(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
@@ -342,7 +337,7 @@ class WholeBodyController(KernelBlock):
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
         peak = self.robot.motors.peak_torque
-        np.multiply(p.torque_margin, peak, out=self._motors.curves.peak)
+        np.multiply(p.torque_margin, peak, out=self._motors.peak)
         changed = {kind: self._task_params(kind) for kind in PHASE_KINDS}
         for kind, params in changed.items():
             for task, each in zip(self._tasks[kind], params, strict=True):

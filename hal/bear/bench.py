@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
@@ -156,7 +156,7 @@ def jog(
     bus.write(motor.id, {"torque_enable": Torque.OFF})
     reply = bus.ping(motor.id)
     if is_critical(reply.error_byte):
-        raise BusError(f"drive {name}: {describe(reply.error_byte)}")
+        raise BusError(f"drive {name}: {describe_conditions(reply.error_byte)}")
     start = motor.sign * bus.read(motor.id, "present_position")["present_position"] - motor.offset
     for end in (start, start + angle):
         if not motor.low <= end <= motor.high:
@@ -189,7 +189,7 @@ def jog(
                 raise BusError(f"drive {name} does not answer any more")
             condition = int(bulk.error_bytes.item(0))
             if is_critical(condition):
-                raise BusError(f"drive {name}: {describe(condition)}")
+                raise BusError(f"drive {name}: {describe_conditions(condition)}")
             if not next_cycle():
                 raise BusError("the dead man's switch was let go")
             yield goal, motor.sign * bulk.values.item(0) - motor.offset

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...runtime.language.errors import AloftError
 from .protocol import (
     BROADCAST,
@@ -69,7 +69,7 @@ class Reply:
     @property
     def problem(self) -> str:
         """What the error byte reports, in words."""
-        return describe(self.error_byte)
+        return describe_conditions(self.error_byte)
 
     @property
     def failed(self) -> bool:

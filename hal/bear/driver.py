@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ...blocks.signals import DrivePhase
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission, motor_gains
@@ -100,7 +100,7 @@ def clear_errors(bus: BearBus, hardware: Hardware) -> None:
             if not is_critical(condition):
                 break
         else:
-            raise BusError(f"drive {name} (address {motor.id}): {describe(condition)}")
+            raise BusError(f"drive {name} (address {motor.id}): {describe_conditions(condition)}")
 
 
 def configure(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import ContactSwitches, ImuReading, JointState
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import Transmission
 from ...runtime.language.signals import Signal
@@ -229,7 +229,7 @@ class Supervision:
             return ""
         for k, condition in enumerate(bulk.error_bytes.tolist()):
             if is_critical(condition):
-                return f"{self._who[k]}: {describe(condition)}"
+                return f"{self._who[k]}: {describe_conditions(condition)}"
         voltage = _first_lasting(
             measured.voltage, settings.lowest_voltage, self.low, settings.bad_cycles, -1.0
         )

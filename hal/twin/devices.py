@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...blocks.signals import ImuReading
-from ...blocks.signals.drive_conditions import HEALTHY
+from ...blocks.signals.robot import HEALTHY
 from ...robots.robot_description import MountedSensorPart
 from ..bear.protocol import (
     BROADCAST,

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import Appearance, Link, Mesh, RobotDescription, Shape
 from ...robots.importing.meshes import mesh_triangles, simplified
 from ...robots.importing.urdf_text import find_file
-from ...robots.kinematics import link_poses, matrices_of_quaternions
+from ...robots.kinematics import link_poses
 
 USUAL_REACH = 0.4
 """The reach [m] of the robot that the sizes of marks and lines are given for."""
@@ -191,8 +192,7 @@ def _absent(link: str, mesh: Mesh) -> str:
 
 
 def _rotation(mesh: Mesh) -> Array:
-    matrix: Array = matrices_of_quaternions(np.array([mesh.orientation]))[0]
-    return matrix
+    return matrices_of_quaternions(np.array(mesh.orientation))
 
 
 def drawn_link(

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
     from_base_outwards,
     link_poses,
-    matrices_of_quaternions,
 )
 from ...robots.welding import welded
 from ..models.symmetry import mirrored_pairs, symmetrised

@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..models.midpoint import angular_motion, cross, euler_angles, euler_rates, rotation
-from ..models.quaternions import pose_of
+from ..models.midpoint import (
+    angular_motion,
+    cross,
+    euler_angles,
+    euler_rates,
+    pose_of,
+    rotation,
+)
 from ..models.symbolic_model import SymbolicModel
 from ..task.plan import PlannedJump
 from .problem import FullProblem

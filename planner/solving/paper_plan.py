@@ -8,8 +8,8 @@ import numpy as np
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ...robots.kinematics import matrices_of_quaternions
 from ..models.robot_model import model_of, stances_of
 from ..problem import paper_problem as stages
 from ..problem.paper_problem import PaperProblemBuilder

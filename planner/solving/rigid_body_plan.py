@@ -17,9 +17,9 @@ import numpy as np
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ...robots.kinematics import matrices_of_quaternions
-from ..models.quaternions import pose_of
+from ..models.midpoint import pose_of
 from ..models.robot_model import Stance, model_of, stances_of
 from ..models.simple_models import BLEND, RigidBody, composite_inertia
 from ..models.symbolic_model import SymbolicModel

@@ -11,12 +11,11 @@ import numpy as np
 from aloft.blocks.signals import Phase
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.constants import GRAVITY
+from aloft.mathematics.rotations import matrices_of_quaternions, multiply
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.midpoint import angular_motion, euler_angles, euler_rates, rotation
-from aloft.planner.models.quaternions import product
 from aloft.planner.task.plan import PlannedJump
 from aloft.robots.description import RobotDescription
-from aloft.robots.kinematics import matrices_of_quaternions
 
 WEIGHT = np.array([0.0, 0.0, -GRAVITY])
 
@@ -45,7 +44,8 @@ def paper_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, flo
         v, force = plan.velocity[k], plan.contact_force[k - 1]
         turn = matrices_of_quaternions(q[k, None, 3:7])[0]
         half = 0.5 * dt * v[3:6]
-        turned = product(q[k - 1, 3:7], np.append(half, 1.0)) / np.sqrt(1.0 + half @ half)
+        turned = np.empty(4)
+        multiply(q[k - 1, 3:7], np.append(half, 1.0) / np.sqrt(1.0 + half @ half), turned)
         note("integration", q[k, :3] - q[k - 1, :3] - dt * turn @ v[:3])
         note("integration", q[k, 3:7] - turned)
         note("integration", q[k, 7:] - q[k - 1, 7:] - dt * v[6:])

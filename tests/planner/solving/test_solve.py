@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.planner.checking.validity import InvalidPlanError, check_plan, checked
 from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.problem.guess import ballistic_guess
@@ -35,7 +36,6 @@ from aloft.planner.task.plan import ARRAYS, PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
-from aloft.robots.kinematics import matrices_of_quaternions
 
 from ..independence import smallest_singular_value
 
