@@ -133,7 +133,7 @@ def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
 
 
 def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    from ...runtime.loading.problems import nearest
+    from ...files.problems import nearest
 
     if task.profile and task.profile not in robot.profiles:
         there = ", ".join(robot.profiles)
