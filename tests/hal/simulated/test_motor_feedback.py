@@ -10,8 +10,8 @@ import pytest
 from aloft.blocks.signals import CommandMode, JointCommand
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.protocol import Mode
-from aloft.hal.drive_control import DriveGains, DriveGoals, joint_gains
-from aloft.hal.simulated.motor_feedback import FeedbackState, MotorFeedback
+from aloft.hal.drive_control import CommandTargets, DriveGains, DriveGoals, joint_gains
+from aloft.hal.simulated.motor_feedback import FeedbackState, MotorFeedback, close_loops
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.state import TickRecord
 from aloft.hal.twin.devices import EmulatedActuator
@@ -45,10 +45,22 @@ def command(rng: np.random.Generator) -> JointCommand:
     return made
 
 
-def feedback(**params: Any) -> tuple[MotorFeedback, FeedbackState]:
+class Feedback(MotorFeedback):
+    """The loops with one command at a time."""
+
+    def write(
+        self, command: JointCommand, arrived: bool, position: Array, velocity: Array, out: Array
+    ) -> bool:
+        rows = {name: values[None] for name, values in command if name != "mode"}
+        return close_loops(
+            self.loops, CommandTargets.bind(rows), 0, arrived, position, velocity, out
+        )
+
+
+def feedback(**params: Any) -> tuple[Feedback, FeedbackState]:
     state = FeedbackState.allocate(ROBOT.dimensions)
     gains = DriveGains.model_validate(params)
-    return MotorFeedback(ROBOT, gains, 0.001, STEPS, state), state
+    return Feedback(ROBOT, gains, 0.001, STEPS, state), state
 
 
 def motion(rng: np.random.Generator) -> tuple[Array, Array]:
