@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
 from ...runtime.language.steps import signal_call
 from ..bear.configuration import Hardware
 from ..bear.protocol import Mode
@@ -49,7 +49,7 @@ class EmulatedDrives:
     ) -> None:  # fmt: skip
         n = len(actuators)
         self.actuators = tuple(actuators)
-        self._transmission = Transmission(robot)
+        self._transmission = TransmissionMap(robot)
         limits = MotorLimits(robot, record)
         self._motor_torque = limits.motor_torque
         self._moving_at, self._limited = np.zeros(n), np.zeros(n)

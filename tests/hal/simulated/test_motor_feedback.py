@@ -18,7 +18,7 @@ from aloft.hal.twin.devices import EmulatedActuator
 from aloft.hal.twin.drives import EmulatedDrives
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
-from aloft.robots.transmission import Transmission, motor_gains
+from aloft.robots.transmission import TransmissionMap, motor_gains
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
@@ -132,7 +132,7 @@ def test_they_give_the_joints_what_the_twins_drives_give() -> None:
     twin.take_states()
     driver = DriveGoals(ROBOT, stiffness, damping, *motors, 0.0015)
     made, _ = feedback()
-    to_motors = Transmission(ROBOT).motor_motion
+    to_motors = TransmissionMap(ROBOT).motor_motion
     wanted, seen = command(rng), motion(rng)
     mine, its = np.zeros(N), np.zeros(N)
     made.write(wanted, True, *seen, mine)
