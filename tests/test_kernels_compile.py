@@ -164,7 +164,10 @@ def calls():
         function = getattr(function, "kernel", function)
         return used.get(id(function)) or find_names(function)
 
-    find_names = steps.names_used
+    def called(block, function):
+        return call_of(block, getattr(function, "kernel", function))
+
+    find_names, call_of = steps.names_used, steps.call_of
     for function in functions.values():  # before its calls of other kernels are replaced
         expand(function)
         used[id(function)] = find_names(function)
@@ -173,7 +176,9 @@ def calls():
         patch.setattr(steps, "names_used", names_used)
         for module in [m for name, m in sys.modules.items() if name.startswith("aloft.")]:
             for key, value in list(vars(module).items()):
-                if id(value) in name_of:
+                if value is call_of:
+                    patch.setattr(module, key, called)
+                elif id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         run_jump()
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
