@@ -51,7 +51,9 @@ def test_mass_places_and_motion_are_the_whole_robots() -> None:
 @needs_robots
 @pytest.mark.parametrize("name", ["g1", "simple_humanoid", "talos"])
 def test_bodies_are_those_of_pinocchios_reduced_model(name: str) -> None:
-    robot = find_robot(name).model_copy(update={"feet": (), "contacts": ()})  # no frames but joints'
+    robot = find_robot(name).model_copy(
+        update={"feet": (), "contacts": ()}
+    )  # no frames but joints'
     whole, own = (build_pinocchio_model(each).model for each in (robot, welded(robot).robot))
     for joint in range(1, whole.njoints):
         whole.addJointFrame(joint)
