@@ -28,10 +28,9 @@ from ...mathematics.compiling.equations import cross
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
-from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
-from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, DynamicsTerms, JointState, JointTorque, MassEstimate
@@ -160,10 +159,11 @@ class GravityCompensation(Block):
     torque = Output(JointTorque, text="torques that hold the robot still")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a base that is not fixed."""
+        robot = context.robot
         if robot is not None and robot.base_joint != "fixed":
-            yield Misfit(
+            yield UnmetRequirement(
                 f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",
                 fix="use: blocks.WholeBodyController",
             )

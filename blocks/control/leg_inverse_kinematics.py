@@ -12,7 +12,6 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle
-from ...robots.description import RobotDescription
 from ...robots.five_joint_leg import Leg, find_leg
 from ...robots.five_joint_track import (
     FootMotion,
@@ -24,7 +23,7 @@ from ...robots.five_joint_track import (
 )
 from ...robots.limb import chain_to
 from ...robots.limb_inverse import follow_limb, limb_geometry, limb_memory, watch_foot
-from ...runtime.language.block import Input, Misfit, Output, State
+from ...runtime.language.block import Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
@@ -194,14 +193,15 @@ class LegInverseKinematics(KernelBlock):
     memory = State(LegMemory, text="the last targets and the last solution")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report joints that two legs share."""
+        robot = context.robot
         assert robot is not None
         uses = Counter(joint for foot in robot.feet for joint in chain_to(robot, foot.link))
         for joint, count in uses.items():
             name = robot.joints[joint].name
             if count > 1 and name not in robot.held:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"joint {name} of {robot.name} carries {count} feet; the inverse kinematics "
                     "solves every leg by itself, so it can only hold such a joint",
                     fix=f"in the robot's description: held: {{{name}: 0.0}}",

@@ -59,7 +59,7 @@ class DelayEstimatorParameters(Parameters):
         text="the delay that the feedback bears, and that is not predicted",
     )
     tolerance: float = parameter(
-        0.001, unit="s", gt=0.0, text="difference of both without a caution"
+        0.001, unit="s", gt=0.0, text="difference of both without a warning"
     )
 
 
@@ -94,7 +94,7 @@ class DelayEstimator(Block):
     simulator says. With ``follow: measured`` the output is the measured delay as soon as it counts,
     less ``usual``, by which it is longer than what is told where that is right, and at first and
     otherwise what is told. With ``follow: told`` it is always that. The result of a run has a
-    caution where both differ by more than ``tolerance``.
+    warning where both differ by more than ``tolerance``.
 
     **Ahead.** Feedback bears a short delay, a long one takes its phase margin. Of a task with the gains
     Kp and Kd the open loop is (Kd s + Kp) exp(-s d) / s^2, so its crossover frequency w and its phase
@@ -175,7 +175,7 @@ class DelayEstimator(Block):
             values["delay_measured_ms"] = 1e3 * float(self.memory.delay)
         return values
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         """Say where the measured delay is not the one that was told."""
         p, measured = self.params, float(self.memory.delay)
         if measured < 0.0 or abs(measured - p.usual - p.told) <= p.tolerance:

@@ -22,6 +22,7 @@ from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
 from aloft.robots.limb import place_limb, read_limb
+from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
@@ -392,15 +393,18 @@ def test_a_joint_that_carries_two_feet_must_be_held():
     )
     params = LegInverseKinematics.Params()
     both = robot.model_copy(update={"joints": moved, "held": {}})
-    misfits = list(LegInverseKinematics.requires(params, both))
-    assert len(misfits) == 1
-    assert misfits[0].message == (
+    unmet = list(LegInverseKinematics.requires(params, Context("block", Clock(0.002), robot=both)))
+    assert len(unmet) == 1
+    assert unmet[0].message == (
         "joint waist of humanoid carries 2 feet; the inverse kinematics solves every leg by "
         "itself, so it can only hold such a joint"
     )
-    assert misfits[0].fix == "in the robot's description: held: {waist: 0.0}"
+    assert unmet[0].fix == "in the robot's description: held: {waist: 0.0}"
     assert not list(
-        LegInverseKinematics.requires(params, both.model_copy(update={"held": {"waist": 0.1}}))
+        LegInverseKinematics.requires(
+            params,
+            Context("block", Clock(0.002), robot=both.model_copy(update={"held": {"waist": 0.1}})),
+        )
     )
 
 
