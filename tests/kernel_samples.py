@@ -4,6 +4,7 @@ import numpy as np
 
 from aloft.blocks.control import frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
+from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import RobotTruth
@@ -211,6 +212,7 @@ UNUSED = {
     "aloft.mathematics.capture_step.limit_foothold": (
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
+    "aloft.blocks.scoring.estimator_score.record_landing": (as_record(EstimatorRecord.allocate()),),
     "aloft.blocks.scoring.footing.unroll": (
         Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
     ),

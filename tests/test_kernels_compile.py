@@ -43,6 +43,8 @@ NOT_HOT = {
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "hal.bear.measurement._first_lasting": "of plain numbers, in the driver's own Python",
+    "mathematics.rotations.matrices_of_quaternions": "of many rows, outside of ticks",
+    "mathematics.rotations.quaternions_of_matrices": "of many rows, outside of ticks",
     "mathematics.linear_algebra.inverse": "before a run, when tables are made",
     "mathematics.linear_algebra.product": "before a run, when tables are made",
     "mathematics.compiling.expressions.cross": "stands for loops in an equation",
