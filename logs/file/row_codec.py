@@ -36,7 +36,7 @@ LEAST_GAIN = 1.0
 
 
 @dataclass(frozen=True)
-class Prediction:
+class ColumnPrediction:
     """How each of ``n`` columns is predicted.
 
     Attributes:
@@ -61,7 +61,7 @@ def ordered(words: NDArray[np.int64]) -> Words:
     return result
 
 
-def predict(columns: Words) -> Prediction:
+def predict(columns: Words) -> ColumnPrediction:
     """A good prediction of ``columns`` (n, ticks), which are ``ordered``."""
     count, ticks = columns.shape
     starts = np.unique(np.linspace(0, max(0, ticks - STRETCH), STRETCHES).astype(np.int64))
@@ -73,7 +73,7 @@ def predict(columns: Words) -> Prediction:
     if count > 1:
         _attach(list(_pairs(sample)), sample, order, best, source, negative)
     bits = np.minimum(np.round(2.0 * best), 255.0)
-    return Prediction(order.astype(np.uint8), source, negative, bits.astype(np.uint8))
+    return ColumnPrediction(order.astype(np.uint8), source, negative, bits.astype(np.uint8))
 
 
 def _bits(sample: Words, order: int) -> NDArray[np.float64]:
@@ -184,7 +184,7 @@ def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
     return head + _SIZES.pack(len(columns), len(flat)) + packed
 
 
-def _left(columns: Words, how: Prediction) -> Words:
+def _left(columns: Words, how: ColumnPrediction) -> Words:
     """What of ``columns`` (n, ticks) is left by their prediction, zigzag coded."""
     left = columns.copy()
     others = np.flatnonzero(how.source != np.arange(len(columns)))
@@ -264,7 +264,7 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
     changing = np.unpackbits(mask, count=width).astype(np.bool_)
     if int(changing.sum()) != changes:
         raise ValueError("packed rows have not as many columns as they say")
-    how = Prediction(kind % _NEGATIVE, source.view(np.int32), kind >= _NEGATIVE, bits)
+    how = ColumnPrediction(kind % _NEGATIVE, source.view(np.int32), kind >= _NEGATIVE, bits)
     low, high = begin // 8, -(-end // 8)
     number = np.cumsum(changing) - 1  # of a column that changes, among those that do
     wanted = np.zeros(changes, np.bool_)
@@ -277,7 +277,7 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
     return np.ascontiguousarray(found.T).view(np.uint8)
 
 
-def _columns(planes: NDArray[np.uint8], how: Prediction, wanted: NDArray[np.bool_]) -> Words:
+def _columns(planes: NDArray[np.uint8], how: ColumnPrediction, wanted: NDArray[np.bool_]) -> Words:
     """Those columns that are ``wanted`` (n,), (some, ticks), from the bytes of all (8, n, ticks)."""
     count = len(how.order)
     if (how.source >= count).any() or (how.source < 0).any() or (how.order > MOST_ORDER).any():

@@ -32,8 +32,8 @@ from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
 from ..viewing.robot_shapes import missing_meshes
-from .place import Place, cause_of, part_of, remedy, replaced, take_place
-from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, Report, Task
+from .place import RecordingPlace, cause_of, part_of, remedy, replaced, take_place
+from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
 _MAIN = (
@@ -56,7 +56,7 @@ class RecorderLink:
         place: the file's place, if there is to be a file. The process takes it over.
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
-        flush_period, sync_period, live, split: see ``Task``.
+        flush_period, sync_period, live, split: see ``RecorderTask``.
         least: the size with which the ring makes do where files may not be larger.
 
     Raises:
@@ -65,7 +65,7 @@ class RecorderLink:
 
     def __init__(
         self,
-        place: Place | None,
+        place: RecordingPlace | None,
         header: str,
         capacity: int,
         flush_period: float,
@@ -84,7 +84,7 @@ class RecorderLink:
             self.ring.write(HEADER, 0, text)
             path = str(place.target.absolute()) if place is not None else ""
             file, keep = (place.descriptor, place.keep) if place is not None else (-1, 0)
-            task = Task(
+            task = RecorderTask(
                 descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
             )
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
@@ -156,7 +156,7 @@ class RecorderLink:
 
     def finish(
         self, outcome: dict[str, Any], goes_on: Callable[[], bool]
-    ) -> tuple[Report | None, str]:
+    ) -> tuple[RecorderReport | None, str]:
         """Tell the outcome and wait for the end, as long as ``goes_on`` says so.
 
         Returns:
@@ -177,7 +177,7 @@ class RecorderLink:
         self.ring.close()
         lines = [json.loads(line) for line in self._said.splitlines()]
         if lines and "rows" in lines[-1]:
-            return Report(**lines[-1]), ""
+            return RecorderReport(**lines[-1]), ""
         how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
         return None, f"the recorder {how}"
 
@@ -255,7 +255,7 @@ class Recorder:
         self.before = ""
         self._keep = keep
         self._seen = 0
-        self.report: Report | None = None
+        self.report: RecorderReport | None = None
         self.link: RecorderLink | None = None
         self._when_full = when_full
         self._keyframe_period = keyframe_period
@@ -448,7 +448,7 @@ class Recorder:
             self._tell_of_a_problem(self.report)
         return self.warnings
 
-    def _tell_of_a_problem(self, report: Report) -> None:
+    def _tell_of_a_problem(self, report: RecorderReport) -> None:
         """Say that nothing, or not all, could be written."""
         fix = remedy(report.error_number, self.path)
         if report.rows:

@@ -42,7 +42,7 @@ from ..file.format import (
     RecordedField,
     entity_of,
 )
-from .plot_views import MOST_IN_TAB, Shown, block_tabs, legend, main_plots
+from .plot_views import MOST_IN_TAB, ShownRun, block_tabs, legend, main_plots
 from .robot_shapes import eye_controls
 from .scene import EYE
 from .scene_ports import scene_ports
@@ -56,7 +56,7 @@ HIDDEN_LANES = ("mode",)
 
 def recording_blueprint(
     header: Header,
-    shown: Sequence[Shown] = (Shown(),),
+    shown: Sequence[ShownRun] = (ShownRun(),),
     *,
     live: bool = False,
     first_tabs: Sequence[Any] = (),
@@ -104,7 +104,7 @@ def recording_blueprint(
     )
 
 
-def events_view(shown: Sequence[Shown]) -> Any:
+def events_view(shown: Sequence[ShownRun]) -> Any:
     """What happened: each text begins with its time, as the viewer's column cuts times off."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, TimelineColumn
@@ -126,7 +126,7 @@ def events_view(shown: Sequence[Shown]) -> Any:
     )
 
 
-def scene_view(header: Header, shown: Sequence[Shown], *, follow: bool = True) -> Any:
+def scene_view(header: Header, shown: Sequence[ShownRun], *, follow: bool = True) -> Any:
     """The robot in 3D; of a comparison both robots."""
     import rerun.blueprint as rrb
 
@@ -152,7 +152,7 @@ def is_main(lane: Lane) -> bool:
     return name in LANES or (bool(lane.field.values) and name not in HIDDEN_LANES)
 
 
-def states_view(header: Header, shown: Sequence[Shown]) -> Any:
+def states_view(header: Header, shown: Sequence[ShownRun]) -> Any:
     """One lane each for phases, contacts and whether the quadratic program was solved."""
     import rerun.blueprint as rrb
 
