@@ -347,7 +347,7 @@ class Recorder:
 
     def _find_room(self, tick: int) -> None:
         """Wait for room in the ring if that is the policy; otherwise count the tick as dropped."""
-        if self._gap is None and self._waits and self._wait_for_room(tick):
+        if self._wait_for_room(ROW, tick, self._bus):
             return
         if self._gap is not None and self._note_gap(tick) and self._write(ROW, tick, self._bus):
             return
@@ -355,13 +355,16 @@ class Recorder:
         self._gap = (first, tick, count + 1)
         self.dropped += 1
 
-    def _wait_for_room(self, tick: int) -> bool:
+    def _wait_for_room(self, kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
+        """Wait for room in the ring, if that is the policy, and write. Returns whether that was done."""
+        if not self._waits or self._gap is not None:
+            return False
         assert self.link is not None
         self.link.reset_stall_timer()
         self.waits_for_others = True
         try:
             while self._waiting_helps():
-                if self._write(ROW, tick, self._bus):
+                if self._write(kind, tick, data):
                     return True
                 time.sleep(1e-3)
         finally:
@@ -411,15 +414,16 @@ class Recorder:
         size = len(self._bus)
         self._frame[:size] = self._bus
         self._frame[size:] = self._bound.memory.state.buffer.data
-        self._write(KEYFRAME, tick, self._frame)
+        if not self._write(KEYFRAME, tick, self._frame):
+            self._wait_for_room(KEYFRAME, tick, self._frame)
 
     def _note_change(self, change: ParameterChange) -> None:
         self.note(parameter_note(change))
 
     def note(self, note: Note) -> None:
         """Put a note into the ring; there is nearly always room."""
-        if self.link is not None:
-            self._write(NOTE, note.tick, _encoded(note))
+        if self.link is not None and not self._write(NOTE, note.tick, _encoded(note)):
+            self._wait_for_room(NOTE, note.tick, _encoded(note))
 
     def close(self) -> None:
         """No-op: the recording ends when the outcome is known, in ``finish``."""

@@ -131,10 +131,13 @@ def test_no_tick_allocates(tmp_path: Path) -> None:
 
 
 def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, keyframe_period=0.1)
     result = run(graph(20_000), sinks=[recorder])
     assert recorder.dropped == 0 and result.warnings == ()
-    assert_whole(read(tmp_path / "a.rrd"), result)
+    recorded = read(tmp_path / "a.rrd")
+    assert_whole(recorded, result)
+    assert recorded.keyframes == tuple(range(50, 20_001, 50))
+    assert len(recorded.notes) == 4
 
 
 def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
