@@ -16,7 +16,7 @@ from ..blocks.signals import (
     JointState,
     RobotHealth,
 )
-from ..blocks.signals.drive_conditions import HEALTHY
+from ..blocks.signals.robot import HEALTHY
 from ..mathematics.arrays import (
     Indices1D,
 )
@@ -27,27 +27,30 @@ from ..runtime.language.block import Block, Context, Input, Output, Port
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters
 from ..runtime.language.signals import Signal
-from ..runtime.language.steps import as_record
+from ..runtime.language.steps import signal_call
 from .sensors.sensor import MountedSensor, mounted_sensors
-
-_DRIVING = int(DrivePhase.DRIVING)
 
 
 @kernel
 def report_healthy(tick: Indices1D, base_period: float, health: RobotHealth) -> None:
     """Report healthy drives and sensors in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
-    health.state[()] = _DRIVING
-    for k in range(health.condition.shape[0]):
-        health.condition[k] = HEALTHY
-        health.voltage[k] = health.temperature[k] = health.current[k] = health.age[k] = 0.0
-    health.imu_age[()] = 0.0
-    health.late_cycles[()] = health.lost_answers[()] = 0
-    health.stamp[()] = tick[0] * base_period
-    health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
+    health.state = DrivePhase.DRIVING
+    health.condition[:] = HEALTHY
+    health.voltage[:] = 0.0
+    health.temperature[:] = 0.0
+    health.current[:] = 0.0
+    health.age[:] = 0.0
+    health.imu_age = 0.0
+    health.late_cycles = 0
+    health.lost_answers = 0
+    health.stamp = tick[0] * base_period
+    health.joints_valid = True
+    health.imu_valid = True
+    health.contacts_valid = True
 
 
 _CLASSES: dict[tuple[Any, ...], type[Block]] = {}
-"""Robots with outputs for mounted sensors, by class and sensors."""
+"""Robots with outputs for mounted sensors, or without some, by class, sensors and reasons."""
 
 
 class Robot(Block, ABC):
@@ -85,7 +88,7 @@ class Robot(Block, ABC):
     although ``open`` has failed or was never called.
 
     A robot whose description says that it has no IMU, or no contact switches, publishes zeros at
-    that port; a wire from there is an error at load (``absent_outputs``).
+    that port; a wire from there is an error at load.
 
     Errors: ``open`` raises what the link raises, with the name of the device. When the link is lost
     during a run, the driver reports it by ``request_stop`` after its time-out.
@@ -100,26 +103,32 @@ class Robot(Block, ABC):
     command = Input(JointCommand, text="what the drives are to do")
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with an output for every sensor that the robot's description mounts."""
+        """The class with an output for every sensor that the robot's description mounts, and with
+        the reason at every output that the robot does not have."""
         sensors = mounted_sensors(robot, folder)
-        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors))
-        if not sensors or all(sensor.name in cls.outputs for sensor in sensors):
+        sensors = () if all(sensor.name in cls.outputs for sensor in sensors) else sensors
+        absent = {} if robot is None else cls._absent_outputs(robot)
+        if not sensors and all(cls.outputs[name].absent == why for name, why in absent.items()):
             return cls
+        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors), *absent.items())
         if key not in _CLASSES:
-            ports = cls.ports_of(sensors)
+            ports = cls.ports_of(sensors) if sensors else {}
             for name in ports:
                 if hasattr(cls, name) or not name.isidentifier():
                     raise BlockError(
                         f"sensor {name}: the output of a robot cannot be called {name!r}; give it "
                         "another name in the robot's description"
                     )
+            for name, reason in absent.items():
+                output = cls.outputs[name]
+                ports[name] = Output(output.signal, text=output.text, absent=reason)
             body = {"__doc__": cls.__doc__, "__module__": cls.__module__, **ports}
             _CLASSES[key] = type(cls.__name__, (cls,), body)
         return _CLASSES[key]
@@ -139,22 +148,20 @@ class Robot(Block, ABC):
         """The outputs of the mounted sensors, by name."""
         return {name: getattr(self, name) for name in self.robot.sensors.mounted}
 
-    @classmethod
-    def absent_outputs(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, str]:
-        """The sensors that the robot's description says it does not have."""
+    @staticmethod
+    def _absent_outputs(robot: RobotDescription) -> Mapping[str, str]:
+        """The outputs that a robot's description says it does not have, each with the reason."""
         absent: dict[str, str] = {}
-        if robot is not None and not robot.sensors.imu:
+        if not robot.sensors.imu:
             absent["imu"] = f"{robot.name} has no IMU"
-        if robot is not None and not robot.contacts:
+        if not robot.contacts:
             absent["contacts"] = f"{robot.name} has no contact points"
-        elif robot is not None and not robot.sensors.switches:
+        elif not robot.sensors.switches:
             absent["contacts"] = f"{robot.name} has no contact switches"
         return absent
 
     @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """``delay``: the delay from sensing to torque [s], for the graph to compensate."""
         return {"delay": cls.nominal_delay(params)}
 
@@ -205,7 +212,7 @@ class Robot(Block, ABC):
     def reporting(self) -> KernelCall:
         """Writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
-        return KernelCall(report_healthy, clock.present, clock.base_period, as_record(self.health))
+        return signal_call(report_healthy, clock.present, clock.base_period, self.health)
 
     @abstractmethod
     def write(self) -> None:

@@ -1,4 +1,4 @@
-"""Balance of a standing robot: its stability margin, where it must step when that is lost, and how a foot gets there.
+"""Balance of a standing robot: its stability margin, and where it must step when that is lost.
 
 The linear inverted pendulum of height h has the natural frequency w, w^2 = g / h. Its capture point
 
@@ -15,15 +15,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .arrays import Array1D, Array2D, Flags1D, Indices1D, Vector2
+from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .constants import GRAVITY
 from .kernel import kernel
-
-_SHORTEST = 0.03
-"""The motion of a foot counts on at least this much time [s], which limits its feedback gains."""
 
 
 @kernel
@@ -103,45 +97,6 @@ def farthest_foot(
 
 
 @kernel
-def choose_foothold(
-    capture: Vector2,
-    rate: float,
-    left: float,
-    beyond: float,
-    points: Array2D,
-    foot_of_point: Indices1D,
-    swing: int,
-    n_feet: int,
-    nearest: Vector2,
-    scratch: Vector2,
-    out: Array1D,
-) -> None:
-    """Where the foot ``swing`` should land: at the capture point of that instant, and beyond.
-
-    The force is taken to act where the other feet are nearest to the capture point.
-
-    Args:
-        capture: the capture point now [m], (2,).
-        rate: the pendulum's frequency [1/s].
-        left: time until the foot lands [s].
-        beyond: how far beyond it lands, as a share of the way from the force to the capture point.
-        nearest, scratch: scratch, (2,).
-        out: becomes the foothold; its height stays, (3,).
-    """
-    least = math.inf
-    for foot in range(n_feet):
-        if foot == swing:
-            continue
-        distance = nearest_in_foot(points, foot_of_point, foot, capture, scratch)
-        if distance < least:
-            least = distance
-            nearest[0], nearest[1] = scratch[0], scratch[1]
-    grown = (1.0 + beyond) * math.exp(rate * left)
-    for k in range(2):
-        out[k] = nearest[k] + grown * (capture[k] - nearest[k])
-
-
-@kernel
 def limit_foothold(
     stance: Array1D,
     heading: float,
@@ -199,58 +154,7 @@ def spread_to_feet(stance: Flags1D, foot: Indices1D, n_feet: int, out: Flags1D) 
 
 
 @kernel
-def swing_points(
-    swing: int,
-    foot: Indices1D,
-    offset: Array2D,
-    place: Array1D,
-    heading: float,
-    elapsed: float,
-    duration: float,
-    height: float,
-    position: Array2D,
-    velocity: Array2D,
-    stance: Flags1D,
-    stepping: Flags1D,
-    acceleration: Array2D,
-) -> None:
-    """The acceleration of the points of the foot ``swing`` to its place, with a flat sole.
-
-    In the first half of the step the sole rises by ``height``. In the second it comes down as if the
-    ground were lower by that, so it is still moving when it meets the ground.
-
-    Args:
-        foot: the foot of every point, (n,).
-        offset: of the points from the centre of the sole [m, foot], (n, 3).
-        place, heading: where the centre of the sole goes [m, world], (3,), and its heading [rad].
-        elapsed, duration: of the step [s].
-        position, velocity: of the points [m, m/s, world], (n, 3).
-        stance: becomes false for these points, (n,).
-        stepping: becomes true for them.
-        acceleration: becomes theirs [m/s^2, world], (n, 3).
-    """
-    cosine, sine = math.cos(heading), math.sin(heading)
-    left = max(duration - elapsed, _SHORTEST)
-    rises = elapsed < 0.5 * duration
-    for i in range(foot.shape[0]):
-        if foot[i] != swing:
-            continue
-        stance[i], stepping[i] = False, True
-        x = place[0] + cosine * offset[i, 0] - sine * offset[i, 1]
-        y = place[1] + sine * offset[i, 0] + cosine * offset[i, 1]
-        z, until = place[2] - height, left
-        if rises:
-            z = place[2] + height
-            until = max(0.5 * duration - elapsed, _SHORTEST)
-        acceleration[i, 0] = approach(position[i, 0], velocity[i, 0], x, left)
-        acceleration[i, 1] = approach(position[i, 1], velocity[i, 1], y, left)
-        acceleration[i, 2] = approach(position[i, 2], velocity[i, 2], z, until)
-
-
-@kernel
-def support_margin(
-    points: NDArray[np.float64], loaded: NDArray[np.bool_], x: float, y: float
-) -> float:
+def support_margin(points: Array2D, loaded: Flags1D, x: float, y: float) -> float:
     """The distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
 
     The support polygon is the convex hull of the ``loaded`` ones of ``points`` (n, 2 or 3). The
@@ -264,23 +168,23 @@ def support_margin(
         if not loaded[i]:
             continue
         first = i if first < 0 else first
-        ax, ay = float(points[i, 0]), float(points[i, 1])
+        ax, ay = points[i, 0], points[i, 1]
         for j in range(count):
             if not loaded[j]:
                 continue
-            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
+            dx, dy = points[j, 0] - ax, points[j, 1] - ay
             length = math.sqrt(dx * dx + dy * dy)
             if length < 1e-9:
                 continue
             leftmost = True
             for k in range(count):
-                side = dx * (float(points[k, 1]) - ay) - dy * (float(points[k, 0]) - ax)
+                side = dx * (points[k, 1] - ay) - dy * (points[k, 0] - ax)
                 leftmost = leftmost and (side >= -1e-12 or not loaded[k])
             if leftmost:
                 margin = min(margin, (dx * (y - ay) - dy * (x - ax)) / length)
     if first < 0:
         return -1.0
     if margin == math.inf:
-        dx, dy = float(points[first, 0]) - x, float(points[first, 1]) - y
+        dx, dy = points[first, 0] - x, points[first, 1] - y
         return -math.sqrt(dx * dx + dy * dy)
     return margin

@@ -27,7 +27,7 @@ from ..signals import (
     SwitchHealth,
     WholeBodyCommand,
 )
-from ..signals.drive_conditions import HEALTHY, describe
+from ..signals.robot import HEALTHY, describe_conditions
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
@@ -567,7 +567,7 @@ def health_text(fault: SafetyFault, motor: str, value: float, params: SafetyPara
     """
     match fault:
         case SafetyFault.DRIVE:
-            return f"drive {motor}: {describe(int(value))}"
+            return f"drive {motor}: {describe_conditions(int(value))}"
         case SafetyFault.SILENT_DRIVE:
             return (
                 f"drive {motor} has not answered for {1e3 * value:.0f} ms; answer_age is "

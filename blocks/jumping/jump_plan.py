@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
-from ...planner.library.jump_table import JumpTable, JumpTableReader
-from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...mathematics.kernel import kernel
+from ...planner.library.jump_table import (
+    FlightRotation,
+    JumpTable,
+    TableRows,
+    flight_rotation,
+    read_table,
+    table_rows,
+)
+from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
+from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
-from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference
 from .plan_progress import (
-    FallSettings,
-    Progress,
-    ProgressSettings,
-    following_calls,
-    plan_instant,
+    PlanProgress,
+    ProgressConstants,
+    ProgressParameters,
+    follow_fall,
+    follow_thrust,
+    follow_turn,
 )
-from .turn_timing import Body, Pose, Rotation, Turning, TurnProgress, TurnSettings, follow_turn
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
@@ -35,19 +40,7 @@ if TYPE_CHECKING:
     from ...robots.description import RobotDescription
 
 
-FASTEST = 0.5
-"""By how much a plan is slowed down or hastened at most, as a share of time."""
-
-
-class PlanProgress(Signal):
-    """The state of ``JumpPlan``."""
-
-    late = Field(unit="s", text="how much later than by the clock the plan is read")
-    before = Field(unit="s", text="the same before the thrust's last part")
-    spin = Field(unit="", text="how fast a somersault turns, as a share of the plan's rate")
-
-
-class JumpPlan(KernelBlock):
+class JumpPlan(Block):
     """The reference motion of a jump, found by the kino-dynamic planner (paper, III).
 
     The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
@@ -59,7 +52,7 @@ class JumpPlan(KernelBlock):
     Every plan, also one from the library, must pass the validity check with exact dynamics
     (``planner/checking/validity``). With ``check: reported`` a plan that fails it is followed all
     the same, to compare the formulations ``paper`` and ``srbm``, whose plans always fail. Then the
-    run's cautions name every test that failed, and the metrics have ``plan_valid`` and
+    warnings of the run name every test that failed, and the metrics have ``plan_valid`` and
     ``plan_tests_failed``. For those formulations the reference has the centre of mass and momentum
     of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
     without the features that only ``full`` has: impacts, margins and limits of the motors.
@@ -86,7 +79,7 @@ class JumpPlan(KernelBlock):
     at touchdown, there ``delay' = toes_gain (f - touchdown_time + time)``.
 
     **Somersaults.** With ``turning`` a plan that turns over is timed in flight by how far the robot has
-    turned and how long it will fly (``turn_timing.follow_turn``). Other plans are followed as without.
+    turned and how long it will fly (``plan_progress.follow_turn``). Other plans are followed as without.
 
     What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
     the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
@@ -100,7 +93,7 @@ class JumpPlan(KernelBlock):
     plan must be valid and is not; the message says which constraint or test.
     """
 
-    class Params(Parameters):
+    class Params(ProgressParameters):
         task: str | Mapping[str, Any] = parameter(
             "tasks/in_situ.yaml",
             text="a task's file, the task's parameters, or a file and parameters that change it",
@@ -114,24 +107,6 @@ class JumpPlan(KernelBlock):
             ge=0.0,
             le=0.02,
             text="delay from sensing to torque that is compensated; none: the one at `delay`",
-        )
-        by: Literal["progress", "clock"] = parameter(
-            "progress", text="what ends the thrust: the speed reached, if `terms` is wired, or time"
-        )
-        progress_time: float = parameter(
-            0.06, unit="s", gt=0.0, text="how long before lift-off the motion counts"
-        )
-        progress_gain: float = parameter(
-            40.0, unit="1/s", ge=0.0, text="rate at which an error of the speed is corrected"
-        )
-        progress_limit: float = parameter(
-            0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
-        )
-        toes_gain: float = parameter(
-            5.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
-        )
-        turning: Turning | None = parameter(
-            None, text="how a somersault is timed by its rotation in flight; none: by the clock"
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -147,16 +122,18 @@ class JumpPlan(KernelBlock):
             True, text="whether what a rehearsal of this plan has learnt is told to the graph"
         )
 
+    Constants = ProgressConstants
     needs = ("floating base", "feet")
     files_folder = "library"
     params: Params
+    constants: ProgressConstants
     terms = Input(DynamicsTerms, default={}, text="the measured motion, for by: progress")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
     progress = State(PlanProgress, text="how late the plan is")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.library import shipped_tasks
         from ...planner.task.task import JumpTaskError
@@ -169,7 +146,7 @@ class JumpPlan(KernelBlock):
             for line in str(error).splitlines():
                 place, _, rest = line.partition(": ")
                 key = rest.partition(": ")[0] if place == "task" else ""
-                yield Misfit(
+                yield UnmetRequirement(
                     f"the task cannot be used: {rest if key else line}",
                     parameter=f"task.{key}" if key else "task",
                 )
@@ -177,7 +154,7 @@ class JumpPlan(KernelBlock):
         except LookupError as error:
             there = shipped_tasks()
             near = get_close_matches(str(params.task), there, 3)
-            yield Misfit(
+            yield UnmetRequirement(
                 str(error.args[0]),
                 parameter="task",
                 expected="a task's file, relative to the graph, or one of the "
@@ -188,7 +165,7 @@ class JumpPlan(KernelBlock):
             )
             return
         if task.robot != robot.name:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the task {task.name!r} is for {task.robot}, but the graph's robot is "
                 f"{robot.name}",
                 parameter="task",
@@ -197,7 +174,7 @@ class JumpPlan(KernelBlock):
                 fix=f"robot: {task.robot}, as a key of the graph",
             )
         elif task.profile and task.profile != robot.motors.profile:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the task {task.name!r} is planned with the actuators {task.profile}, but the "
                 f"graph runs with {robot.motors.profile}",
                 parameter="task",
@@ -207,7 +184,7 @@ class JumpPlan(KernelBlock):
             )
 
     @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """The ground and the score's expectation that follow from the task."""
         from ...planner.task.ground import scene_of
         from ...planner.task.task import JumpTaskError
@@ -217,7 +194,7 @@ class JumpPlan(KernelBlock):
         try:
             scene = scene_of(task, context.robot)
         except JumpTaskError as error:
-            scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
+            scene = UnmetRequirement(str(error), fix="robot.scene: flat, or a floor and boxes")
         end, hops = task.places()[-1], task.hops()
         velocity, momentum = cls._corrections(task, params, context)
         return {
@@ -233,7 +210,7 @@ class JumpPlan(KernelBlock):
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
-        """What a rehearsal has learnt; for both the same ``Misfit`` where its file is damaged."""
+        """What a rehearsal has learnt; for both the same ``UnmetRequirement`` where its file is damaged."""
         from ...planner.library.rehearsed import (
             ZERO,
             RehearsalFileError,
@@ -250,7 +227,7 @@ class JumpPlan(KernelBlock):
             task = _as_planned(task, params.formulation)
             found = find_rehearsed(plan_library(params, context.robot), task, controller)
         except RehearsalFileError as error:
-            damaged = Misfit(str(error), fix=f"{context.path}.rehearsed: false")
+            damaged = UnmetRequirement(str(error), fix=f"{context.path}.rehearsed: false")
             return damaged, damaged
         if found is None:
             return list(ZERO), list(ZERO)
@@ -263,45 +240,45 @@ class JumpPlan(KernelBlock):
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
         table = reference_table_once(plan, robot, self.params.stand_time)
-        reader = JumpTableReader(table, self.reference)
-        self.kernel_calls = [*self._calls(reader), *self._turning(reader.instant, table)]
+        self.table = table_rows(table)
+        self.rotation = self._time_progress(table)
 
-    def _calls(self, reader: JumpTableReader) -> list[KernelCall]:
-        """Find the instant of the plan, read it, and follow the motion where that is asked for."""
-        p, clock, period, reference = self.params, self.context.clock, self.period, self.reference
-        progress = Progress(self.progress.late, self.progress.before)
-        lead = self.delay.delay if p.lead is None else np.array(p.lead, np.float64)
-        calls = [
-            KernelCall(
-                plan_instant, clock.present, clock.base_period, progress.late, lead,
-                self.delay.ahead, period, reader.instant,
-            ),
-            reader.call,
-        ]  # fmt: skip
-        if p.by == "progress" and "terms" in self.context.wired:
-            thrust = ProgressSettings(
-                float(p.progress_time), float(p.progress_gain), float(p.progress_limit), FASTEST,
-                period,
-            )  # fmt: skip
-            fall = FallSettings(float(p.toes_gain), FASTEST, period)
-            calls += following_calls(reader.instant, self.terms, reference, thrust, fall, progress)
-        return calls
+    def _time_progress(self, table: JumpTable) -> FlightRotation:
+        """Write the constants; returns the rotation of the flight, empty where it is not followed."""
+        p, constants, turning = self.params, self.constants, self.params.turning
+        measured = "terms" in self.context.wired
+        rotation = flight_rotation(table, self.robot) if measured and turning is not None else None
+        constants.lead = -1.0 if p.lead is None else p.lead
+        constants.follows_motion = measured and p.by == "progress"
+        constants.follows_turn = rotation is not None
+        constants.period = self.period
+        if turning is not None:
+            constants.gain, constants.aim = turning.gain, turning.aim
+            constants.early, constants.late = turning.early, turning.late
+        return rotation or FlightRotation(*(np.zeros(1) for _ in FlightRotation._fields))
 
-    def _turning(self, instant: Array, table: JumpTable) -> Iterator[KernelCall]:
-        """Follow the rotation of a somersault in flight where that is asked for."""
-        from ...planner.library.jump_table import flight_rotation
-
-        given, terms, reference = self.params.turning, self.terms, self.reference
-        if given is None or "terms" not in self.context.wired:
-            return
-        rotation = flight_rotation(table, self.robot)
-        if rotation is not None:
-            yield KernelCall(
-                follow_turn, instant, Body(*(getattr(terms, name) for name in Body._fields)),
-                Pose(*(getattr(reference, name) for name in Pose._fields)), Rotation(*rotation),
-                TurnSettings(given.gain, given.early, given.late, given.aim, self.period),
-                TurnProgress(self.progress.late, self.progress.spin),
-            )  # fmt: skip
+    @kernel
+    @staticmethod
+    def step(
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        reference: JumpReference,
+        progress: PlanProgress,
+        table: TableRows,
+        rotation: FlightRotation,
+        params: Params,
+        constants: ProgressConstants,
+        clock: Clock,
+    ) -> None:
+        lead = delay.delay if constants.lead < 0.0 else constants.lead
+        early = min(delay.ahead, lead)
+        time = clock.base_period * clock.tick - progress.late + early
+        read_table(table, time, lead - early, constants.period, reference)
+        if constants.follows_motion:
+            follow_thrust(time, terms, reference, progress, params, constants)
+            follow_fall(time, terms, reference, progress, params, constants)
+        if constants.follows_turn:
+            follow_turn(time, terms, reference, rotation, progress, constants)
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report
@@ -309,7 +286,7 @@ class JumpPlan(KernelBlock):
             return {}
         return {"plan_valid": report.valid, "plan_tests_failed": len(report.failed)}
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         report = self._report
         if report is None or report.valid:
             return ()

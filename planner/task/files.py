@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...files.document import read_value
+from ...files.nodes import ListNode, MapNode, Node, plain
+from ...files.problems import Position, Problems
 from ...runtime.language.errors import AloftError
-from ...runtime.language.stages import Position
-from ...runtime.loading.problems import Problems
-from ...runtime.loading.reading.document import read_value
-from ...runtime.loading.reading.nodes import ListNode, MapNode, Node, plain
 
 
 class JumpTaskError(AloftError, ValueError):

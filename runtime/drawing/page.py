@@ -20,10 +20,10 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
+from ...files.nodes import text_of
 from ..language.reference import PortReference, block_reference
 from ..language.stages import BlockSpec, CheckedGraph
 from ..loading.picture import BlockRow, table
-from ..loading.reading.nodes import text_of
 from .diagram import diagram, subgraphs
 from .layout import draw
 from .render import svg
@@ -277,8 +277,8 @@ def _fields(port: PortReference, spec: BlockSpec) -> str:
     """The fields of an output with what they carry in this graph."""
     found = []
     for field in port.fields:
-        carried = spec.quantities.get(f"{port.name}.{field.name}")
-        found.append(f"{field.name}: {field.type}" + (f" {carried}" if carried else ""))
+        quantity = spec.quantities.get(f"{port.name}.{field.name}")
+        found.append(f"{field.name}: {field.type}" + (f" {quantity}" if quantity else ""))
     return f"{port.signal}: {', '.join(found)}"
 
 

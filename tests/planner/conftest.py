@@ -6,8 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.squat_jump import SquatJumpTask, plan_squat_jump
-from aloft.blocks.jumping.squat_jump_reference import SquatJumpReference
+from aloft.blocks.jumping.squat_jump import SquatJumpParameters, plan_squat_jump
 from aloft.blocks.signals import Phase
 from aloft.planner.models.exact_dynamics import ExactDynamics, joint_motion
 from aloft.planner.task.plan import PlannedJump
@@ -25,11 +24,7 @@ def squat_jump_plan() -> PlannedJump:
     """The squat jump as a plan. Its feet hit the ground with the speed of the fall."""
     robot = find_robot("bruce")
     dynamics = ExactDynamics(robot)
-    names = set(SquatJumpTask.__dataclass_fields__)
-    defaults = {k: v for k, v in SquatJumpReference.Params().model_dump().items() if k in names}
-    jump = SquatJumpTask(
-        **defaults | {"rise": RISE, "touchdown_pitch": 0.0, "stand_time": 0.1, "pause_time": 0.05}
-    )
+    jump = SquatJumpParameters(rise=RISE, touchdown_pitch=0.0, stand_time=0.1, pause_time=0.05)
     table = plan_squat_jump(build_pinocchio_model(robot), robot, jump)
     breaks = np.flatnonzero(np.diff(table.time) < 1e-9).tolist()
     ends = [0, *[k + 1 for k in breaks], len(table.time)]

@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ...language.block import Block, Clock, Context, Input, Misfit, Output, Port
+from ....files.nodes import ListNode, MapNode, Node
+from ....files.problems import Code, Position, Problems, listing, nearest
+from ...language.block import Block, Clock, Context, Input, Output, Port, UnmetRequirement
 from ...language.feedthrough import inputs_read_by_emit
-from ...language.fit import find_misfits, unmet_needs
 from ...language.layout import LARGEST
 from ...language.parameters import Parameters
 from ...language.quantities import UNCHECKED, Quantity, quantity_of
+from ...language.requirements import unmet_needs, unmet_requirements
 from ...language.signals import DTYPES, Field, Signal
-from ...language.stages import Position
 from ..flattening.flat import FlatBlock, FlatGraph
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import ListNode, MapNode, Node
 from .settings import Settings
 
 
@@ -27,8 +26,7 @@ from .settings import Settings
 class BlockDraft:
     """A block while it is checked.
 
-    ``complete`` is true if all its dimensions are known. ``absent`` holds the outputs that it
-    cannot have with the graph's robot, each with the reason.
+    ``complete`` is true if all its dimensions are known.
     """
 
     flat: FlatBlock
@@ -36,7 +34,6 @@ class BlockDraft:
     params: Parameters | None = None
     dimensions: Mapping[str, int] = field(default_factory=dict)
     complete: bool = False
-    absent: Mapping[str, str] = field(default_factory=dict)
     quantities: dict[str, Quantity] = field(default_factory=dict)
     """Unit and frame of every output, by ``port.field``; those of blocks that take any are there
     once ``infer_quantities`` has been called."""
@@ -125,12 +122,8 @@ def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
     return bool(unmet_needs(draft.block_type, settings.robot))
 
 
-def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapping[str, str]:
-    """Report every misfit of one block, whose parameters have been checked.
-
-    Returns:
-        The outputs that this robot cannot have, each with the reason.
-    """
+def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> None:
+    """Report every unmet requirement of one block, whose parameters have been checked."""
     assert draft.block_type is not None and draft.params is not None
     flat = draft.flat
     context = Context(
@@ -144,16 +137,16 @@ def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapp
         folder=flat.folder,
         graph_folder=settings.folder,
     )
-    misfits = find_misfits(draft.block_type, draft.params, context)
-    for misfit in misfits:
-        report_misfit(draft, misfit, problems)
-    return {} if misfits else draft.block_type.absent_outputs(draft.params, settings.robot)
+    for requirement in unmet_requirements(draft.block_type, draft.params, context):
+        report_requirement(draft, requirement, problems)
 
 
-def report_misfit(draft: BlockDraft, misfit: Misfit, problems: Problems) -> None:
-    """Report a misfit at the parameter it concerns, or else at the block."""
+def report_requirement(
+    draft: BlockDraft, requirement: UnmetRequirement, problems: Problems
+) -> None:
+    """Report an unmet requirement at the parameter it concerns, or else at the block."""
     flat = draft.flat
-    steps = misfit.parameter.split(".") if misfit.parameter else []
+    steps = requirement.parameter.split(".") if requirement.parameter else []
     node: Node = flat.parameters
     where = flat.where
     for step in steps:
@@ -162,14 +155,14 @@ def report_misfit(draft: BlockDraft, misfit: Misfit, problems: Problems) -> None
             break
         node, where = found, found.where
     problems.add(
-        Code.MISFIT,
-        f"{flat.path} ({flat.use}): {misfit.message}",
+        Code.UNMET_REQUIREMENT,
+        f"{flat.path} ({flat.use}): {requirement.message}",
         where,
         at=".".join([flat.path, *steps]),
-        expected=misfit.expected,
-        found=misfit.found,
-        nearest=misfit.nearest,
-        fix=misfit.fix,
+        expected=requirement.expected,
+        found=requirement.found,
+        nearest=requirement.nearest,
+        fix=requirement.fix,
     )
 
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ....files.problems import Code, Position, Problems, nearest
 from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
-from ...language.fit import fix_without_robot
 from ...language.importing import BlockImportError, UnknownModuleError
 from ...language.registry import find_block, nearest_names
+from ...language.requirements import fix_without_robot
 from ...language.schedule import ScheduleBlock, find_loops, order_blocks
 from ...language.signals import Signal
-from ...language.stages import BlockSpec, CheckedGraph, Position, Wire
+from ...language.stages import BlockSpec, CheckedGraph, Wire
 from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
-from ..problems import Code, Problems, nearest
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
@@ -82,15 +82,15 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.params is None:
         return draft
     try:
-        draft.block_type = draft.block_type.fitted(
+        draft.block_type = draft.block_type.specialize(
             draft.params, flat.folder, settings.robot, graph.folder
         )
     except BlockError as error:
-        problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
+        problems.add(Code.UNMET_REQUIREMENT, f"{flat.path}: {error}", flat.where, at=flat.path)
         draft.block_type = None
         return draft
     try:
-        local = draft.block_type.local_dimensions(draft.params, settings.robot)
+        local = draft.block_type.dimensions(draft.params, settings.robot)
     except Exception as error:  # noqa: BLE001  the block's own code must not hide others
         if settings.robot_known:
             problems.add(
@@ -109,7 +109,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.complete:
         check_defaults(draft, problems)
     if settings.robot_known:
-        draft.absent = check_fit(draft, settings, problems)
+        check_fit(draft, settings, problems)
     return draft
 
 

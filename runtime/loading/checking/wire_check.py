@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from ....files.nodes import text_of
+from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Input, Output
 from ...language.quantities import UNCHECKED, quantity_of
 from ...language.signals import Field, Signal
 from ...language.unit_algebra import over
 from ...language.units import Unit
 from ..flattening.flat import FlatGraph, FlatWire
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import text_of
 from .block_check import BlockDraft
 
 
@@ -111,10 +111,10 @@ class WireCheck:
                 if nearby
                 else allowed,
             )
-        reason = source.absent.get(wire.source_port)
-        if reason is not None:
+        reason = source.outputs[wire.source_port].absent
+        if reason:
             self.problems.add(
-                Code.MISFIT,
+                Code.UNMET_REQUIREMENT,
                 f"{at} reads {wire.source}, which is not there: {reason}",
                 wire.where,
                 **other,
@@ -236,7 +236,7 @@ class WireCheck:
                 continue
             for name, output in source.outputs.items():
                 path = f"{source.flat.path}.{name}"
-                if path in taken or name in source.absent:
+                if path in taken or output.absent:
                     continue
                 same = output.signal is port.signal
                 if not same and len(other) == 3:

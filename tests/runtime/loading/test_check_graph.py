@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
+from aloft.files.problems import Position
 from aloft.runtime.graph import Graph
-from aloft.runtime.language.stages import CheckedGraph, ClockSpec, Position
+from aloft.runtime.language.stages import CheckedGraph, ClockSpec
 from aloft.runtime.loading import LoadError, check, load, load_text
 
 PATH = Path("graph.yaml")
@@ -229,7 +230,7 @@ def test_a_crash_in_a_users_own_check_is_a_problem(tmp_path: Path) -> None:
         "    y = Output(Vector)\n"
         "    def step(self): pass\n"
         "    @classmethod\n"
-        "    def local_dimensions(cls, params, robot):\n"
+        "    def dimensions(cls, params, robot):\n"
         "        return {'n': robot.legs}\n"
     )
     (tmp_path / "graph.yaml").write_text(

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from aloft.files.problems import Problem
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.registry import all_blocks
 from aloft.runtime.loading import check, load, load_text
-from aloft.runtime.loading.problems import Problem
 
 SENSOR = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
@@ -223,5 +223,5 @@ def test_shipped_graphs_leave_no_unit_unchecked(name: str) -> None:
 
 def test_every_shipped_block_says_what_it_carries() -> None:
     for name, block in all_blocks().items():
-        carries = any(f.carried for o in block.outputs.values() for f in o.signal.fields.values())
-        assert not carries or block.carried.__func__ is not Block.carried.__func__, name
+        carries = any(f.inferred for o in block.outputs.values() for f in o.signal.fields.values())
+        assert not carries or block.infer_units.__func__ is not Block.infer_units.__func__, name

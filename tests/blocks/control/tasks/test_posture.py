@@ -13,7 +13,7 @@ from aloft.blocks.control.tasks.posture import (
     PostureParameters,
     chosen_joints,
 )
-from aloft.blocks.control.tasks.task import RowGains, TaskError, TaskJacobian, feedback_rows
+from aloft.blocks.control.tasks.task import TaskError, TaskJacobian, feedback_rows
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.mathematics.whole_body_qp import TaskRows
 from aloft.robots.description import find_robot
@@ -34,11 +34,11 @@ def test_a_joint_accelerates_by_feedforward_and_feedback_and_a_held_one_stands_s
     terms, joints = SimpleNamespace(velocity=velocity), SimpleNamespace(position=position)
     chosen = PostureJoints(index, np.array([False, False, True]), np.array([7.0, 8.0, 0.4]))
     rows = TaskRows(np.ones((3, 11)), np.zeros(3), np.zeros(3))
-    gains = RowGains(np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
+    gains = (np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
     e, j = TaskError(*np.zeros((3, 3))), TaskJacobian(rows.jacobian, np.zeros(3))
     Posture.error(terms, joints, target, chosen, e)
     Posture.jacobian(joints, chosen, j)
-    feedback_rows(e, j.drift, gains, rows)
+    feedback_rows(e, j.drift, *gains, rows)
     assert (rows.jacobian == np.eye(11)[[7, 10, 8]]).all()
     angle, rate, feedforward = reference[:, index]
     angle[2], rate[2], feedforward[2] = 0.4, 0.0, 0.0
@@ -54,11 +54,13 @@ def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
     assert chosen_joints(held, PostureParameters()) == [5]
 
 
-def test_a_pattern_that_matches_no_joint_is_a_misfit():
+def test_a_pattern_that_matches_no_joint_is_an_unmet_requirement():
     entry = {"task": "Posture", "gains": {"joints": ["*_ankle", "tail"]}}
     with pytest.raises(BlockError, match="task Posture: no joint of bruce is called 'tail'; there"):
         BlockBench(WholeBodyController, {"tasks": [entry]}, robot=BRUCE)
-    assert not list(Posture.misfits(PostureParameters(posture_weight={"*_knee": 1.0}), BRUCE))
+    assert not list(
+        Posture.unmet_requirements(PostureParameters(posture_weight={"*_knee": 1.0}), BRUCE)
+    )
 
 
 def test_patterns_choose_joints_in_the_robots_order():
