@@ -41,13 +41,18 @@ _BOUNDS = {
 
 
 def read_model(
-    path: Path, model: type[Model], problems: Problems, kind_of_file: tuple[str, str]
+    path: Path,
+    model: type[Model],
+    problems: Problems,
+    kind_of_file: tuple[str, str],
+    *,
+    may_be_empty: bool = False,
 ) -> tuple[Model | None, MapNode | None]:
     """The model in a file, and the file's tree; ``None`` for what cannot be read, which is reported.
 
     ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
-    tree = read_file(path, str(path), problems, kind_of_file)
+    tree = read_file(path, str(path), problems, kind_of_file, may_be_empty=may_be_empty)
     if tree is None:
         return None, None
     try:
@@ -292,10 +297,15 @@ def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, E
         if isinstance(node, MapNode) and (found := node.get(str(step))) is not None:
             entry, node = found, found.value
             steps.append(str(step))
-        elif isinstance(node, ListNode) and isinstance(step, int) and step < len(node.items):
-            node, entry = node.items[step], None
-            steps.append(step)
+        elif isinstance(node, ListNode) and str(step).isdigit() and int(step) < len(node.items):
+            node, entry = node.items[int(step)], None
+            steps.append(int(step))
     return tuple(steps), node, entry
+
+
+def place_of(root: MapNode, path: Sequence[str | int]) -> Position:
+    """The place of the value at a path, or of the nearest thing that holds it."""
+    return locate(root, path)[1].where
 
 
 def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:
