@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,24 +96,25 @@ def explain(error: Mapping[str, Any], unit: str = "") -> tuple[str, str]:
 
 def describe(error: Mapping[str, Any], model: type[BaseModel]) -> str:
     """One error of pydantic as a line: where it is, what is expected and what was found."""
-    location = tuple(error["loc"])
-    at = path_text(location)
+    location, value = tuple(error["loc"]), error["input"]
+    at = ".".join(map(str, location))
     if error["type"] == "missing":
-        return f"{at} is missing"
+        return f"{at}: is missing"
     if error["type"] == "extra_forbidden":
-        legal = names_at(model, location[:-1])
-        near = nearest(str(location[-1]), legal, 1)
-        return f"there is no {at}" + (f"; did you mean {near[0]}?" if near else "")
-    info = info_at(model, location)
-    expected, reason = explain(error, unit_of(info))
-    if not at:
-        return reason or expected
-    found = text_of(error["input"]) if _is_short(error["input"]) else "this"
-    return f"{at} cannot be {found}: " + (f"expected {expected}" if expected else reason)
+        near = nearest(str(location[-1]), names_at(model, location[:-1]), 1)
+        return f"{at}: is not known" + (f"; the nearest is {near[0]}" if near else "")
+    unit = unit_of(info_at(model, location))
+    expected, reason = explain(error, unit)
+    expected = with_unit(expected, unit)
+    text = f"expected {expected}" if expected else reason
+    return text if not at or isinstance(value, Mapping) else f"{at}: {text}, found {value!r}"
 
 
-def _is_short(value: Any) -> bool:
-    return value is None or isinstance(value, (bool, int, float, str))
+def with_unit(expected: str, unit: str) -> str:
+    """What is expected, with the unit where it does not say it already."""
+    if not unit or not expected or re.search(rf"(?<!\w){re.escape(unit)}(?!\w)", expected):
+        return expected
+    return f"{expected} in {unit}"
 
 
 def unit_of(info: FieldInfo | None) -> str:
