@@ -234,10 +234,10 @@ def recompute_multipliers(n: int, count: int, gradient: Array1D, memory: ActiveS
 @kernel
 def violation(n: int, program: QuadraticProgram, row: int, x: Array1D) -> float:
     """By how much x violates a constraint; negative where it does not."""
-    total = -program.bound[row]
+    total: float = -program.bound[row]
     for k in range(n):
         total += program.matrix[row, k] * x[k]
-    return float(total)
+    return total
 
 
 @kernel

@@ -208,8 +208,7 @@ def yaw(quaternion: Array1D) -> float:
 
 @kernel
 def pitch_angle(quaternion: Array1D) -> float:
-    """The angle [rad], from -pi to pi, of the body's x axis about its own y axis: of R = Ry(pitch)
-    exactly, through full turns."""
+    """The angle [rad] about the world's y axis from its x axis to the body's, seen in the x-z plane."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 

@@ -34,8 +34,8 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
-from ...runtime.language.block import Block, Input, Misfit, Output
-from ...runtime.language.context import Clock
+from ...runtime.language.block import Block, Input, Output, UnmetRequirement
+from ...runtime.language.context import Clock, Context
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
@@ -74,12 +74,12 @@ def missing_joints(robot: RobotDescription) -> int:
     return max(0, rows - (len(robot.joints) - len(robot.held)))
 
 
-def too_few_joints(robot: RobotDescription | None) -> Iterator[Misfit]:
-    """The misfit of a robot that lacks joints to move its centre of mass and base while it stands."""
+def too_few_joints(robot: RobotDescription | None) -> Iterator[UnmetRequirement]:
+    """The unmet requirement of a robot that lacks joints to move its centre of mass and base while it stands."""
     assert robot is not None
     missing = missing_joints(robot)
     if missing:
-        yield Misfit(
+        yield UnmetRequirement(
             f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
             "all feet on the ground",
             expected=f"{len(robot.joints) + missing} joints that are not held",
@@ -286,17 +286,19 @@ def check_limits(robot: RobotDescription, columns: dict[str, Array]) -> None:
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles).max(axis=0)
     worst = int(excess.argmax())
     if excess[worst] > 0.0:
+        joint = robot.joints[worst]
         raise BlockError(
-            f"this motion takes {robot.joints[worst].name} {excess[worst]:.3f} rad past its limit; "
+            f"this motion takes {joint.name} {excess[worst]:.3f} {joint.unit('rad')} past its limit; "
             + hint
         )
     speeds = np.abs(columns["joint_velocity"] @ robot.joint_to_motor.T).max(axis=0)
     most = robot.motors.no_load_speed
     worst = int((speeds - most).argmax())
     if speeds[worst] > most[worst]:
+        unit = robot.motor_unit(worst, "rad/s")
         raise BlockError(
-            f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, "
-            f"but {robot.motors.profile} reaches {most[worst]:.1f} rad/s; {hint}"
+            f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} {unit}, "
+            f"but {robot.motors.profile} reaches {most[worst]:.1f} {unit}; {hint}"
         )
 
 
@@ -320,9 +322,9 @@ class GuidedReference(Block):
     """What is fed forward is the mean over so many seconds."""
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
-        return too_few_joints(robot)
+        return too_few_joints(context.robot)
 
     @abstractmethod
     def make_table(self) -> JumpTable:

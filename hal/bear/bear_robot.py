@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ...blocks.signals import DrivePhase
-from ...runtime.language.block import Context, Misfit
+from ...runtime.language.block import Context, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..drive_control import joint_gains
 from .bus import BusError, open_port
@@ -16,7 +16,7 @@ from .configuration import Hardware, HardwareError
 from .driven_robot import DrivenRobot, DriveParameters, missing_sensors, read_hardware
 from .driver import DriveLaw, Driver
 from .motor_loop import CommandQueue, MotorThread
-from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
+from .watchdog import AlwaysHeld, DeadMansSwitch, DriveWatchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""
@@ -74,18 +74,19 @@ class BearRobot(DrivenRobot):
     params: BearParameters
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report a wrong file of the hardware."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report gains that no drives can give the joints, and a wrong file of the hardware."""
         assert isinstance(params, BearParameters) and context.robot is not None
+        yield from super().requires(params, context)
         try:
             hardware = read_hardware(params.hardware, context, context.robot)
         except HardwareError as error:
-            yield Misfit(str(error), parameter="hardware", found=params.hardware)
+            yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
             return
         yield from missing_sensors(hardware, context.robot)
         ratio = context.period / hardware.bus.period
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the bus's period {hardware.bus.period} s does not divide the control period "
                 f"{context.period} s"
             )
@@ -102,7 +103,7 @@ class BearRobot(DrivenRobot):
         gains = joint_gains(self.params, self.robot)
         self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
         self._thread: MotorThread | None = None
-        self._watchdog: Watchdog | None = None
+        self._watchdog: DriveWatchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()
         self._queue: CommandQueue | None = None
         self._opened_at = self._cycle = 0.0
@@ -129,15 +130,20 @@ class BearRobot(DrivenRobot):
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
-                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout, silence)
+                self._watchdog = DriveWatchdog(descriptor, devices, params.graph_timeout, silence)
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
-            age = min(params.command_age, self.context.clock.command_limit or params.command_age)
-            self._thread = MotorThread(driver.loop, age, self._stop_reason)
+            self._thread = MotorThread(driver.loop, self.oldest_command, self._stop_reason)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
+
+    @property
+    def oldest_command(self) -> float:
+        """The age of a command at which the drives are damped [s]: also that of a silent link."""
+        limit = self.context.clock.command_limit
+        return min(self.params.command_age, limit) if limit else self.params.command_age
 
     def now(self) -> float:
         """The time since ``open`` [s]: of the clock, or of the exchanges."""

@@ -12,7 +12,7 @@ import numpy as np
 from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware, MotorSettings
@@ -87,7 +87,7 @@ def calibrate(
         BusError: a drive is silent, is switched on, or moves.
     """
     wanted = np.zeros(len(robot.joints))
-    Transmission(robot).motor_motion(pose, wanted)
+    TransmissionMap(robot).motor_motion(pose, wanted)
     offsets: dict[str, float] = {}
     for k, name in enumerate(robot.transmission.motors):
         motor = hardware.motors[name]

@@ -13,7 +13,7 @@ from .protocol import (
     BROADCAST,
     CONFIG,
     STATUS,
-    Frame,
+    BusFrame,
     FrameReader,
     Instruction,
     Register,
@@ -138,11 +138,11 @@ class BearBus:
         """Give the port back."""
         self.port.close()
 
-    def overhear(self, received: bytes | bytearray | memoryview, own: bytes = b"") -> None:
+    def overhear(self, received: bytes | bytearray | memoryview, own: bytes | None = None) -> None:
         """Look for instructions among bytes that are no answers to a question of ours.
 
         An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data
-        of an instruction of ours, which some adapters send back.
+        of an instruction of ours, if one was sent: some adapters send it back.
         """
         for frame in self._listener.feed(received):
             if _is_instruction(frame) and frame.data != own:
@@ -265,14 +265,14 @@ class BearBus:
                     return Reply(device, frame.code, frame.data)
                 self.counts.stray += 1
 
-    def _read_frames(self, size: int) -> list[Frame]:
+    def _read_frames(self, size: int) -> list[BusFrame]:
         before = self._reader.damaged
         frames = self._reader.feed(self.port.read(size))
         self.counts.damaged += self._reader.damaged - before
         return frames
 
 
-def _is_instruction(frame: Frame) -> bool:
+def _is_instruction(frame: BusFrame) -> bool:
     """Whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a
     right checksum by chance."""
     size = len(frame.data)

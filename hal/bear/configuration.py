@@ -12,7 +12,7 @@ from typing import Literal
 from ...files.problems import Code, LoadError, Problems, listing, nearest
 from ...files.validation import place_of, read_model
 from ...robots.robot_description import RobotDescription
-from ...runtime.language.block import Misfit
+from ...runtime.language.block import UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from .bus import BAUDRATE
@@ -174,25 +174,25 @@ class Hardware(Parameters):
         problems = Problems()
         found, tree = read_model(file, cls, problems, ("a robot's hardware", "robot, bus, motors"))
         if found is not None and tree is not None:
-            for misfit in found.find_faults(robot):
+            for requirement in found.find_faults(robot):
                 problems.add(
-                    Code.MISFIT, misfit.message, place_of(tree, misfit.parameter.split(".")),
-                    at=misfit.parameter, expected=misfit.expected, found=misfit.found,
-                    nearest=misfit.nearest, fix=misfit.fix,
+                    Code.UNMET_REQUIREMENT, requirement.message, place_of(tree, requirement.parameter.split(".")),
+                    at=requirement.parameter, expected=requirement.expected, found=requirement.found,
+                    nearest=requirement.nearest, fix=requirement.fix,
                 )  # fmt: skip
         if len(problems) or found is None:
             raise HardwareError(problems.report(str(file)))
         return found
 
-    def find_faults(self, robot: RobotDescription | None) -> list[Misfit]:
+    def find_faults(self, robot: RobotDescription | None) -> list[UnmetRequirement]:
         """What contradicts itself, or the robot's description."""
-        found: list[Misfit] = []
+        found: list[UnmetRequirement] = []
         owners: dict[int, str] = {}
         for name, motor in self.motors.items():
             first = owners.setdefault(motor.id, name)
             if first != name:
                 found.append(
-                    Misfit(
+                    UnmetRequirement(
                         f"{name} and {first} have the same address {motor.id}",
                         f"motors.{name}.id",
                         expected="an address of its own",
@@ -200,30 +200,30 @@ class Hardware(Parameters):
                 )
             if motor.low >= motor.high:
                 text = f"{name}: low {motor.low:g} is not below high {motor.high:g}"
-                found.append(Misfit(text, f"motors.{name}.low"))
+                found.append(UnmetRequirement(text, f"motors.{name}.low"))
         drives = self.drives
         if drives.current_margin >= drives.current_limit:
             text = "current_margin leaves nothing of current_limit"
-            found.append(Misfit(text, "drives.current_margin"))
+            found.append(UnmetRequirement(text, "drives.current_margin"))
         if drives.lowest_voltage >= drives.highest_voltage:
             text = "lowest_voltage is above highest_voltage"
-            found.append(Misfit(text, "drives.lowest_voltage"))
+            found.append(UnmetRequirement(text, "drives.lowest_voltage"))
         if robot is not None:
             found += self._faults_with(robot)
         return found
 
-    def _faults_with(self, robot: RobotDescription) -> list[Misfit]:
-        found: list[Misfit] = []
+    def _faults_with(self, robot: RobotDescription) -> list[UnmetRequirement]:
+        found: list[UnmetRequirement] = []
         if self.robot != robot.name:
             text = f"this is the hardware of {self.robot}, not of {robot.name}"
-            return [Misfit(text, "robot", expected=robot.name, found=self.robot)]
+            return [UnmetRequirement(text, "robot", expected=robot.name, found=self.robot)]
         motors = robot.transmission.motors
         for name in self.motors:
             if name not in motors:
                 near = nearest(name, motors)
                 hint = f"; did you mean {near[0]}?" if near else ""
                 found.append(
-                    Misfit(
+                    UnmetRequirement(
                         f"{robot.name} has no motor {name!r}{hint}", f"motors.{name}",
                         expected=listing(motors), found=name, nearest=near,
                     )
@@ -231,12 +231,12 @@ class Hardware(Parameters):
         for name in motors:
             if name not in self.motors:
                 text = f"motor {name} is missing"
-                found.append(Misfit(text, "motors", fix=f"{name}: {{id: ...}}"))
+                found.append(UnmetRequirement(text, "motors", fix=f"{name}: {{id: ...}}"))
         points = [contact.name for contact in robot.contacts]
         for k, name in enumerate(self.board.switches):
             if name not in points:
                 found.append(
-                    Misfit(
+                    UnmetRequirement(
                         f"{robot.name} has no contact point {name!r}: {', '.join(points)}",
                         f"board.switches.{k}", found=name, nearest=nearest(name, points),
                     )
@@ -245,7 +245,7 @@ class Hardware(Parameters):
         for k, name in enumerate(self.board.sensors):
             if name not in mounted:
                 found.append(
-                    Misfit(
+                    UnmetRequirement(
                         f"{robot.name} mounts no sensor {name!r}: {', '.join(mounted) or 'none'}",
                         f"board.sensors.{k}", found=name, nearest=nearest(name, mounted),
                     )

@@ -16,7 +16,7 @@ from ...blocks.signals import DrivePhase
 from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission, motor_gains
+from ...robots.transmission import TransmissionMap, motor_gains
 from ..drive_control import DriveGoals
 from .bus import BearBus, BusError, Reply, SerialPort
 from .configuration import Hardware
@@ -247,7 +247,7 @@ class Driver:
         )
         self.loop = MotorLoop(robot, hardware, self.bus, self.board, law.goals, law.motor_stiffness)
         self._standing = np.zeros(len(names))
-        Transmission(robot).motor_motion(robot.standing_position, self._standing)
+        TransmissionMap(robot).motor_motion(robot.standing_position, self._standing)
 
     def connect(self) -> None:
         """Find all drives and the board, and measure once. Nothing is switched on.

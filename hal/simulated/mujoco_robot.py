@@ -10,14 +10,13 @@ import numpy as np
 
 from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Metric, Misfit, State
+from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
-from ..drive_control import gain_misfits, lost_gains
-from .geared_rotors import unsupported_motor
+from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters
-from .stance import uneven_contacts
 from .state import DriveState, TickRecord
+from .unsupported import uneven_contacts, unsupported_motor
 
 
 class MujocoRobot(SimulatedRobot):
@@ -49,7 +48,8 @@ class MujocoRobot(SimulatedRobot):
     Joints without a working motor are kept in the standing pose until the run begins. A fixed base
     is at the world's origin from the start, and a robot without feet lies on its lowest shape.
 
-    For a slide, metres and newtons stand for radians and newton metres in every parameter.
+    For a joint that slides, metres and newtons stand for radians and newton metres in every parameter
+    and signal.
 
     All random numbers follow from ``seed``. Every disturbance has a stream of its own, so setting
     one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
@@ -83,32 +83,30 @@ class MujocoRobot(SimulatedRobot):
         }  # fmt: skip
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a transmission that the simulator cannot express, gains that no drives can give, and
         feet that cannot stand."""
+        robot = context.robot
         assert isinstance(params, SimulatorParameters) and robot is not None
         complaint = unsupported_motor(robot)
         if complaint:
-            yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+            yield UnmetRequirement(
+                complaint, fix="correct `transmission` in the robot's description"
+            )
         elif params.bus_period is not None:
-            yield from gain_misfits(params, robot)
+            yield from gain_requirements(params, robot)
         uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
         if uneven:
-            yield Misfit(
+            yield UnmetRequirement(
                 uneven,
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report periods that do not divide each other."""
-        assert isinstance(params, SimulatorParameters)
         bus = params.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"
         steps = whole / params.timestep
         if not _is_whole(steps):
-            yield Misfit(
+            yield UnmetRequirement(
                 f"timestep {params.timestep} s does not divide {what} {whole} s",
                 parameter="timestep",
                 expected=f"a whole fraction of {whole} s",
@@ -116,7 +114,7 @@ class MujocoRobot(SimulatedRobot):
                 fix=f"timestep: {_nearest_step(whole, params.timestep):.10g} s",
             )
         if bus is not None and not _is_whole(context.period / bus):
-            yield Misfit(
+            yield UnmetRequirement(
                 f"bus_period {bus} s does not divide the control period {context.period} s",
                 parameter="bus_period",
                 expected=f"a whole fraction of {context.period} s",
@@ -156,7 +154,7 @@ class MujocoRobot(SimulatedRobot):
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
         from ..random_streams import Purpose, uniform_call
-        from .drives import CommandLatency, Drives
+        from .drives import CommandLatency, SimulatedDrives
         from .plant import Plant
         from .stance import RELEASED
 
@@ -173,7 +171,7 @@ class MujocoRobot(SimulatedRobot):
         if params.bus_period is not None:
             exchange = round(params.bus_period / params.timestep)
             feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
-        drives = self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+        drives = self._drives = SimulatedDrives(robot, damping, self.drives, self.record, feedback)
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
@@ -226,11 +224,11 @@ class MujocoRobot(SimulatedRobot):
         self.plant.clear_record()
         self._damped.run()
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Copy the state of the simulator and the random streams to the declared state."""
         self.plant.save()
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Restore both from the declared state, and recompute what depends on them."""
         self.plant.load()
 

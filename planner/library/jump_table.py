@@ -277,7 +277,7 @@ def locate(times: Array1D, time: float) -> tuple[int, float]:
             low = middle
         else:
             high = middle
-    return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
+    return low, (time - times[low]) / (times[high] - times[low])
 
 
 @kernel

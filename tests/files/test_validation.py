@@ -48,13 +48,17 @@ def heads(tmp_path: Path, text: str, *, may_be_empty: bool = False) -> list[str]
         ),
         (
             "nane: a\n",
-            ["1:1 unknown-key: 'nane' is not a key of a walker; expected name, legs, gains; fix name: a"],
+            [
+                "1:1 unknown-key: 'nane' is not a key of a walker; expected name, legs, gains; fix name: a"
+            ],
         ),
         (
             "name: a\nlegs: [{lenght: 1}]\n",
             [
-                "2:9 unknown-key: 'lenght' is not a key of legs[0]; expected length, side; "
-                "fix length: 1"
+                (
+                    "2:9 unknown-key: 'lenght' is not a key of legs[0]; expected length, side; "
+                    "fix length: 1"
+                )
             ],
         ),
         (
@@ -68,8 +72,10 @@ def heads(tmp_path: Path, text: str, *, may_be_empty: bool = False) -> list[str]
         (
             "name: [\n",
             [
-                "1:8 yaml: did not find expected node content; "
-                "fix close the bracket or quote, or add the missing colon or comma"
+                (
+                    "1:8 yaml: did not find expected node content; "
+                    "fix close the bracket or quote, or add the missing colon or comma"
+                )
             ],
         ),
     ],

@@ -290,10 +290,10 @@ def test_variation_and_scenes_reach_the_model() -> None:
     assert model.geom("right_toe").friction[0] == 0.5
     assert model.geom("box/0").solref[0] == pytest.approx(0.002)
     assert model.body("torso").ipos[0] == pytest.approx(0.02325 + 0.005)
-    assert step(0.05, 0.1).ground_height(0.2, 0.0) == 0.05
-    assert step(0.05, 0.1).ground_height(0.05, 0.0) == 0.0
+    assert step(0.05, 0.1).height(0.2, 0.0) == 0.05
+    assert step(0.05, 0.1).height(0.05, 0.0) == 0.0
     off = platform(0.35, 0.1)
-    assert off.ground_height(0.0, 0.0) == 0.0
-    assert off.ground_height(0.2, 0.0) == -0.35
+    assert off.height(0.0, 0.0) == 0.0
+    assert off.height(0.2, 0.0) == -0.35
     behind = platform(0.35, -0.1)
-    assert [behind.ground_height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]
+    assert [behind.height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]

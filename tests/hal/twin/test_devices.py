@@ -3,7 +3,7 @@
 import pytest
 
 from aloft.blocks.signals.robot import describe_conditions
-from aloft.hal.bear.protocol import CONFIG, STATUS, Frame, Instruction, Mode, Torque
+from aloft.hal.bear.protocol import CONFIG, STATUS, BusFrame, Instruction, Mode, Torque
 from aloft.hal.twin.devices import EmulatedActuator
 
 
@@ -12,7 +12,7 @@ def write(actuator: EmulatedActuator, **values: float) -> None:
         register = STATUS.get(name) or CONFIG[name]
         code = Instruction.WRITE_STATUS if name in STATUS else Instruction.WRITE_CONFIG
         data = bytes((register.address,)) + register.pack(value)
-        assert actuator.answer(Frame(actuator.device, code, data)) is None
+        assert actuator.answer(BusFrame(actuator.device, code, data)) is None
 
 
 def test_a_goal_beyond_its_limit_is_ignored_and_not_clamped() -> None:

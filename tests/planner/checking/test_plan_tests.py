@@ -14,7 +14,12 @@ import pytest
 from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.planner.checking.evidence import Evidence
-from aloft.planner.checking.plan_tests import _short, active_limits, allowed_motor_torque
+from aloft.planner.checking.plan_tests import (
+    _short,
+    _standing_knots,
+    active_limits,
+    allowed_motor_torque,
+)
 from aloft.planner.checking.replay import replay
 from aloft.planner.checking.validity import PlanTest, check_plan
 from aloft.planner.library.library import SHIPPED
@@ -383,6 +388,25 @@ def test_two_jumps_are_followed_one_after_the_other(two_jumps: Evidence) -> None
     assert np.abs(two_jumps.point_height[standing]).max() < 1e-3
     between = (samples.time > landed + 0.01) & (samples.time < second - 0.01)
     assert samples.points[between][:, :, 2].min() > 0.049
+
+
+def test_feet_of_several_jumps_rest_at_each_place_by_itself(two_jumps: Evidence) -> None:
+    assert found(two_jumps.plan)["foot_slip"].value < 1e-3
+
+
+def test_the_feet_stand_between_two_jumps_until_the_first_heel_lifts() -> None:
+    contact = np.zeros((14, 2), bool)
+    contact[4:10] = True
+    contact[8:10, 1] = False  # the heels lift at knot 8
+    flights = ((1, 4), (10, 12))
+    given = SimpleNamespace(
+        replay=SimpleNamespace(flights=flights), plan=SimpleNamespace(contact=contact)
+    )
+    assert _standing_knots(given) == [8]  # type: ignore[arg-type]
+    contact[4:10, 1] = False
+    assert _standing_knots(given) == [10]  # type: ignore[arg-type]
+    given.replay.flights = ((1, 4),)
+    assert _standing_knots(given) == []  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("jump", "amount"), [(0, 0.05), (1, -0.04)])
