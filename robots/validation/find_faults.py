@@ -7,10 +7,11 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from ...files.problems import listing
 from ...files.validation import explain, names_at
 from ..robot_description import RobotDescription
 from .actuation import check_actuation
-from .faults import Draft, Path, RobotFault, listing, nearest
+from .faults import Draft, Path, RobotFault, nearest
 from .stance import check_feet, check_poses
 from .structure import check_bodies, check_joints, check_looks, check_names, check_tree
 
