@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
+from ....files.validation import describe, path_text
 from ....mathematics.arrays import Array1D, Array2D
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
@@ -282,11 +283,11 @@ class ChosenTask:
         try:
             return self.kind.Params.model_validate({**values, **self.entry.gains, **own})
         except ValidationError as error:
-            first = error.errors()[0]
-            gain = ".".join(map(str, first["loc"]))
+            first = error.errors(include_url=False)[0]
+            gain, reason = path_text(first["loc"]), describe(first, self.kind.Params)
             known = ", ".join(self.kind.Params.model_fields) or "none"
             raise TaskChoiceError(
-                f"task {self.entry.task}: gain {gain!r}: {first['msg']}; its gains are {known}"
+                f"task {self.entry.task}: gain {gain!r}: {reason}; its gains are {known}"
             ) from error
 
 
