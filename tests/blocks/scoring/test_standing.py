@@ -130,7 +130,7 @@ def stand(
     record: StandRecord, time: float, shift: tuple[float, float] = (0.0, 0.0), touched: Any = ALL,
     stay: bool = True, **changes: Any,
 ) -> None:  # fmt: skip
-    seen = truth(contact_position=[*POINTS, *shift, 0.0], contact_touched=touched)
+    seen = truth(contact_position=np.add(POINTS, (*shift, 0.0)), contact_touched=touched)
     tick(record, time, seen)
     record_feet(seen.contact_touched, record, given(**changes), constants(), stay)
 
