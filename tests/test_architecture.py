@@ -202,6 +202,18 @@ def test_every_file_has_a_room() -> None:
     assert not without, "say in ALLOWED what the room may import"
 
 
+def test_only_their_verb_imports_the_benchmarks() -> None:
+    """They are not in the wheel."""
+    importing = [
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        if package != "benchmarks"
+        for path in files(package)
+        if any((own(name) or ("",))[0] == "benchmarks" for name in imports(path))
+    ]
+    assert importing == ["cli/bench.py"]
+
+
 @pytest.mark.parametrize("room", ALLOWED)
 def test_imports_point_one_way(room: str) -> None:
     may = (room, *ALLOWED[room])
