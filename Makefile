@@ -74,9 +74,7 @@ plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/ta
 
 docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
-	@$(BIN)/python docs/refresh_task_parameters.py
-	@$(BIN)/python docs/refresh_excerpts.py
-	@$(BIN)/python docs/refresh_results.py
+	@$(BIN)/python docs/refresh.py
 	@$(BIN)/python docs/make_pictures.py
 
 clean:  ## remove all that these targets made

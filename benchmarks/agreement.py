@@ -26,7 +26,7 @@ from ..mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
 from ..mathematics.quadratic_program import ConeProgramSolver
 from ..mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ..mathematics.whole_body_qp import RigidBodyTerms, TaskRows, joint_torque
-from ..mathematics.whole_body_solution import SOLVED, Solution
+from ..mathematics.whole_body_solution import SOLVED, WholeBodySolution
 from ..runtime.graph import load
 from ..runtime.loading.reading.files import FOLDER
 from ..runtime.running.executor import Executor
@@ -195,7 +195,7 @@ def present_state(block: WholeBodyController) -> State:
         RigidBodyTerms(*(array.copy() for array in block._model)),
         block.phase.stance.copy(),
         block.joints.velocity.copy(),
-        block._motors.curves.peak.copy(),
+        block._motors.peak.copy(),
         float(w.friction[0]),
         float(w.force_min[0]),
         float(w.force_max[0]),
@@ -209,7 +209,7 @@ def show_state(block: WholeBodyController, state: State) -> None:
         *zip(block._model, state.model, strict=True),
         (block.phase.stance, state.stance),
         (block.joints.velocity, state.velocity),
-        (block._motors.curves.peak, state.peak),
+        (block._motors.peak, state.peak),
         (block._weights.friction, state.friction),
         (block._weights.force_min, state.force_min),
         (block._weights.force_max, state.force_max),
@@ -362,7 +362,7 @@ class Methods:
         self._block = block
         n, contacts = len(block.command.acceleration), len(block.command.force)
         self._n = n
-        self._solution = Solution(
+        self._solution = WholeBodySolution(
             np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
         )
         arguments = block._solve.arguments

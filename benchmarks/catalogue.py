@@ -19,6 +19,7 @@ from .frontier.frontier import frontier
 from .jumps.jumps import jumps
 from .links.link_delays import link_delays
 from .links.links import links
+from .loading import loading
 from .planner.planner import planner
 from .recorder import recorder
 from .rows import Row
@@ -29,6 +30,7 @@ from .tick.tick import tick
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
     "startup": startup,
+    "loading": loading,
     "scheduler": scheduler,
     "planner": planner,
     "recorder": recorder,

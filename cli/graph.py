@@ -111,10 +111,10 @@ def draw_files(
     Raises:
         AloftError: there is no such sub-graph, or a file cannot be written.
     """
+    from ..files.problems import listing
     from ..runtime.drawing.diagram import diagram, subgraphs
     from ..runtime.drawing.layout import draw
     from ..runtime.drawing.render import svg as svg_text
-    from ..runtime.loading.problems import listing
 
     known = subgraphs(graph)
     for path in closed:

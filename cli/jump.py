@@ -183,7 +183,7 @@ def usual_rise(path: Path) -> float | None:
 
 def settings_for(asked: dict[str, float], trial: str) -> list[str]:
     """The overrides of a graph for what was asked."""
-    from ..runtime.loading.reading.nodes import text_of
+    from ..files.nodes import text_of
     from ..studies.rehearsal import trial_settings
 
     return [

@@ -126,6 +126,6 @@ def value_of(name: str, found: list[dict[str, Any]]) -> Any:
 
 def text_of(value: Any) -> str:
     """A value as it is written in a graph file."""
-    from ..runtime.loading.reading.nodes import text_of
+    from ..files.nodes import text_of
 
     return text_of(value)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..planner.library.library import PlanLibrary
-    from ..planner.task.plan import JumpPlan
+    from ..planner.task.plan import PlannedJump
     from ..planner.task.task import JumpTask
     from ..robots.description import RobotDescription
 
@@ -113,10 +113,10 @@ def plan_tasks(
     """Plan each task file, also after one has failed. All files are read before anything is planned.
 
     Raises:
-        TaskError: what is wrong with any of them.
+        JumpTaskError: what is wrong with any of them.
     """
     from ..planner.library.library import PlanLibrary
-    from ..planner.task.files import TaskError
+    from ..planner.task.files import JumpTaskError
     from ..planner.task.read_task import read_task
     from ..robots.description import find_robot
 
@@ -124,10 +124,10 @@ def plan_tasks(
     for path in paths:
         try:
             tasks.append(read_task(path))
-        except TaskError as error:
+        except JumpTaskError as error:
             wrong.append(str(error))
     if wrong:
-        raise TaskError("\n".join(wrong))
+        raise JumpTaskError("\n".join(wrong))
     rows: list[dict[str, Any]] = []
     for path, task in zip(paths, tasks, strict=True):
         library = PlanLibrary(find_robot(task.robot, path.parent), keep)
@@ -226,7 +226,9 @@ def solver_with_progress(tell: Any) -> Any:
     """The planner, which prints what it is compiling."""
     from ..planner.solving.solve import solve_jump
 
-    def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+    def make(
+        task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+    ) -> PlannedJump:
         def progress(text: str, done: int, total: int) -> None:
             tell(f"planning {task.name}: {text} ({done} of {total})")
 
@@ -236,7 +238,7 @@ def solver_with_progress(tell: Any) -> Any:
 
 
 def write_pictures(
-    found: JumpPlan, robot: RobotDescription, out: Path, screen: Console
+    found: PlannedJump, robot: RobotDescription, out: Path, screen: Console
 ) -> dict[str, str]:
     """The picture and the recording of a plan."""
     from ..logs.recording.motion_recording import write_motion

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from ..logs.file.reader import RecordedRun
     from ..robots.description import ReadRobot
-    from ..robots.identification import Delay, RigidBody
+    from ..robots.identification import IdentifiedBody, IdentifiedDelay
     from ..robots.robot_description import RobotDescription
 
 robot = typer.Typer(
@@ -289,13 +289,13 @@ def _recorded(file: Path) -> tuple[RecordedRun, RobotDescription]:
 def _identified(
     run: RecordedRun, description: RobotDescription, robot: str, base: str, command: str,
     encoder_std: float,
-) -> tuple[RigidBody, Delay]:  # fmt: skip
+) -> tuple[IdentifiedBody, IdentifiedDelay]:  # fmt: skip
     import numpy as np
 
     from ..mathematics.rotations import to_matrix
     from ..robots.identification import (
         IdentificationError,
-        Motion,
+        MeasuredRun,
         identify_delay,
         identify_rigid_body,
     )
@@ -324,7 +324,7 @@ def _identified(
         to_matrix(orientation, matrix)
         up[k] = matrix[2]
     period = 1.0 / run.header.base_rate
-    motion = Motion(
+    motion = MeasuredRun(
         period, seen["position"], seen["velocity"], seen["torque"], seen["rate"], seen["force"], up,
         seen["closed"],
     )  # fmt: skip
@@ -337,7 +337,7 @@ def _identified(
 
 
 def _rows(
-    robot: RobotDescription, body: RigidBody, delay: Delay
+    robot: RobotDescription, body: IdentifiedBody, delay: IdentifiedDelay
 ) -> list[tuple[str, str, str, str, str]]:
     def row(name: str, value: Any, described: float | None, unit: str, factor: float = 1.0) -> Any:
         shown = "" if described is None else f"{factor * described:.4g}"
@@ -357,7 +357,11 @@ def _rows(
 
 
 def graph_values(
-    run: RecordedRun, robot: RobotDescription, body: RigidBody, delay: Delay, file: Path
+    run: RecordedRun,
+    robot: RobotDescription,
+    body: IdentifiedBody,
+    delay: IdentifiedDelay,
+    file: Path,
 ) -> str:
     """The values as a graph's ``set``, for the blocks of the recorded graph that take them."""
 

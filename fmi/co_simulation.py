@@ -15,7 +15,7 @@ from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Field, Signal
 from .description import Description, Variable, describe, nearest, signals
-from .instance import Instance
+from .instance import FmuInstance
 
 _ROOM = 4096
 """Bytes by which an FMU's state may grow, beside a half of what it is at first."""
@@ -86,7 +86,7 @@ class UnitBlock(Block):
         assert isinstance(params, FmuParameters)
         if not cls.described.kept:
             return {"fmu_state": 1}
-        instance = Instance(cls.described, params.start, 0.0)
+        instance = FmuInstance(cls.described, params.start, 0.0)
         try:
             size = len(instance.state())
         finally:
@@ -97,14 +97,14 @@ class UnitBlock(Block):
 
     def setup(self) -> None:
         """Load the FMU, and bind its variables to the ports."""
-        self._instance: Instance | None = None
+        self._instance: FmuInstance | None = None
         self._begin()
 
     def _begin(self) -> None:
         """Load the FMU anew, as it is before its first step."""
         if self._instance is not None:
             self._instance.close()
-        made = Instance(
+        made = FmuInstance(
             self.described,
             self.params.start,
             self.context.offset_ticks * self.context.clock.base_period,

@@ -61,7 +61,7 @@ LINES = 12
 """How many of the FMU's last log lines are kept."""
 
 
-class Instance:
+class FmuInstance:
     """One instance of an FMU, initialised and ready for its first step.
 
     Args:
@@ -207,7 +207,7 @@ class Transfer:
 
     def __init__(
         self,
-        instance: Instance,
+        instance: FmuInstance,
         variables: Iterable[Variable],
         ports: Mapping[str, Signal],
         *,
@@ -260,7 +260,7 @@ def _pointer(array: NDArray[Any]) -> Any:
 class _Blame:
     """Turns what FMPy or an FMU raises into a ``BlockError`` that has the FMU's own log lines."""
 
-    def __init__(self, instance: Instance, doing: str) -> None:
+    def __init__(self, instance: FmuInstance, doing: str) -> None:
         self._instance = instance
         self._doing = doing
 

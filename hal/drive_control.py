@@ -23,12 +23,12 @@ in ``kappa`` and runs at the rate of the bus instead.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ..blocks.signals import JointCommand
 from ..mathematics.arrays import Array, Array1D, Array2D
-from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
@@ -36,6 +36,8 @@ from ..robots.transmission import MotorGains, motor_gains
 from ..runtime.language.block import Misfit
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.per_joint import PerJoint
+from ..runtime.language.signals import Field, Signal
+from ..runtime.language.steps import signal_call
 
 _REACH = 3.0
 """How far from its target a joint is [rad] where the default stiffness asks for the peak torque.
@@ -116,14 +118,39 @@ def _some(gains: MotorGains, limit: int = 4) -> str:
     return f"{text} and {more} more" if more > 0 else text
 
 
-class Targets(NamedTuple):
-    """What some commands say of the joints: ``JointTargets``, each (n_commands, n_joints)."""
+class CommandTargets(Signal):
+    """What some commands say of the joints, a row for each command."""
 
-    torque: Array2D
-    position: Array2D
-    velocity: Array2D
-    stiffness: Array2D
-    damping: Array2D
+    torque = Field(("n_queue", "n_joints"), unit="N m", text="feedforward joint torques")
+    position = Field(("n_queue", "n_joints"), unit="rad", text="joint angle targets")
+    velocity = Field(("n_queue", "n_joints"), unit="rad/s", text="joint velocity targets")
+    stiffness = Field(("n_queue", "n_joints"), unit="N m/rad", text="gains on position")
+    damping = Field(("n_queue", "n_joints"), unit="N m s/rad", text="gains on velocity")
+
+
+class MotorGoals(Signal):
+    """The goals of all drives."""
+
+    torque = Field("n_joints", unit="N m", text="the motors' torques beside their feedback")
+    position = Field("n_joints", unit="rad", text="the motors' target angles")
+    velocity = Field("n_joints", unit="rad/s", text="the motors' target velocities")
+
+
+class MeasuredMotion(Signal):
+    """The measured motion of motors and joints."""
+
+    position = Field("n_joints", unit="rad", text="angles of the motors")
+    velocity = Field("n_joints", unit="rad/s", text="velocities of the motors")
+    joint_position = Field("n_joints", unit="rad", text="angles of the joints")
+    joint_velocity = Field("n_joints", unit="rad/s", text="velocities of the joints")
+
+
+class GoalScratch(Signal):
+    """What ``make_goals`` computes on its way."""
+
+    position_error = Field("n_joints", unit="rad", text="of the joints, against their targets")
+    velocity_error = Field("n_joints", unit="rad/s", text="of the joints, against their targets")
+    joint_torque = Field("n_joints", unit="N m", text="the torques that are asked of the joints")
 
 
 class Gears(NamedTuple):
@@ -141,31 +168,6 @@ class Gears(NamedTuple):
     lead: float
 
 
-class Goals(NamedTuple):
-    """The goals of every motor [N m, rad, rad/s], each (n,)."""
-
-    torque: Array1D
-    position: Array1D
-    velocity: Array1D
-
-
-class MeasuredMotion(NamedTuple):
-    """The measured motion of motors and joints [rad, rad/s], each (n,)."""
-
-    position: Array1D
-    velocity: Array1D
-    joint_position: Array1D
-    joint_velocity: Array1D
-
-
-class TrackingErrors(NamedTuple):
-    """Scratch, each (n,): the joints' errors, and the torque that is asked of them."""
-
-    position: Array1D
-    velocity: Array1D
-    torque: Array1D
-
-
 @kernel
 def smallest_share(gears: Gears, motor: int, commanded: Array1D, drives: Array1D) -> float:
     """Of a motor, the least share of the drives' gains among the joints it moves."""
@@ -180,24 +182,23 @@ def smallest_share(gears: Gears, motor: int, commanded: Array1D, drives: Array1D
 @kernel
 def make_goals(
     gears: Gears,
-    targets: Targets,
+    commands: CommandTargets,
     row: int,
     measured: MeasuredMotion,
-    goals: Goals,
-    errors: TrackingErrors,
+    goals: MotorGoals,
+    scratch: GoalScratch,
 ) -> None:
-    """The goals of all drives for the command in a row of ``targets``: see the module."""
-    stiffness, damping = targets.stiffness[row], targets.damping[row]
-    for k in range(errors.torque.shape[0]):
-        position = targets.position[row, k] - measured.joint_position[k]
-        velocity = targets.velocity[row, k] - measured.joint_velocity[k]
-        errors.position[k], errors.velocity[k] = position, velocity
-        requested = position * stiffness[k] + targets.torque[row, k]
-        errors.torque[k] = requested + velocity * damping[k]
-    multiply_vector(gears.torque_to_motor, errors.torque, goals.torque)
-    multiply_vector(gears.to_motor, errors.position, goals.position)
-    multiply_vector(gears.to_motor, errors.velocity, goals.velocity)
-    for k in range(errors.torque.shape[0]):
+    """The goals of all drives for the command in a row of ``commands``: see the module."""
+    stiffness, damping = commands.stiffness[row], commands.damping[row]
+    scratch.position_error[:] = commands.position[row] - measured.joint_position
+    scratch.velocity_error[:] = commands.velocity[row] - measured.joint_velocity
+    scratch.joint_torque[:] = (
+        scratch.position_error * stiffness + commands.torque[row] + scratch.velocity_error * damping
+    )
+    multiply_vector(gears.torque_to_motor, scratch.joint_torque, goals.torque)
+    multiply_vector(gears.to_motor, scratch.position_error, goals.position)
+    multiply_vector(gears.to_motor, scratch.velocity_error, goals.velocity)
+    for k in range(goals.torque.shape[0]):
         angle, speed = measured.position[k], measured.velocity[k]
         share = smallest_share(gears, k, stiffness, gears.stiffness)
         error = goals.position[k] * share
@@ -207,21 +208,6 @@ def make_goals(
         error = goals.velocity[k] * smallest_share(gears, k, damping, gears.damping)
         goals.torque[k] = torque - error * gears.motor_damping[k]
         goals.velocity[k] = error + speed
-
-
-class JointTargets(Protocol):
-    """What a command says of the joints: ``JointCommand`` without its mode, each (n_joints,)."""
-
-    @property
-    def torque(self) -> Array: ...
-    @property
-    def position(self) -> Array: ...
-    @property
-    def velocity(self) -> Array: ...
-    @property
-    def stiffness(self) -> Array: ...
-    @property
-    def damping(self) -> Array: ...
 
 
 class DriveGoals:
@@ -241,19 +227,18 @@ class DriveGoals:
         self, robot: RobotDescription, stiffness: Array, damping: Array, motor_stiffness: Array,
         motor_damping: Array, lead: float,
     ) -> None:  # fmt: skip
-        n = len(robot.joints)
         self.gears = gears_of(robot, stiffness, damping, motor_stiffness, motor_damping, lead)
-        self.torque, self.position, self.velocity = (np.zeros(n) for _ in range(3))
-        self._targets = Targets(*(np.zeros((1, n)) for _ in Targets._fields))
-        self._measured = MeasuredMotion(*(np.zeros(n) for _ in MeasuredMotion._fields))
-        self._make = KernelCall(
-            make_goals, self.gears, self._targets, 0, self._measured,
-            Goals(self.torque, self.position, self.velocity),
-            TrackingErrors(*(np.zeros(n) for _ in TrackingErrors._fields)),
-        )  # fmt: skip
+        goals = MotorGoals.allocate(robot.dimensions)
+        self.torque, self.position, self.velocity = goals.torque, goals.position, goals.velocity
+        self._targets = CommandTargets.allocate({**robot.dimensions, "n_queue": 1})
+        self._measured = MeasuredMotion.allocate(robot.dimensions)
+        scratch = GoalScratch.allocate(robot.dimensions)
+        self._make = signal_call(
+            make_goals, self.gears, self._targets, 0, self._measured, goals, scratch
+        )
 
     def follow(
-        self, command: JointTargets, position: Array, velocity: Array, joint_position: Array,
+        self, command: JointCommand, position: Array, velocity: Array, joint_position: Array,
         joint_velocity: Array,
     ) -> None:  # fmt: skip
         """Set the goals for an active command and the measured motion of motors and joints."""

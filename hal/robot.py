@@ -16,7 +16,7 @@ from ..blocks.signals import (
     JointState,
     RobotHealth,
 )
-from ..blocks.signals.drive_conditions import HEALTHY
+from ..blocks.signals.robot import HEALTHY
 from ..mathematics.arrays import (
     Indices1D,
 )
@@ -27,23 +27,26 @@ from ..runtime.language.block import Block, Context, Input, Output, Port
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters
 from ..runtime.language.signals import Signal
-from ..runtime.language.steps import as_record
+from ..runtime.language.steps import signal_call
 from .sensors.sensor import MountedSensor, mounted_sensors
-
-_DRIVING = int(DrivePhase.DRIVING)
 
 
 @kernel
 def report_healthy(tick: Indices1D, base_period: float, health: RobotHealth) -> None:
     """Report healthy drives and sensors in a ``tick``, (1,), of ``base_period`` [s]; nothing is measured."""
-    health.state[()] = _DRIVING
-    for k in range(health.condition.shape[0]):
-        health.condition[k] = HEALTHY
-        health.voltage[k] = health.temperature[k] = health.current[k] = health.age[k] = 0.0
-    health.imu_age[()] = 0.0
-    health.late_cycles[()] = health.lost_answers[()] = 0
-    health.stamp[()] = tick[0] * base_period
-    health.joints_valid[()] = health.imu_valid[()] = health.contacts_valid[()] = True
+    health.state = DrivePhase.DRIVING
+    health.condition[:] = HEALTHY
+    health.voltage[:] = 0.0
+    health.temperature[:] = 0.0
+    health.current[:] = 0.0
+    health.age[:] = 0.0
+    health.imu_age = 0.0
+    health.late_cycles = 0
+    health.lost_answers = 0
+    health.stamp = tick[0] * base_period
+    health.joints_valid = True
+    health.imu_valid = True
+    health.contacts_valid = True
 
 
 _CLASSES: dict[tuple[Any, ...], type[Block]] = {}
@@ -205,7 +208,7 @@ class Robot(Block, ABC):
     def reporting(self) -> KernelCall:
         """Writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
-        return KernelCall(report_healthy, clock.present, clock.base_period, as_record(self.health))
+        return signal_call(report_healthy, clock.present, clock.base_period, self.health)
 
     @abstractmethod
     def write(self) -> None:

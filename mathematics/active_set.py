@@ -35,7 +35,7 @@ _FEASIBLE = 1e-10
 """A constraint is violated by more than this, times its own size."""
 
 
-class Program(NamedTuple):
+class QuadraticProgram(NamedTuple):
     """The program's data: P (n, n), q (n,), G (m, n), h (m,), in arrays that may be larger."""
 
     hessian: Array2D
@@ -74,7 +74,9 @@ def active_set_memory(n: int, m: int) -> ActiveSetMemory:
 
 
 @kernel
-def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> int:
+def solve_program(
+    n: int, m: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
+) -> int:
     """Write the solution (n,) to ``x``.
 
     Args:
@@ -97,7 +99,7 @@ def solve_program(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
 
 @kernel
 def fulfil(
-    n: int, m: int, count: int, program: Program, memory: ActiveSetMemory, x: Array1D
+    n: int, m: int, count: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
 ) -> tuple[int, int]:
     """Add violated constraints to the ``count`` active ones until x fulfils all.
 
@@ -139,7 +141,9 @@ def fulfil(
 
 
 @kernel
-def start_unconstrained(n: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> bool:
+def start_unconstrained(
+    n: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
+) -> bool:
     """The minimum without constraints, and J = L^-T of the Cholesky factor P = L L'.
 
     Returns whether P is positive definite.
@@ -228,16 +232,18 @@ def recompute_multipliers(n: int, count: int, gradient: Array1D, memory: ActiveS
 
 
 @kernel
-def violation(n: int, program: Program, row: int, x: Array1D) -> float:
+def violation(n: int, program: QuadraticProgram, row: int, x: Array1D) -> float:
     """By how much x violates a constraint; negative where it does not."""
-    total = -program.bound[row]
+    total: float = -program.bound[row]
     for k in range(n):
         total += program.matrix[row, k] * x[k]
-    return float(total)
+    return total
 
 
 @kernel
-def most_violated(n: int, m: int, program: Program, memory: ActiveSetMemory, x: Array1D) -> int:
+def most_violated(
+    n: int, m: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
+) -> int:
     """The constraint that x violates by the longest distance; -1 where it violates none."""
     found, largest = -1, 0.0
     for i in range(m):
@@ -255,7 +261,7 @@ def most_violated(n: int, m: int, program: Program, memory: ActiveSetMemory, x: 
 
 @kernel
 def find_step(
-    n: int, count: int, new: int, excess: float, program: Program, memory: ActiveSetMemory
+    n: int, count: int, new: int, excess: float, program: QuadraticProgram, memory: ActiveSetMemory
 ) -> tuple[int, float, float]:
     """The directions towards a new constraint, and how far they may be followed.
 

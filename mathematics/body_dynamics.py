@@ -26,6 +26,7 @@ from .arrays import (
 )
 from .constants import GRAVITY
 from .kernel import kernel
+from .rotations import rotate_about_axis
 
 
 class BodyTree(NamedTuple):
@@ -78,21 +79,6 @@ def body_motion(n_joints: int) -> BodyMotion:
 
 
 @kernel
-def turn_about(base: Matrix3, axis: Vector3, angle: float, out: Matrix3) -> None:
-    """``base`` (3, 3) times the rotation by ``angle`` [rad] about the unit vector ``axis``."""
-    x, y, z = axis[0], axis[1], axis[2]
-    cos, sin = math.cos(angle), math.sin(angle)
-    rest = 1.0 - cos
-    xx, yy, zz = cos + x * x * rest, cos + y * y * rest, cos + z * z * rest
-    xy, xz, yz = x * y * rest, x * z * rest, y * z * rest
-    for row in range(3):
-        a, b, c = base[row, 0], base[row, 1], base[row, 2]
-        out[row, 0] = a * xx + b * (xy + z * sin) + c * (xz - y * sin)
-        out[row, 1] = a * (xy - z * sin) + b * yy + c * (yz + x * sin)
-        out[row, 2] = a * (xz + y * sin) + b * (yz - x * sin) + c * zz
-
-
-@kernel
 def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
     """Where all bodies are at the joints' positions [rad, or m for a slide], (n_joints,)."""
     for k in range(position.shape[0]):
@@ -113,7 +99,8 @@ def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
                 place[row] = place[row] + joint[row] * angle
                 joint[3 + row] = 0.0
             continue
-        turn_about(rotation, tree.axis[k], angle, motion.rotation[k + 1])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        rotate_about_axis(rotation, tree.axis[k], cosine, sine, motion.rotation[k + 1])
         x, y, z = place[0], place[1], place[2]
         u, v, w = joint[3], joint[4], joint[5]
         joint[0], joint[1], joint[2] = y * w - z * v, z * u - x * w, x * v - y * u
@@ -237,19 +224,12 @@ def turn_inertia(inertia: Array1D, rotation: Matrix3, turned: Matrix3, out: Arra
         turned[row, 0] = a * xx + b * xy + c * xz
         turned[row, 1] = a * xy + b * yy + c * yz
         turned[row, 2] = a * xz + b * yz + c * zz
-    out[0] = _product(turned, rotation, 0, 0)
-    out[1] = _product(turned, rotation, 1, 1)
-    out[2] = _product(turned, rotation, 2, 2)
-    out[3] = _product(turned, rotation, 0, 1)
-    out[4] = _product(turned, rotation, 0, 2)
-    out[5] = _product(turned, rotation, 1, 2)
-
-
-@kernel
-def _product(a: Array2D, b: Array2D, row: int, other: int) -> float:
-    """Row ``row`` of ``a`` times row ``other`` of ``b``, both (3, 3)."""
-    first = a[row, 0] * b[other, 0] + a[row, 1] * b[other, 1]
-    return float(first + a[row, 2] * b[other, 2])
+    out[0] = turned[0] @ rotation[0]
+    out[1] = turned[1] @ rotation[1]
+    out[2] = turned[2] @ rotation[2]
+    out[3] = turned[0] @ rotation[1]
+    out[4] = turned[0] @ rotation[2]
+    out[5] = turned[1] @ rotation[2]
 
 
 @kernel

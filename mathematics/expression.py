@@ -35,7 +35,7 @@ _OPERATORS: Mapping[type[ast.AST], Any] = {
 
 
 @dataclass(frozen=True)
-class Expression:
+class ParsedExpression:
     """A checked expression; ``names`` are the variables it reads, sorted."""
 
     text: str
@@ -58,7 +58,7 @@ class Expression:
         return evaluate
 
 
-def parse_expression(text: str, known: Iterable[str]) -> Expression:
+def parse_expression(text: str, known: Iterable[str]) -> ParsedExpression:
     """The expression that ``text`` says, in which the names ``known`` may occur.
 
     Raises:
@@ -71,7 +71,7 @@ def parse_expression(text: str, known: Iterable[str]) -> Expression:
         raise ValueError(f"cannot read {text!r}: {reason}") from None
     names: dict[str, None] = {}
     _check(tree, tuple(known), names)
-    return Expression(text, tree, tuple(sorted(names)))
+    return ParsedExpression(text, tree, tuple(sorted(names)))
 
 
 def _check(node: ast.expr, known: tuple[str, ...], names: dict[str, None]) -> None:

@@ -174,22 +174,23 @@ def advance(coefficients: Array1D, u: Array1D, memory: Array2D, out: Array1D) ->
 
 @kernel
 def advance_transfer_function(
-    a: Array, b: Array, c: Array, d: float, u: Array, states: Array, scratch: Array, out: Array
-) -> None:
+    a: Array2D, b: Array1D, c: Array1D, d: float, u: Array1D, states: Array2D, scratch: Array1D,
+    out: Array1D,
+) -> None:  # fmt: skip
     """Write c x + d u into ``out`` (n), and let every row x of ``states`` (n, k) become A x + b u.
 
     ``a`` is (k, k), ``b`` and ``c`` are (k), ``scratch`` is (k).
     """
     for element in range(u.shape[0]):
-        value = float(u[element])
+        value = u[element]
         total = d * value
         for i in range(c.shape[0]):
-            total += float(c[i]) * float(states[element, i])
+            total += c[i] * states[element, i]
         for i in range(c.shape[0]):
-            sum_of_row = float(b[i]) * value
+            sum_of_row = b[i] * value
             for j in range(c.shape[0]):
-                sum_of_row += float(a[i, j]) * float(states[element, j])
+                sum_of_row += a[i, j] * states[element, j]
             scratch[i] = sum_of_row
         for i in range(c.shape[0]):
-            states[element, i] = float(scratch[i])
+            states[element, i] = scratch[i]
         out[element] = total

@@ -28,7 +28,7 @@ DAMPING = 1e-8
 """Added to the squared levers [m^2] of the joints, so that a straight leg has a finite inverse."""
 
 
-class LegScratch(NamedTuple):
+class BaseForceScratch(NamedTuple):
     """Scratch for ``base_force_map``: ``normal`` (n, n) and ``right`` (6, n) for legs of up to n
     joints."""
 
@@ -42,7 +42,7 @@ def base_force_map(
     stance: NDArray[np.bool_],
     foot_of_point: Indices1D,
     chains: Indices2D,
-    scratch: LegScratch,
+    scratch: BaseForceScratch,
     out: Array2D,
 ) -> None:
     """The map G (6, n_joints) from joint torques to the generalised force on a floating base.

@@ -3,19 +3,20 @@
 A quaternion is x, y, z, w (Hamilton) and takes body vectors to the world. Functions write their
 result into ``out``, which may be the same array as an argument, and allocate no memory. Angles are
 in rad. Roll, pitch and yaw are a rotation about z by yaw, then about the new y by pitch, then about x by
-roll: R = Rz(yaw) Ry(pitch) Rx(roll). Elements are read with ``float``, because Python's arithmetic on
-single numbers is faster than NumPy's.
+roll: R = Rz(yaw) Ry(pitch) Rx(roll). Functions of many rotations at once are at the end.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array1D, Array2D, Array3D
+from .arrays import Array, Array1D, Array2D, Array3D, Matrix3, Vector3
 from .kernel import kernel
+from .linear_algebra import product
 
 _SMALL = 1e-8
 """Below this angle [rad] the series to second order is exact to the last bit."""
@@ -43,12 +44,7 @@ def skew(vector: Array1D, out: Array2D) -> None:
 @kernel
 def normalise(quaternion: Array1D, out: Array1D) -> None:
     """Divide a quaternion by its norm; the quaternion zero becomes the identity."""
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     largest = max(abs(x), abs(y), abs(z), abs(w))
     if largest == 0.0:
         out[0] = out[1] = out[2] = 0.0
@@ -83,18 +79,20 @@ def multiply(a: Array1D, b: Array1D, out: Array1D) -> None:
 def rotate(quaternion: Array1D, vector: Array1D, out: Array1D) -> None:
     """Rotate ``vector`` by a unit quaternion: from body to world."""
     x, y, z = quaternion[0], quaternion[1], quaternion[2]
-    turn(x, y, z, quaternion[3], vector, out)
+    rotate_components(x, y, z, quaternion[3], vector, out)
 
 
 @kernel
 def rotate_back(quaternion: Array1D, vector: Array1D, out: Array1D) -> None:
     """Rotate ``vector`` by the inverse of a unit quaternion: from world to body."""
     x, y, z = quaternion[0], quaternion[1], quaternion[2]
-    turn(-x, -y, -z, quaternion[3], vector, out)
+    rotate_components(-x, -y, -z, quaternion[3], vector, out)
 
 
 @kernel
-def turn(x: float, y: float, z: float, w: float, vector: Array1D, out: Array1D) -> None:
+def rotate_components(
+    x: float, y: float, z: float, w: float, vector: Array1D, out: Array1D
+) -> None:
     """Rotate ``vector`` by the unit quaternion (x, y, z, w)."""
     a, b, c = vector[0], vector[1], vector[2]
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -106,12 +104,7 @@ def turn(x: float, y: float, z: float, w: float, vector: Array1D, out: Array1D) 
 @kernel
 def to_matrix(quaternion: Array1D, out: Array2D) -> None:
     """The rotation matrix (3, 3) of a unit quaternion."""
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
     out[0, 2] = 2.0 * (x * z + w * y)
@@ -121,6 +114,23 @@ def to_matrix(quaternion: Array1D, out: Array2D) -> None:
     out[2, 0] = 2.0 * (x * z - w * y)
     out[2, 1] = 2.0 * (y * z + w * x)
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@kernel
+def rotate_about_axis(
+    base: Matrix3, axis: Vector3, cosine: float, sine: float, out: Matrix3
+) -> None:
+    """``base`` (3, 3) times the rotation about a unit ``axis`` by the angle of that cosine and sine
+    (Rodrigues' formula)."""
+    x, y, z = axis[0], axis[1], axis[2]
+    rest = 1.0 - cosine
+    xx, yy, zz = cosine + x * x * rest, cosine + y * y * rest, cosine + z * z * rest
+    xy, xz, yz = x * y * rest, x * z * rest, y * z * rest
+    for row in range(3):
+        a, b, c = base[row, 0], base[row, 1], base[row, 2]
+        out[row, 0] = a * xx + b * (xy + z * sine) + c * (xz - y * sine)
+        out[row, 1] = a * (xy - z * sine) + b * yy + c * (yz + x * sine)
+        out[row, 2] = a * (xz + y * sine) + b * (yz - x * sine) + c * zz
 
 
 @kernel
@@ -163,12 +173,7 @@ def exponential(vector: Array1D, out: Array1D) -> None:
 @kernel
 def logarithm(quaternion: Array1D, out: Array1D) -> None:
     """The rotation vector [rad] of a unit quaternion, of length at most pi."""
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
     sine = math.sqrt(x * x + y * y + z * z)
@@ -181,21 +186,12 @@ def integrate(
     quaternion: Array1D, angular_velocity: Array1D, duration: float, out: Array1D
 ) -> None:
     """The orientation after rotating at a constant body rate [rad/s] for ``duration`` [s]."""
-    wx, wy, wz = (
-        angular_velocity[0],
-        angular_velocity[1],
-        angular_velocity[2],
-    )
+    wx, wy, wz = angular_velocity[0], angular_velocity[1], angular_velocity[2]
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     half = 0.5 * rate * duration
     scale = 0.5 * duration if abs(half) < _SMALL else math.sin(half) / rate
     bx, by, bz, bw = scale * wx, scale * wy, scale * wz, math.cos(half)
-    ax, ay, az, aw = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    ax, ay, az, aw = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0] = aw * bx + ax * bw + ay * bz - az * by
     out[1] = aw * by - ax * bz + ay * bw + az * bx
     out[2] = aw * bz + ax * by - ay * bx + az * bw
@@ -206,24 +202,21 @@ def integrate(
 @kernel
 def yaw(quaternion: Array1D) -> float:
     """The heading [rad]: the angle about the world's z axis from its x axis to the body's."""
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+@kernel
+def pitch_angle(quaternion: Array1D) -> float:
+    """The angle [rad] about the world's y axis from its x axis to the body's, seen in the x-z plane."""
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
 def tilt(quaternion: Array1D) -> float:
     """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     # Computed from half angles, as the arc cosine of R_zz would lose half the digits at zero.
     return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
 
@@ -281,12 +274,7 @@ def to_euler(quaternion: Array1D, out: Array1D) -> None:
     Where pitch is at its end only the sum or difference of the others is defined, and they are
     ill-conditioned near it.
     """
-    x, y, z, w = (
-        quaternion[0],
-        quaternion[1],
-        quaternion[2],
-        quaternion[3],
-    )
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     sine = 2.0 * (w * y - z * x)
     side = 2.0 * (x * y + w * z)
     front = 1.0 - 2.0 * (y * y + z * z)
@@ -294,3 +282,47 @@ def to_euler(quaternion: Array1D, out: Array1D) -> None:
     # not the arc sine, which would lose half the digits near its end
     out[1] = math.atan2(sine, math.sqrt(side * side + front * front))
     out[2] = math.atan2(side, front)
+
+
+def axis_rotations(axis: Sequence[float], angles: Array) -> Array:
+    """Rotation matrices (n, 3, 3) about a unit axis by ``angles`` [rad] (n,), all at once."""
+    cross = np.empty((3, 3))
+    skew(np.array(axis), cross)
+    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    rotations: Array = np.eye(3) + sine * cross + (1.0 - cosine) * product(cross, cross)
+    return rotations
+
+
+def matrices_of_quaternions(quaternions: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    matrices = np.empty((*quaternions.shape[:-1], 3, 3))
+    for index in np.ndindex(*quaternions.shape[:-1]):
+        to_matrix(quaternions[index], matrices[index])
+    return matrices
+
+
+def quaternions_of_matrices(matrices: Array) -> Array:
+    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3)."""
+    m = matrices
+    diagonal = np.einsum("...ii->...i", m)
+    trace = diagonal.sum(axis=-1)
+    # four times the square of each component; the largest gives the most exact result
+    squares = np.stack(
+        [1.0 - trace + 2.0 * diagonal[..., k] for k in range(3)] + [1.0 + trace], axis=-1
+    )
+    off = {(i, j): m[..., i, j] for i in range(3) for j in range(3)}
+    x, y, z = (off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1])
+    xy, xz, yz = (off[0, 1] + off[1, 0], off[0, 2] + off[2, 0], off[1, 2] + off[2, 1])
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], xy, xz, x], axis=-1),
+            np.stack([xy, squares[..., 1], yz, y], axis=-1),
+            np.stack([xz, yz, squares[..., 2], z], axis=-1),
+            np.stack([x, y, z, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = squares.argmax(axis=-1)
+    picked = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    unit: Array = picked / np.linalg.norm(picked, axis=-1, keepdims=True)
+    return unit

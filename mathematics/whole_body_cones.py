@@ -26,7 +26,7 @@ import numpy as np
 from .active_set import (
     TOO_LONG,
     ActiveSetMemory,
-    Program,
+    QuadraticProgram,
     active_set_memory,
     fulfil,
     polish,
@@ -35,7 +35,7 @@ from .active_set import (
 )
 from .arrays import Array, Array1D, Array2D, Array3D, Flags, Indices, Indices1D
 from .kernel import kernel
-from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows
+from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows, TorqueLimits
 from .whole_body_reduction import (
     Reduction,
     force_gradient,
@@ -45,9 +45,8 @@ from .whole_body_reduction import (
     reduction_memory,
 )
 from .whole_body_solution import (
-    Motors,
-    Solution,
-    Weights,
+    ProgramWeights,
+    WholeBodySolution,
     exceeds_limits,
     limit_rows,
     reduce_program,
@@ -87,7 +86,7 @@ def cone_memory(n_contacts: int) -> Cones:
 
 @kernel
 def write_planes(
-    count: int, n: int, first: int, friction: float, cones: Cones, program: Program
+    count: int, n: int, first: int, friction: float, cones: Cones, program: QuadraticProgram
 ) -> int:
     """Rows for all planes of ``count`` cones, from row ``first`` on; zero where there is none yet.
 
@@ -112,7 +111,7 @@ def add_plane(
     first: int,
     friction: float,
     cones: Cones,
-    program: Program,
+    program: QuadraticProgram,
     memory: ActiveSetMemory,
 ) -> None:
     """A plane along the cone's ``direction``. Where all are in use, it takes the place of the one that
@@ -153,7 +152,7 @@ def cut(
     friction: float,
     tolerance: float,
     cones: Cones,
-    program: Program,
+    program: QuadraticProgram,
     memory: ActiveSetMemory,
     x: Array1D,
 ) -> int:
@@ -278,7 +277,7 @@ class ConeSolutionMemory(NamedTuple):
     """Memory for intermediate results; ``unknowns`` are the forces and the e of the reduction."""
 
     reduction: Reduction
-    program: Program
+    program: QuadraticProgram
     memory: ActiveSetMemory
     cones: Cones
     unknowns: Array
@@ -292,7 +291,7 @@ def cone_solution_memory(n_velocities: int, n_contacts: int) -> ConeSolutionMemo
     n, m = 3 * n_contacts + joints, (PYRAMID_ROWS + PLANES) * n_contacts + 2 * joints
     return ConeSolutionMemory(
         reduction_memory(n_velocities, 3 * n_contacts),
-        Program(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
+        QuadraticProgram(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
         active_set_memory(n, m),
         cone_memory(n_contacts),
         np.zeros(n),
@@ -307,11 +306,11 @@ def solve_whole_body_cones(
     terms: RigidBodyTerms,
     stance: Flags,
     joint_velocity: Array,
-    weights: Weights,
+    weights: ProgramWeights,
     limits: int,
-    motors: Motors,
+    motors: TorqueLimits,
     memory: ConeSolutionMemory,
-    solution: Solution,
+    solution: WholeBodySolution,
 ) -> None:
     """``solve_whole_body`` with the round cone |f_t| <= mu f_z in the place of the pyramid."""
     reduction, active = memory.reduction, memory.active
@@ -332,12 +331,12 @@ def solve_whole_body_cones(
 @kernel
 def solve_cone_forces(
     terms: RigidBodyTerms,
-    weights: Weights,
-    motors: Motors,
+    weights: ProgramWeights,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     memory: ConeSolutionMemory,
-    solution: Solution,
+    solution: WholeBodySolution,
 ) -> int:
     """``solve_forces`` with round cones. Returns a negative code of ``active_set`` where it fails."""
     active, program, reduction, cones = (

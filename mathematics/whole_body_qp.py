@@ -68,21 +68,6 @@ class Constraints(NamedTuple):
     bound: Array1D
 
 
-class FrictionCone(NamedTuple):
-    """Limits of a contact force: friction coefficient and bounds of the normal force [N]."""
-
-    friction: float
-    force_min: float
-    force_max: float
-
-
-class Bounds(NamedTuple):
-    """Lower and upper bounds of the limited torques [N m], (n_joints,) each."""
-
-    lower: Array1D
-    upper: Array1D
-
-
 class TorqueScratch(NamedTuple):
     """Memory for intermediate results of ``torque_limits``: (n_joints, n_x) twice, (n_joints,)."""
 
@@ -91,16 +76,23 @@ class TorqueScratch(NamedTuple):
     offset: Array1D
 
 
-class TorqueSpeedCurves(NamedTuple):
-    """The torque-speed curves of the motors, (n_motors,) each.
+class TorqueLimits(NamedTuple):
+    """The limits of the torques, those of motors or of joints, (n,) each.
 
     A motor has its ``peak`` torque [N m] up to the ``corner`` speed [rad/s]; from there the torque
-    falls linearly to zero at the ``no_load`` speed [rad/s].
+    falls linearly to zero at the ``no_load`` speed [rad/s]. At the present ``speed`` the torques must
+    be within ``lower`` and ``upper``. ``to_speed`` and ``to_torque`` (n, n) are products with joint
+    velocities and joint torques; ``to_torque`` is the identity where joints are limited.
     """
 
+    to_speed: Array2D
+    to_torque: Array2D
     peak: Array1D
     corner: Array1D
     no_load: Array1D
+    speed: Array1D
+    lower: Array1D
+    upper: Array1D
 
 
 @kernel
@@ -144,7 +136,9 @@ def base_dynamics(terms: RigidBodyTerms, active: Indices1D, rows: Constraints) -
 
 
 @kernel
-def friction_pyramids(count: int, first: int, cone: FrictionCone, rows: Constraints) -> None:
+def friction_pyramids(
+    count: int, first: int, friction: float, force_min: float, force_max: float, rows: Constraints
+) -> None:
     """``PYRAMID_ROWS`` rows for each of ``count`` points (paper, cone), whose forces begin in
     column ``first``:
 
@@ -157,27 +151,24 @@ def friction_pyramids(count: int, first: int, cone: FrictionCone, rows: Constrai
         for k in range(2):
             matrix[row + 2 * k, column + k], matrix[row + 2 * k + 1, column + k] = 1.0, -1.0
         for k in range(4):
-            matrix[row + k, column + 2] = -cone.friction
+            matrix[row + k, column + 2] = -friction
             bound[row + k] = 0.0
-        matrix[row + 4, column + 2], bound[row + 4] = 1.0, cone.force_max
-        matrix[row + 5, column + 2], bound[row + 5] = -1.0, -cone.force_min
+        matrix[row + 4, column + 2], bound[row + 4] = 1.0, force_max
+        matrix[row + 5, column + 2], bound[row + 5] = -1.0, -force_min
 
 
 @kernel
 def torque_limits(
     terms: RigidBodyTerms,
     active: Indices1D,
-    transmission: Array2D,
-    bounds: Bounds,
+    motors: TorqueLimits,
     scratch: TorqueScratch,
     rows: Constraints,
 ) -> None:
-    """Rows that keep T tau within its bounds, tau being affine in x = [a; f].
+    """Rows that keep T tau within its limits, with T = ``motors.to_torque`` and tau affine in x = [a; f].
 
     Args:
         active: the points in stance, in the order of their forces in x.
-        transmission: T, from joint torques to the torques that are limited: those of the motors,
-            or for the identity those of the joints.
         rows: out, (2 n_joints, n_x) and (2 n_joints,).
     """
     n = terms.mass_matrix.shape[0]
@@ -187,27 +178,27 @@ def torque_limits(
         point = active[j]
         for k in range(3):
             np.negative(terms.jacobian[point, k, 6:], scratch.rows[:, n + 3 * j + k])
-    np.dot(transmission, scratch.rows, scratch.product)
-    np.dot(transmission, terms.nonlinear[6:], scratch.offset)
+    np.dot(motors.to_torque, scratch.rows, scratch.product)
+    np.dot(motors.to_torque, terms.nonlinear[6:], scratch.offset)
     rows.matrix[0:joints, :] = scratch.product
     np.negative(scratch.product, rows.matrix[joints:, :])
-    np.subtract(bounds.upper, scratch.offset, rows.bound[0:joints])
-    np.subtract(scratch.offset, bounds.lower, rows.bound[joints:])
+    np.subtract(motors.upper, scratch.offset, rows.bound[0:joints])
+    np.subtract(scratch.offset, motors.lower, rows.bound[joints:])
 
 
 @kernel
-def motor_limits(speed: Array1D, curves: TorqueSpeedCurves, bounds: Bounds) -> None:
-    """The torque bounds of each motor at its speed [rad/s], (n_motors,).
+def motor_limits(motors: TorqueLimits) -> None:
+    """The bounds of each motor's torque at its speed.
 
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
     """
-    for i in range(speed.shape[0]):
-        value, peak = speed[i], curves.peak[i]
-        corner, no_load = curves.corner[i], curves.no_load[i]
+    for i in range(motors.speed.shape[0]):
+        value, peak = motors.speed[i], motors.peak[i]
+        corner, no_load = motors.corner[i], motors.no_load[i]
         share = (no_load - abs(value)) / max(no_load - corner, 1e-9)
         driving = peak * min(max(share, 0.0), 1.0)
-        bounds.upper[i] = driving if value > 0.0 else peak
-        bounds.lower[i] = -driving if value < 0.0 else -peak
+        motors.upper[i] = driving if value > 0.0 else peak
+        motors.lower[i] = -driving if value < 0.0 else -peak
 
 
 @kernel

@@ -28,7 +28,7 @@ import numpy as np
 from .arrays import Array1D, Array2D, Indices1D
 from .kernel import kernel
 from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
-from .whole_body_qp import Bounds, RigidBodyTerms, TaskRows
+from .whole_body_qp import RigidBodyTerms, TaskRows, TorqueLimits
 
 
 class Reduction(NamedTuple):
@@ -271,17 +271,12 @@ def torque_rows(
     terms: RigidBodyTerms,
     active: Indices1D,
     count: int,
-    transmission: Array2D,
-    bounds: Bounds,
+    motors: TorqueLimits,
     first: int,
     matrix: Array2D,
     bound: Array1D,
 ) -> int:
-    """Two rows in [f; e] for each limited torque, from row ``first`` on; returns the number in all.
-
-    Args:
-        transmission: from joint torques to those that are limited, (n_joints, n_joints).
-    """
+    """Two rows in [f; e] for each limited torque, from row ``first`` on; returns the number in all."""
     X_t, K, N_t = reduction.X_t, reduction.K, reduction.N_t
     torque_map, torque_rest = reduction.torque_map, reduction.torque_rest
     joints, n, size = torque_rest.shape[0], reduction.a_0.shape[0], 3 * count
@@ -310,28 +305,28 @@ def torque_rows(
             matrix[high, i] = 0.0
         torque = 0.0
         for j in range(joints):
-            share = transmission[motor, j]
+            share = motors.to_torque[motor, j]
             if share != 0.0:
                 torque += share * torque_rest[j]
                 for i in range(size + joints):
                     matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
         for i in range(size + joints):
             matrix[low, i] = -matrix[high, i]
-        bound[high] = bounds.upper[motor] - torque
-        bound[low] = torque - bounds.lower[motor]
+        bound[high] = motors.upper[motor] - torque
+        bound[low] = torque - motors.lower[motor]
     return int(first + 2 * joints)
 
 
 @kernel
-def within_limits(torque: Array1D, transmission: Array2D, bounds: Bounds) -> bool:
+def within_limits(torque: Array1D, motors: TorqueLimits) -> bool:
     """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
     for motor in range(torque.shape[0]):
         total = 0.0
         for j in range(torque.shape[0]):
-            total += transmission[motor, j] * torque[j]
-        if total > bounds.upper[motor] + 1e-10:
+            total += motors.to_torque[motor, j] * torque[j]
+        if total > motors.upper[motor] + 1e-10:
             return False
-        if total < bounds.lower[motor] - 1e-10:
+        if total < motors.lower[motor] - 1e-10:
             return False
     return True
 

@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .active_set import ActiveSetMemory, Program, active_set_memory, polish, solve_program
-from .arrays import Array1D, Array2D, Flags1D, Indices1D, Rows3
+from .active_set import ActiveSetMemory, QuadraticProgram, active_set_memory, polish, solve_program
+from .arrays import Array1D, Flags1D, Indices1D, Rows3
 from .kernel import kernel
 from .whole_body_qp import (
-    Bounds,
     RigidBodyTerms,
     TaskRows,
-    TorqueSpeedCurves,
+    TorqueLimits,
     motor_limits,
 )
 from .whole_body_reduction import (
@@ -47,7 +46,7 @@ NO_LIMITS, JOINT_LIMITS, MOTOR_LIMITS = 0, 1, 2
 """Kinds of torque limits."""
 
 
-class Weights(NamedTuple):
+class ProgramWeights(NamedTuple):
     """Numbers that may change during a run, each an array of one element.
 
     ``acceleration`` w_a and ``force`` w_f are weights, ``friction`` is the pyramid's coefficient, and
@@ -61,20 +60,7 @@ class Weights(NamedTuple):
     force_max: Array1D
 
 
-class Motors(NamedTuple):
-    """The motors: speeds from joint velocities, torques from joint torques, and their limits.
-
-    ``to_speed`` and ``to_torque`` are (n, n); ``speed`` (n,) is scratch.
-    """
-
-    to_speed: Array2D
-    to_torque: Array2D
-    curves: TorqueSpeedCurves
-    speed: Array1D
-    bounds: Bounds
-
-
-class Solution(NamedTuple):
+class WholeBodySolution(NamedTuple):
     """The result: torques (n_joints,), accelerations (n,), forces (n_contacts, 3); ``code`` (1,)."""
 
     torque: Array1D
@@ -87,7 +73,7 @@ class SolutionMemory(NamedTuple):
     """Memory for intermediate results; ``unknowns`` are the forces and the e of the reduction."""
 
     reduction: Reduction
-    program: Program
+    program: QuadraticProgram
     memory: ActiveSetMemory
     unknowns: Array1D
     gradient: Array1D
@@ -100,7 +86,7 @@ def solution_memory(n_velocities: int, n_contacts: int) -> SolutionMemory:
     n, m = 3 * n_contacts + joints, 6 * n_contacts + 2 * joints
     return SolutionMemory(
         reduction_memory(n_velocities, 3 * n_contacts),
-        Program(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
+        QuadraticProgram(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
         active_set_memory(n, m),
         np.zeros(n),
         np.zeros(n),
@@ -114,11 +100,11 @@ def solve_whole_body(
     terms: RigidBodyTerms,
     stance: Flags1D,
     joint_velocity: Array1D,
-    weights: Weights,
+    weights: ProgramWeights,
     limits: int,
-    motors: Motors,
+    motors: TorqueLimits,
     memory: SolutionMemory,
-    solution: Solution,
+    solution: WholeBodySolution,
 ) -> None:
     """Solve the program of ``whole_body_qp`` and write torques, accelerations and forces.
 
@@ -152,12 +138,12 @@ def reduce_program(
     terms: RigidBodyTerms,
     stance: Flags1D,
     joint_velocity: Array1D,
-    weights: Weights,
+    weights: ProgramWeights,
     limits: int,
-    motors: Motors,
+    motors: TorqueLimits,
     reduction: Reduction,
     active: Indices1D,
-    solution: Solution,
+    solution: WholeBodySolution,
 ) -> int:
     """Eliminate the accelerations and compute the motors' limits of this tick.
 
@@ -181,9 +167,11 @@ def reduce_program(
 
 
 @kernel
-def exceeds_limits(limits: int, motors: Motors, reduction: Reduction, solution: Solution) -> bool:
+def exceeds_limits(
+    limits: int, motors: TorqueLimits, reduction: Reduction, solution: WholeBodySolution
+) -> bool:
     """Whether the solution's torques exceed their limits; if so, prepares the larger program."""
-    if limits == NO_LIMITS or within_limits(solution.torque, motors.to_torque, motors.bounds):
+    if limits == NO_LIMITS or within_limits(solution.torque, motors):
         return False
     free_motions(reduction)
     return True
@@ -191,7 +179,7 @@ def exceeds_limits(limits: int, motors: Motors, reduction: Reduction, solution: 
 
 @kernel
 def write_forces(
-    code: int, active: Indices1D, count: int, unknowns: Array1D, solution: Solution
+    code: int, active: Indices1D, count: int, unknowns: Array1D, solution: WholeBodySolution
 ) -> None:
     """Write the forces of the points in stance, zeros for the others, and SOLVED; or a failure's code."""
     if code < 0:
@@ -208,12 +196,12 @@ def write_forces(
 @kernel
 def solve_forces(
     terms: RigidBodyTerms,
-    weights: Weights,
-    motors: Motors,
+    weights: ProgramWeights,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     memory: SolutionMemory,
-    solution: Solution,
+    solution: WholeBodySolution,
 ) -> int:
     """Solve the program in forces, and with ``extra`` unknowns also with the limits on torque.
 
@@ -243,13 +231,13 @@ def solve_forces(
 @kernel
 def limit_rows(
     terms: RigidBodyTerms,
-    weights: Weights,
-    motors: Motors,
+    weights: ProgramWeights,
+    motors: TorqueLimits,
     count: int,
     extra: int,
     reduction: Reduction,
     active: Indices1D,
-    program: Program,
+    program: QuadraticProgram,
 ) -> int:
     """Write the rows of friction, and with ``extra`` unknowns those of torque; returns their number."""
     matrix, bound = program.matrix, program.bound
@@ -258,23 +246,21 @@ def limit_rows(
         weights.force_max[0], matrix, bound,
     )  # fmt: skip
     if extra > 0:
-        rows = torque_rows(
-            reduction, terms, active, count, motors.to_torque, motors.bounds, rows, matrix, bound
-        )
+        rows = torque_rows(reduction, terms, active, count, motors, rows, matrix, bound)
     return rows
 
 
 @kernel
-def limit_motors(joint_velocity: Array1D, limits: int, motors: Motors) -> None:
+def limit_motors(joint_velocity: Array1D, limits: int, motors: TorqueLimits) -> None:
     """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
     for i in range(motors.speed.shape[0]):
         if limits == JOINT_LIMITS:
-            motors.bounds.upper[i] = motors.curves.peak[i]
-            motors.bounds.lower[i] = -motors.curves.peak[i]
+            motors.upper[i] = motors.peak[i]
+            motors.lower[i] = -motors.peak[i]
             continue
         total = 0.0
         for j in range(joint_velocity.shape[0]):
             total += motors.to_speed[i, j] * joint_velocity[j]
         motors.speed[i] = total
     if limits == MOTOR_LIMITS:
-        motor_limits(motors.speed, motors.curves, motors.bounds)
+        motor_limits(motors)

@@ -300,12 +300,9 @@ def yaw_share(flat: float, level: float) -> float:
 @kernel
 def _canonical(signs: Array1D, angles: Array1D) -> tuple[float, float, float, float, float]:
     return (
-        float(signs[0]) * float(angles[0]),
-        float(signs[1]) * float(angles[1]),
-        float(signs[2]) * float(angles[2]),
-        float(signs[3]) * float(angles[3]),
-        float(signs[4]) * float(angles[4]),
-    )
+        signs[0] * angles[0], signs[1] * angles[1], signs[2] * angles[2], signs[3] * angles[3],
+        signs[4] * angles[4],
+    )  # fmt: skip
 
 
 @kernel

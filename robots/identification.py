@@ -39,7 +39,7 @@ STILL = 0.15
 
 
 @dataclass(frozen=True)
-class Motion:
+class MeasuredRun:
     """The measurements of a run, one row a tick, as ``hal.Robot`` publishes them.
 
     Attributes:
@@ -106,7 +106,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class RigidBody:
+class IdentifiedBody:
     """What was found.
 
     Attributes:
@@ -130,8 +130,11 @@ class IdentificationError(ValueError):
 
 
 def identify_rigid_body(
-    robot: RobotDescription, motion: Motion, encoder_std: float = 0.003, tilt_std: float = 0.003
-) -> RigidBody:
+    robot: RobotDescription,
+    motion: MeasuredRun,
+    encoder_std: float = 0.003,
+    tilt_std: float = 0.003,
+) -> IdentifiedBody:
     """Fit mass, torso's CoM and friction to a run.
 
     Args:
@@ -181,7 +184,7 @@ def identify_rigid_body(
     s, n = float(found[0]), int(moved.sum())
     names = [joint.name for joint, moves in zip(robot.joints, moved, strict=True) if moves]
     offsets = [Value(float(found[k]) / s, float(std[k]) / s) for k in range(1, 4)]
-    return RigidBody(
+    return IdentifiedBody(
         Value(s * robot.total_mass, float(std[0]) * robot.total_mass),
         (offsets[0], offsets[1], offsets[2]),
         {name: Value(float(found[4 + k]), float(std[4 + k])) for k, name in enumerate(names)},
@@ -220,7 +223,7 @@ class _Assembly:
         self._joints = len(robot.joints)
 
     def blocks(
-        self, motion: Motion, ticks: NDArray[np.int64]
+        self, motion: MeasuredRun, ticks: NDArray[np.int64]
     ) -> tuple[Array, Array, NDArray[np.int64]]:
         """The equations (n_blocks, n_velocities, n_unknowns), their right sides (n_blocks,
         n_velocities), and the first tick of each block."""
@@ -236,7 +239,7 @@ class _Assembly:
             right.append(np.mean([side for _, side in made], axis=0))
         return np.array(rows), np.array(right), np.array([group[0] for group in groups])
 
-    def _tick(self, motion: Motion, k: int) -> tuple[Array, Array]:
+    def _tick(self, motion: MeasuredRun, k: int) -> tuple[Array, Array]:
         pin, n, period = self._pin, self._joints, motion.period
         q = np.zeros(7 + n)
         q[6], q[7:] = 1.0, 0.5 * (motion.position[k - 1] + motion.position[k])
@@ -271,7 +274,7 @@ class _Assembly:
         return rows - used.T @ (used @ rows), right - used.T @ (used @ right)
 
     def systematic(
-        self, motion: Motion, ticks: NDArray[np.int64], weighted: Array, scale: Array,
+        self, motion: MeasuredRun, ticks: NDArray[np.int64], weighted: Array, scale: Array,
         kept: NDArray[np.bool_], encoder_std: float, tilt_std: float,
     ) -> Array:  # fmt: skip
         """The covariance that unknown offsets of the encoders and an unknown tilt add."""
@@ -324,7 +327,7 @@ _PARTS = 10
 
 
 @dataclass(frozen=True)
-class Delay:
+class IdentifiedDelay:
     """What was found.
 
     Attributes:
@@ -340,7 +343,7 @@ class Delay:
 
 def identify_delay(
     period: float, commanded: Array, measured: Array, feedback: NDArray[np.bool_]
-) -> Delay:
+) -> IdentifiedDelay:
     """Find the delay between commands and torques.
 
     The command of tick k acts from t_k + d until the next one acts. A measured torque is the mean over
@@ -380,7 +383,7 @@ def identify_delay(
         )
     parts = [_fit(changes, measured, part, j)[1] for part in np.array_split(used, _PARTS)]
     std = max(float(np.std(parts, ddof=1)) / math.sqrt(_PARTS), _RESOLUTION)
-    return Delay(Value((j + share) * period, std * period), correlation, len(used))
+    return IdentifiedDelay(Value((j + share) * period, std * period), correlation, len(used))
 
 
 def _fit(changes: Array, measured: Array, used: NDArray[np.int64], j: int) -> tuple[float, float]:

@@ -1,8 +1,7 @@
 """Forward kinematics of a robot from its description, and where its feet are, in plain NumPy.
 
 ``link_poses`` takes many instants at once, with the base anywhere; ``link_poses_in_base`` one position of the
-joints, seen from the base. For set-up, checks and pictures, not for control, and independent of the libraries
-that the controller and the simulator use. During a run use ``PinocchioModel``.
+joints, seen from the base. For set-up, checks and pictures, not for control.
 
 A foot with one contact point is a ball, which rolls on the ground. Its contact point, and its sole, are the
 ball's lowest point in the world, whatever the foot's orientation: the point one radius straight below the
@@ -19,7 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.body_dynamics import BodyTree, body_motion, place_bodies
 from ..mathematics.linear_algebra import product
+from ..mathematics.rotations import axis_rotations, matrices_of_quaternions
 from .robot_description import Joint, RobotDescription
 
 
@@ -40,51 +41,21 @@ class LinkPoses:
         return self.position[:, index], self.rotation[:, index]
 
 
-def matrices_of_quaternions(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of unit quaternions x, y, z, w (n, 4)."""
-    x, y, z, w = np.moveaxis(quaternions, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
-
-
-def quaternions_of_matrices(matrices: Array) -> Array:
-    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3)."""
-    m = matrices
-    diagonal = np.einsum("...ii->...i", m)
-    trace = diagonal.sum(axis=-1)
-    # four times the square of each component; the largest gives the most exact result
-    squares = np.stack(
-        [1.0 - trace + 2.0 * diagonal[..., k] for k in range(3)] + [1.0 + trace], axis=-1
+def body_tree(robot: RobotDescription) -> BodyTree:
+    """The links and joints of the robot, in the description's order of joints."""
+    links = {link.name: link for link in robot.links}
+    bodies = [links[robot.base], *(links[joint.child] for joint in robot.joints)]
+    index = {link.name: k for k, link in enumerate(bodies)}
+    joints = robot.joints
+    return BodyTree(
+        np.array([index[joint.parent] for joint in joints], dtype=np.int64),
+        np.array([joint.origin for joint in joints], dtype=np.float64).reshape(-1, 3),
+        np.array([joint.axis for joint in joints], dtype=np.float64).reshape(-1, 3),
+        np.array([joint.kind == "slide" for joint in joints], dtype=np.bool_),
+        np.array([link.mass for link in bodies], dtype=np.float64),
+        np.array([link.com for link in bodies], dtype=np.float64),
+        np.array([link.inertia for link in bodies], dtype=np.float64),
     )
-    off = {(i, j): m[..., i, j] for i in range(3) for j in range(3)}
-    x, y, z = (off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1])
-    xy, xz, yz = (off[0, 1] + off[1, 0], off[0, 2] + off[2, 0], off[1, 2] + off[2, 1])
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], xy, xz, x], axis=-1),
-            np.stack([xy, squares[..., 1], yz, y], axis=-1),
-            np.stack([xz, yz, squares[..., 2], z], axis=-1),
-            np.stack([x, y, z, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = squares.argmax(axis=-1)
-    picked = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    unit: Array = picked / np.linalg.norm(picked, axis=-1, keepdims=True)
-    return unit
-
-
-def rotations_about(axis: tuple[float, float, float], angles: Array) -> Array:
-    """Rotation matrices (n, 3, 3) by ``angles`` [rad] (n,) about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    turns: Array = np.eye(3) + sine * cross + (1.0 - cosine) * product(cross, cross)
-    return turns
 
 
 def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:
@@ -136,7 +107,7 @@ def link_poses(
             rotation[:, child] = rotation[:, parent]
             continue
         position[:, child] = position[:, parent] + product(rotation[:, parent], offset)
-        turn = rotations_about(joint.axis, joint_position[:, k])
+        turn = axis_rotations(joint.axis, joint_position[:, k])
         rotation[:, child] = product(rotation[:, parent], turn)
     return LinkPoses(names, position, rotation)
 
@@ -150,29 +121,10 @@ def link_poses_in_base(
         robot: its joints must be listed after those that carry them.
         position: of the joints [rad, or m for a slide], (n_joints,).
     """
-    poses = {robot.base: (np.eye(3), np.zeros(3))}
-    for joint, value in zip(robot.joints, position.tolist(), strict=True):
-        R, p = poses[joint.parent]
-        origin = p + product(R, np.array(joint.origin))
-        if joint.kind == "slide":
-            poses[joint.child] = (R, origin + product(R, np.array(joint.axis) * value))
-        else:
-            poses[joint.child] = (product(R, axis_rotation(joint.axis, value)), origin)
-    return poses
-
-
-def axis_rotation(axis: tuple[float, float, float], angle: float) -> Array:
-    """The matrix (3, 3) that turns vectors by ``angle`` [rad] about the unit vector ``axis``."""
-    x, y, z = axis
-    cos, sin = math.cos(angle), math.sin(angle)
-    rest = 1.0 - cos
-    return np.array(
-        [
-            [cos + x * x * rest, x * y * rest - z * sin, x * z * rest + y * sin],
-            [y * x * rest + z * sin, cos + y * y * rest, y * z * rest - x * sin],
-            [z * x * rest - y * sin, z * y * rest + x * sin, cos + z * z * rest],
-        ]
-    )
+    motion = body_motion(len(robot.joints))
+    place_bodies(body_tree(robot), position, motion)
+    links = (robot.base, *(joint.child for joint in robot.joints))
+    return dict(zip(links, zip(motion.rotation, motion.place, strict=True), strict=True))
 
 
 def contact_centres(robot: RobotDescription) -> Array:

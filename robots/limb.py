@@ -249,9 +249,7 @@ def aim(position: Vector3, rotation: Matrix3, target: Rows3) -> None:
 
 
 @kernel
-def foot_error(
-    tip: Array1D, pose: Array2D, target: Array2D, weights: Array1D, error: Array1D
-) -> float:
+def foot_error(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, error: Array1D) -> float:
     """The weighted error of a foot's pose, and its square [m^2].
 
     Args:
@@ -281,21 +279,21 @@ def foot_error(
             cosine = -1e9
     elif tip[6] == 2.0:
         # The axis of target times the foot's inverse, times the sine of the angle.
-        tx = 0.5 * (_product(target, pose, 3, 2) - _product(target, pose, 2, 3))
-        ty = 0.5 * (_product(target, pose, 1, 3) - _product(target, pose, 3, 1))
-        tz = 0.5 * (_product(target, pose, 2, 1) - _product(target, pose, 1, 2))
+        tx = 0.5 * (target[3] @ pose[2] - target[2] @ pose[3])
+        ty = 0.5 * (target[1] @ pose[3] - target[3] @ pose[1])
+        tz = 0.5 * (target[2] @ pose[1] - target[1] @ pose[2])
         a, b, c = (
-            _product(target, pose, 1, 1),
-            _product(target, pose, 2, 2),
-            _product(target, pose, 3, 3),
+            target[1] @ pose[1],
+            target[2] @ pose[2],
+            target[3] @ pose[3],
         )
         sine, cosine = math.sqrt(tx * tx + ty * ty + tz * tz), 0.5 * (a + b + c - 1.0)
         if sine < 1e-7 and cosine < 0.0:
             # Half a turn: its axis is that of the largest element of the diagonal.
             k = 1 if a >= b and a >= c else (2 if b >= c else 3)
-            tx = 0.5 * (_product(target, pose, 1, k) + _product(target, pose, k, 1))
-            ty = 0.5 * (_product(target, pose, 2, k) + _product(target, pose, k, 2))
-            tz = 0.5 * (_product(target, pose, 3, k) + _product(target, pose, k, 3))
+            tx = 0.5 * (target[1] @ pose[k] + target[k] @ pose[1])
+            ty = 0.5 * (target[2] @ pose[k] + target[k] @ pose[2])
+            tz = 0.5 * (target[3] @ pose[k] + target[k] @ pose[3])
             if k == 1:
                 tx += 1.0
             elif k == 2:
@@ -312,9 +310,7 @@ def foot_error(
 
 
 @kernel
-def weigh_rows(
-    tip: Array1D, pose: Array2D, target: Array2D, weights: Array1D, rows: Array2D
-) -> None:
+def weigh_rows(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, rows: Array2D) -> None:
     """Make of the foot's Jacobian (6, n) the negative derivative of ``foot_error``, in place."""
     plane, normal, length = weights[0], weights[1], weights[2]
     n = rows.shape[1]
@@ -341,7 +337,7 @@ def weigh_rows(
 
 @kernel
 def turning(
-    tip: Array1D, last: Array2D, target: Array2D, period: float, limit: float, out: Array1D
+    tip: Array1D, last: Rows3, target: Rows3, period: float, limit: float, out: Array1D
 ) -> None:
     """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
@@ -358,11 +354,11 @@ def turning(
         ax, ay, az = ly * wz - lz * wy, lz * wx - lx * wz, lx * wy - ly * wx
         cosine = lx * wx + ly * wy + lz * wz
     elif tip[6] == 2.0:
-        ax = 0.5 * (_product(target, last, 3, 2) - _product(target, last, 2, 3))
-        ay = 0.5 * (_product(target, last, 1, 3) - _product(target, last, 3, 1))
-        az = 0.5 * (_product(target, last, 2, 1) - _product(target, last, 1, 2))
-        trace = _product(target, last, 1, 1) + _product(target, last, 2, 2)
-        cosine = 0.5 * (trace + _product(target, last, 3, 3) - 1.0)
+        ax = 0.5 * (target[3] @ last[2] - target[2] @ last[3])
+        ay = 0.5 * (target[1] @ last[3] - target[3] @ last[1])
+        az = 0.5 * (target[2] @ last[1] - target[1] @ last[2])
+        trace = target[1] @ last[1] + target[2] @ last[2]
+        cosine = 0.5 * (trace + target[3] @ last[3] - 1.0)
     sine = math.sqrt(ax * ax + ay * ay + az * az)
     angle = math.atan2(sine, cosine)
     scale = 0.0
@@ -372,21 +368,7 @@ def turning(
 
 
 @kernel
-def _along(pose: Array, tip: Array) -> tuple[float, float, float]:
+def _along(pose: Rows3, tip: Array1D) -> tuple[float, float, float]:
     """The direction of a foot's line in the base's frame."""
-    x, y, z = float(tip[3]), float(tip[4]), float(tip[5])
-    return (
-        float(pose[1, 0]) * x + float(pose[1, 1]) * y + float(pose[1, 2]) * z,
-        float(pose[2, 0]) * x + float(pose[2, 1]) * y + float(pose[2, 2]) * z,
-        float(pose[3, 0]) * x + float(pose[3, 1]) * y + float(pose[3, 2]) * z,
-    )
-
-
-@kernel
-def _product(first: Array2D, second: Array2D, row: int, column: int) -> float:
-    """An element of a rotation matrix times the transpose of another; row 0 is the position."""
-    return (
-        float(first[row, 0]) * float(second[column, 0])
-        + float(first[row, 1]) * float(second[column, 1])
-        + float(first[row, 2]) * float(second[column, 2])
-    )
+    line = tip[3:6]
+    return pose[1] @ line, pose[2] @ line, pose[3] @ line

@@ -82,7 +82,7 @@ class Mesh(Part):
     scale: Vector3 = (1.0, 1.0, 1.0)
 
 
-class Look(Part):
+class Appearance(Part):
     """What a link is drawn as: ``meshes``, and capsules for the rest."""
 
     meshes: tuple[Mesh, ...]
@@ -281,7 +281,7 @@ class RobotDescription(Part):
     """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
-    looks: Mapping[str, Look] = {}
+    looks: Mapping[str, Appearance] = {}
     """What links are drawn as, by name; others are drawn as their collision shapes."""
 
     @property

@@ -27,7 +27,7 @@ _SMALL = 1e-9
 """The share of a gain that is lost to rounding only."""
 
 
-class Transmission:
+class TransmissionMap:
     """The products of a robot's transmission, without allocating arrays.
 
     All arrays have one element a joint or one a motor, of which there are as many. ``out`` must not

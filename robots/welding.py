@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..mathematics.rotations import axis_rotations
 from .description import Joint, Link, RobotDescription, Shape, Vector3
-from .kinematics import from_base_outwards, rotations_about
+from .kinematics import from_base_outwards
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
         if joint.kind == "slide":
             origin = origin + turn @ np.array(joint.axis) * value
         else:
-            turn = turn @ rotations_about(joint.axis, np.array([value]))[0]
+            turn = turn @ axis_rotations(joint.axis, np.array([value]))[0]
         places[joint.child] = _Place(on.link, turn, origin)
     kept = [robot.base, *(robot.joints[k].child for k in moving)]
     links = tuple(_merged(robot, places, link.name) for link in robot.links if link.name in kept)

@@ -114,7 +114,7 @@ RETRY = 0.5
 
 
 @dataclass(frozen=True)
-class Place:
+class NodeAddress:
     """Where a node is: the router's endpoint, the domain, namespace and name."""
 
     router: str
@@ -142,8 +142,8 @@ class Endpoint:
 class Node:
     """Joins ROS 2's graph as soon as there is a router, and announces what blocks have given it."""
 
-    def __init__(self, place: Place) -> None:
-        self.place = place
+    def __init__(self, address: NodeAddress) -> None:
+        self.address = address
         self.users = 0
         self._endpoints: list[Endpoint] = []
         self._left = threading.Event()
@@ -167,7 +167,7 @@ class Node:
     def _run(self) -> None:
         session = None
         while session is None and not self._left.is_set():
-            session = _open(self.place.router)
+            session = _open(self.address.router)
             if session is None:
                 self._left.wait(RETRY)
         if session is None:
@@ -179,20 +179,20 @@ class Node:
                 session.close()
 
     def _announce(self, session: Any) -> None:
-        place = self.place
-        name = NodeName(place.domain, str(session.info.zid()), 0, place.namespace, place.name)
+        address = self.address
+        name = NodeName(address.domain, str(session.info.zid()), 0, address.namespace, address.name)
         kept = [session.liveliness().declare_token(name.token())]
         done = 0
         while not self._left.is_set():
             while done < len(self._endpoints):
                 endpoint = self._endpoints[done]
                 done += 1
-                topic = full_name(endpoint.topic, place.namespace)
+                topic = full_name(endpoint.topic, address.namespace)
                 token = name.endpoint(
                     done, endpoint.kind, topic, endpoint.type_name, endpoint.type_hash,
                     endpoint.quality,
                 )  # fmt: skip
-                key = data_key(place.domain, topic, endpoint.type_name, endpoint.type_hash)
+                key = data_key(address.domain, topic, endpoint.type_name, endpoint.type_hash)
                 gid = blake2b(token.encode(), digest_size=16).digest()
                 kept.append(endpoint.joined(session, key, gid))
                 kept.append(session.liveliness().declare_token(token))
@@ -220,14 +220,14 @@ def _open(router: str) -> Any:
         return None
 
 
-_NODES: dict[Place, Node] = {}
+_NODES: dict[NodeAddress, Node] = {}
 _LOCK = threading.Lock()
 
 
-def join(place: Place) -> Node:
-    """The node at a place, for one more block."""
+def join(address: NodeAddress) -> Node:
+    """The node of this address, for one more block."""
     with _LOCK:
-        node = _NODES.setdefault(place, Node(place))
+        node = _NODES.setdefault(address, Node(address))
         node.users += 1
         return node
 
@@ -244,7 +244,7 @@ def leave(node: Node) -> None:
     with _LOCK:
         node.users -= 1
         last = node.users == 0
-        if last and _NODES.get(node.place) is node:
-            del _NODES[node.place]
+        if last and _NODES.get(node.address) is node:
+            del _NODES[node.address]
     if last:
         node.leave()

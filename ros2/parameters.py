@@ -13,7 +13,7 @@ from ..runtime.language.block import Block, Context, Misfit
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters, parameter
 from .codec import Codec, MessageType
-from .node import Place, Quality, is_topic
+from .node import NodeAddress, Quality, is_topic
 
 FRAMES = {"body": "base_link", "world": "world"}
 """The frames of ROS 2 that aloft's are called by default."""
@@ -64,9 +64,9 @@ def quality(params: Ros2Parameters) -> Quality:
     return Quality(params.reliability == "reliable", params.depth)
 
 
-def place(params: Ros2Parameters) -> Place:
+def address(params: Ros2Parameters) -> NodeAddress:
     """The node of a block."""
-    return Place(params.router, params.domain, params.namespace, params.node)
+    return NodeAddress(params.router, params.domain, params.namespace, params.node)
 
 
 class Ros2Block(Block):

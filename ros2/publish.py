@@ -15,7 +15,7 @@ from ..runtime.language.block import Block, Input, Metric
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Signal
 from .node import Endpoint, Node, attachment, join, leave
-from .parameters import Ros2Block, Ros2Parameters, message_type, place, quality
+from .parameters import Ros2Block, Ros2Parameters, address, message_type, quality
 
 SLOTS = 32
 """Messages that may wait for the thread that sends."""
@@ -85,7 +85,7 @@ class Publish(Ros2Block):
         """Begin to join ROS 2's graph; waits for nothing."""
         params = self.params
         self._begin = time.time_ns() if params.stamp == "wall" else 0
-        self._node = join(place(params))
+        self._node = join(address(params))
         found = self._codec.type
         self._node.add(
             Endpoint("MP", params.topic, found.name, found.hash, quality(params), self._joined)

@@ -15,7 +15,7 @@ from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Field, Signal
 from .codec import WrongMessageError
 from .node import Endpoint, Node, join, leave, sequence_in
-from .parameters import Ros2Block, Ros2Parameters, message_type, place, quality
+from .parameters import Ros2Block, Ros2Parameters, address, message_type, quality
 
 
 class TopicHealth(Signal):
@@ -85,7 +85,7 @@ class Subscribe(Ros2Block):
     def start(self) -> None:
         """Begin to join ROS 2's graph; waits for nothing."""
         params, found = self.params, self._codec.type
-        self._node = join(place(params))
+        self._node = join(address(params))
         self._node.add(
             Endpoint("MS", params.topic, found.name, found.hash, quality(params), self._joined)
         )

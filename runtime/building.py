@@ -18,12 +18,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..files.nodes import text_of
+from ..files.problems import nearest
 from .graph import Graph, load
 from .language.block import Block
 from .language.errors import AloftError
 from .language.registry import block_name
-from .loading.problems import nearest
-from .loading.reading.nodes import text_of
 
 
 class Source:

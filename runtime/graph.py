@@ -15,12 +15,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from ..files.nodes import text_of
 from .language.errors import AloftError
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import load as load_checked
 from .loading import load_text
-from .loading.reading.nodes import text_of
 from .running.executor import Executor
 from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult

@@ -16,10 +16,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..files.problems import listing, nearest
 from ..plotting import COLOURS, FAINT, INK, label_ends, look, new_figure, style, svg_text
 from ..runtime.language.errors import AloftError
 from ..runtime.language.units import parse_unit
-from ..runtime.loading.problems import listing, nearest
 from .execution import Run
 from .study import Axis, Plot, Study
 from .summary import Row, figures_of, wilson_interval

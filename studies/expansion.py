@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ..files.nodes import Entry, from_plain, plain, text_of
+from ..files.problems import Code, LoadError, Position, Problem, Problems, Report
 from ..runtime.graph import Graph
-from ..runtime.language.stages import CheckedGraph, Position
+from ..runtime.language.stages import CheckedGraph
 from ..runtime.loading import load, load_text
-from ..runtime.loading.problems import Code, LoadError, Problem, Problems, Report
-from ..runtime.loading.reading.nodes import Entry, from_plain, plain, text_of
 from .study import Arm, Axis, Coordinate, Study, Task
 
 Tuned = Mapping[str, Mapping[str, Any]]

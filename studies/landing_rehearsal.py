@@ -25,7 +25,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.linear_algebra import inverse, product
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
-from ..planner.task.plan import JumpPlan
+from ..planner.task.plan import PlannedJump
 from ..runtime.graph import load
 from ..runtime.running.run_result import RunResult
 from .rehearsal import LiftOff, deviation, in_all_worlds, missed_at_lift_off, parts_of
@@ -72,7 +72,7 @@ Measure = Callable[[Vector, Vector], Sequence[Touchdown]]
 """Runs a plan with a velocity and a momentum correction, once with every seed."""
 
 
-def response(plan: JumpPlan, mass: float) -> Array:
+def response(plan: PlannedJump, mass: float) -> Array:
     """By how much what is ``LEARNT`` should change the errors of a ``Touchdown``, (5, 5).
 
     A velocity moves the landing by itself times the flight. An angular momentum k turns the robot

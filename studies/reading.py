@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..runtime.language.stages import Position
-from ..runtime.loading.problems import Code, LoadError, Problems, nearest
-from ..runtime.loading.reading.document import read_file
-from ..runtime.loading.reading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
+from ..files.document import read_file
+from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
+from ..files.problems import Code, LoadError, Position, Problems, nearest
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .sections import Labels, read_axes, read_goals, read_plots, read_seeds, read_sets, read_tuning
 from .study import Arm, Filter, Range, Study, Task

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..blocks.jumping.plan_progress import speed_error
+from ..files.nodes import text_of
 from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
@@ -26,7 +27,6 @@ from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
 from ..runtime.loading.flattening.flat import FlatGraph
 from ..runtime.loading.reading.files import settings_of
-from ..runtime.loading.reading.nodes import text_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
 from .batch.seeds import overrides_for

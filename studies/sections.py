@@ -18,18 +18,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
+from ..files.problems import Code, Problems, listing, nearest
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.problems import Code, Problems, listing, nearest
-from ..runtime.loading.reading.nodes import (
-    Entry,
-    ListNode,
-    MapNode,
-    Node,
-    ScalarNode,
-    kind,
-    plain,
-    text_of,
-)
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .batch.seeds import parse_seeds
 from .quantities import column_name, in_unit, quantity, written

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..runtime.language.stages import Position
-from ..runtime.loading.reading.nodes import Entry
+from ..files.nodes import Entry
+from ..files.problems import Position
 
 FIRST_REPORT_SEED = 1000
 """Gains are tuned on the seeds below, and reported on those from here on."""

@@ -32,19 +32,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..files.document import read_file
+from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
+from ..files.problems import Code, LoadError, Position, Problems
 from ..runtime.language.errors import AloftError
-from ..runtime.language.stages import Position
-from ..runtime.loading.problems import Code, LoadError, Problems
-from ..runtime.loading.reading.document import read_file
-from ..runtime.loading.reading.nodes import (
-    Entry,
-    ListNode,
-    MapNode,
-    Node,
-    ScalarNode,
-    plain,
-    text_of,
-)
 from ..runtime.loading.reading.written import unknown_key
 from .execution import Run
 from .expansion import Cell, Tuned, cells

@@ -4,21 +4,24 @@ import numpy as np
 
 from aloft.blocks.control import followed_plan, frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
-from aloft.blocks.jumping import plan_progress, turn_timing
-from aloft.blocks.scoring import footing, jump_following, jump_series, stand_following, stand_score
+from aloft.blocks.scoring.footing import Footing
+from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
-from aloft.robots.contact_kinematics import body_tree
+from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
+from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
 from aloft.runtime.language.steps import as_record
+
+from .robots.limbed_robots import quadruped
 
 LEG = read_leg(find_robot("bruce"), 0)
 LIMB = read_limb(find_robot("bruce"), 0)
@@ -100,40 +103,8 @@ FOLLOWING = (
     LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
 )  # fmt: skip
 DRAW = np.random.default_rng(4).standard_normal
-STANDING = stand_following.Stand(
-    now=np.array(1.2), ticks=np.array(3), fall_time=np.array(-1.0), fall_tilt=np.array(0.0),
-    fall_height=np.array(0.0), standing_height=np.array(0.3), foot=0.1 * DRAW((2, 2)),
-    landed_foot=0.1 * DRAW((2, 2)), foot_slip=np.array(0.01), lifted_time=np.array([0.03, 0.0]),
-    steps=np.array(0), step_end=np.array([1.198, 0.0]), longest_lift=np.array(0.01),
-    peak_tilt=np.array(0.1), judged_time=np.array(-1.0), tilt=np.array(0.0), com_speed=np.array(0.0),
-    angular_speed=np.array(0.0), margin=np.array(0.0), load_share=np.array(0.0),
-    points_unloaded=np.array(0), forbidden=np.array(0), forbidden_time=np.array(-1.0),
-    violation=np.array(0.0), overload=np.array(0.0), peak_torque=np.array(1.0),
-    peak_speed=np.array(2.0), saturated=np.array(0.5), failures=np.array(0),
-)  # fmt: skip
-SEEN = stand_following.Truth(
-    np.array([0.0, 0.0, 0.35]), np.array([0.1, 0.0, 0.0, 0.99]), *0.02 * DRAW((1, 3)),
-    np.array([0.01, 0.0, 0.3]), 0.01 * DRAW(3), SOLES, np.tile([0.0, 0.0, 12.0], (4, 1)),
-    np.array([False, False, True, True]), np.zeros(4), np.array(1), np.array(0.01), np.array(0.0),
-    np.array(0.1), DRAW(10), DRAW(10),
-)  # fmt: skip
-STAND_LIMITS = stand_following.Limits(1.2, 0.1, 0.02, 1, 0.15, 0.002, 50.0, np.array([0, 0, 1, 1]))
-LANDED = jump_series.Jump(
-    DRAW((2, 2)), np.array(0.5), np.array(1.1), DRAW(3), np.array(0.5), np.array(1.3), DRAW(3),
-    np.array(0.7), np.array(1.0), np.array(-1.0), np.array(0.2), np.array(0.45), DRAW((2, 2)),
-    DRAW((2, 2)), np.array(0.0), np.array(0.0),
-)  # fmt: skip
-PLANNED = jump_series.Planned(
-    np.array(0.3), np.array(1.2), np.array(0.5), np.array(0.31), np.array(0.43), *DRAW((2, 2, 2)),
-    np.array(0.1), np.array(0.3),
-)  # fmt: skip
-SERIES = jump_series.Series(
-    np.array(1), np.array(0.4), np.array(0.5), np.array(0.9), np.array(1), np.array(0.05),
-    np.array(1), np.array(0.02), np.array(1), np.array(0.01), np.array(0.02), np.array(1),
-    np.array(0.05), np.array(0.03), np.array(1),
-)  # fmt: skip
 BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
-TIMES = jump_following.Times(0.02, 0.5, 0.1, 0.15, 3, True)
+ROW = tuple(as_record(each.allocate({"n_feet": 2})) for each in (JumpRecord, JumpSeries))
 FOLLOWED = (
     followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),
     followed_plan.Soles(
@@ -156,32 +127,22 @@ FOLLOWED = (
 )
 FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
 LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
-FALLING = (
-    np.array([1.23, 0.002, 0.002]),
-    *(
-        plan_progress.Motion(np.array([0.1, 0.0, z]), np.array([0.1, 0.0, -0.9]), np.zeros((2, 3)))
-        for z in (0.4, 0.41)
-    ),
-    plan_progress.Flight(np.array(3), np.array(1.35), np.array(True)),
-    plan_progress.FallSettings(5.0, 0.5, 0.002),
-    plan_progress.Progress(np.array(0.001), np.array(0.0)),
-)
-TURNING = (
-    np.array([1.23, 0.002, 0.002]),
-    turn_timing.Body(
-        np.eye(3), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]), np.array([0.0, 0.9, 0.0]),
-        NORMAL((6, 16)),
-    ),
-    turn_timing.Pose(
-        np.array(3), np.array(1.35), np.array([0.1, 0.0, 0.5]), np.array([0.1, 0.0, -0.9]),
-        np.array([0.0, 0.1, 0.0, 0.99]),
-    ),
-    turn_timing.Rotation(
-        np.array([1.0, 1.1, 1.25, 1.35]), np.array([10.0, 20.0, 20.0, 11.0]),
-        np.array([6.0, 4.5, 1.5, 0.0]), np.array([1.08, 1.29, 20.0, 1.0]),
-    ),
-    turn_timing.TurnSettings(50.0, 0.04, 0.005, -0.04, 0.002),
-    turn_timing.TurnProgress(np.array(0.001), np.array(1.01)),
+FALLING = records(
+    {
+        "com": [0.1, 0.0, 0.5], "com_velocity": [0.1, 0.0, -0.9], "angular_momentum": [0.0, 0.9, 0.0],
+        "base_rotation": np.eye(3), "centroidal_matrix": NORMAL((6, 16)),
+    },
+    {
+        "phase": 3, "touchdown_time": 1.35, "toes_first": True, "com": [0.1, 0.0, 0.5],
+        "com_velocity": [0.1, 0.0, -0.9], "orientation": [0.0, 0.1, 0.0, 0.99],
+    },
+    {"late": 0.001, "before": 0.0, "spin": 1.01},
+    {"toes_gain": 5.0},
+    {"gain": 50.0, "early": 0.04, "late": 0.005, "aim": -0.04, "period": 0.002},
+)  # fmt: skip
+ROTATION = FlightRotation(
+    np.array([1.0, 1.1, 1.25, 1.35]), np.array([10.0, 20.0, 20.0, 11.0]),
+    np.array([6.0, 4.5, 1.5, 0.0]), np.array([1.08, 1.29, 20.0, 1.0]),
 )  # fmt: skip
 MODEL = records(
     {"base_position": NORMAL(3), "base_rotation": np.eye(3), "velocity": NORMAL(16)},
@@ -214,11 +175,13 @@ UNUSED = {
             {"tick": 400, "base_period": 0.002},
         ),
     ),
-    "aloft.blocks.jumping.plan_progress.follow_fall": FALLING,
+    "aloft.blocks.jumping.plan_progress.follow_fall": (1.23, *FALLING),
     "aloft.blocks.jumping.plan_progress.time_to_fall": (0.35, -0.8),
-    "aloft.blocks.jumping.turn_timing.follow_turn": TURNING,
-    "aloft.blocks.jumping.turn_timing.value_at": (*TURNING[3][:2], 1.23),
-    "aloft.blocks.jumping.turn_timing.turned_beyond": (TURNING[1].base_rotation, TURNING[2].orientation),
+    "aloft.blocks.jumping.plan_progress.follow_turn": (
+        1.23, *FALLING[:2], ROTATION, FALLING[2], FALLING[4],
+    ),
+    "aloft.blocks.jumping.plan_progress.value_at": (*ROTATION[:2], 1.23),
+    "aloft.blocks.jumping.plan_progress.turned_beyond": (np.eye(3), np.array([0.0, 0.1, 0.0, 0.99])),
     "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
     "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
     "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),
@@ -250,25 +213,15 @@ UNUSED = {
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
     "aloft.blocks.scoring.footing.unroll": (
-        footing.Ball(
-            1, 0.02, np.array(LIMB.joints), LIMB.links, LIMB.tip, np.zeros(5), np.zeros((5, 6)),
-            np.zeros((4, 3)), np.zeros(3),
-        ),
-        0.2 * DRAW(10), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((2, 2)),
+        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
     ),
-    "aloft.blocks.scoring.jump_series.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
-    "aloft.blocks.scoring.jump_series.keep_place": (SERIES,),
-    "aloft.blocks.scoring.jump_series.note_landing": (0.3, LANDED, PLANNED, SERIES, True),
-    "aloft.blocks.scoring.jump_series.note_place": (DRAW((2, 2)), LANDED, PLANNED, SERIES),
-    "aloft.blocks.scoring.jump_following.follow_row": (
-        1.0, True, DRAW((2, 2)), LANDED._replace(lift_off_time=np.array(-1.0)), PLANNED, SERIES,
-        TIMES, jump_following.Verdict(np.zeros(1, np.int64), np.zeros(1)),
+    "aloft.blocks.scoring.jump_score.record_row": (
+        BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
     ),
-    "aloft.blocks.scoring.stand_score.follow_stand": (
-        np.array([600]), 0.002, SEEN, np.array([0.0, 0.0, 0.28]), np.array(2), STANDING,
-        stand_score.Squat(np.array(0.31), np.array(0.31), np.array(0.29)), STAND_LIMITS, 0.3, 1.0,
-        np.zeros(1, np.int64),
-    ),
+    "aloft.blocks.scoring.jump_score.record_jump": (*ROW, True),
+    "aloft.blocks.scoring.jump_score.compare_place": ROW,
+    "aloft.blocks.scoring.jump_score.keep_place": (ROW[1],),
+    "aloft.blocks.scoring.jump_score.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
     "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
@@ -335,7 +288,6 @@ UNUSED = {
     "aloft.robots.limb.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),
     "aloft.robots.limb._along": (POSE, LIMB.tip),
-    "aloft.robots.limb._product": (POSE, TARGET, 1, 2),
     "aloft.mathematics.rotations.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_leg.slide": (
         LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
@@ -344,6 +296,7 @@ UNUSED = {
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),
     "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
+    "aloft.mathematics.rotations.pitch_angle": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.blocks.control.balance_target.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),

@@ -16,18 +16,19 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
+    "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
+    "files": ("runtime/language/errors", "runtime/language/units"),
     "mathematics": (),
-    "robots": ("mathematics",),
-    "runtime/language": ("robots", "mathematics/compiling", "mathematics/kernel"),
+    "robots": ("files", "mathematics"),
+    "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel"),
     "runtime/running": (
         "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
     "runtime/loading": (
-        "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
+        "files", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
     ),
     "runtime/placement": ("runtime/language", "robots"),
     "runtime/transports": ("runtime/language", "runtime/placement", "robots"),
@@ -35,23 +36,23 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/transports", "robots",
     ),
-    "runtime/drawing": ("runtime/language", "runtime/loading", "robots"),
+    "runtime/drawing": ("files", "runtime/language", "runtime/loading", "robots"),
     "runtime/live": (
-        "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing",
+        "files", "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing",
         "runtime/placement", "runtime/links", "runtime/transports", "robots",
     ),
     "runtime/testing": (
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
-        "runtime/links", "runtime/transports", "robots", "mathematics/compiling",
+        "runtime/links", "runtime/transports", "robots", "mathematics",
     ),
     "runtime": (
-        "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
+        "files", "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/links", "runtime/drawing", "robots",
     ),
     "blocks/signals": ("runtime/language",),
     "blocks": (),
     "planner": (),
-    "planner/task": ("mathematics", "robots", "runtime/language", "runtime/loading", "blocks/signals"),
+    "planner/task": ("files", "mathematics", "robots", "runtime/language", "runtime/loading", "blocks/signals"),
     "planner/models": ("planner/task", "mathematics", "robots"),
     "planner/problem": ("planner/task", "planner/models", "mathematics", "robots", "blocks/signals"),
     "planner/solving": (
@@ -72,25 +73,25 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "blocks/general": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/estimation": ("blocks/signals", "mathematics", "robots", "runtime/language"),
-    "blocks/control": ("blocks/signals", "mathematics", "robots", "runtime/language"),
+    "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
-    "hal": ("blocks/signals", "mathematics", "robots", "runtime/language"),
+    "hal": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "ros2": ("robots", "runtime/language"),
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
-    "logs/viewing": ("logs/file", "hal/sensors", "mathematics/arrays", "robots", "runtime/language"),
+    "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
-        "logs/file", "logs/viewing", "mathematics/arrays", "robots", "runtime/language", "runtime/running",
+        "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics/arrays", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),
-    "studies": ("mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
+    "studies": ("files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
     "benchmarks": (
         "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
     ),

@@ -16,7 +16,7 @@ PAGE = (ROOT / "docs" / "comparisons.md").read_text()
 
 @pytest.fixture(scope="module")
 def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_comparisons")
+    return docs_script("result_tables")
 
 
 def row(arm: str, **metrics: float) -> dict[str, object]:
@@ -48,5 +48,5 @@ def test_the_page_has_every_arm_of_every_study(script: ModuleType, name: str) ->
     study = read_study(ROOT / "graphs" / "studies" / f"{name}.yaml")
     table = PAGE.partition(f"<!-- study: {name} -->")[2].partition(f"<!-- end of {name} -->")[0]
     for arm in study.arms:
-        assert f"| {arm.name} |" in table, f"run: aloft study {study.path.name}; {script.__doc__}"
+        assert f"| {arm.name} |" in table, f"run: aloft study {study.path.name}; docs/refresh.py"
     assert f"{study.seeds[0]} to {study.seeds[-1]}" in PAGE

@@ -20,7 +20,7 @@ FOUND = {
 
 @pytest.fixture(scope="module")
 def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_frontier")
+    return docs_script("result_tables")
 
 
 def test_a_direction_is_a_row(script: ModuleType) -> None:

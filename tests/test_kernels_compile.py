@@ -39,9 +39,9 @@ ROOMS = ("mathematics", "blocks", "hal")
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
-    "blocks.signals.drive_conditions.conditions": "of an error byte, for people",
-    "blocks.signals.drive_conditions.describe": "of an error byte, for people",
-    "blocks.signals.drive_conditions.is_critical": "of an error byte, by integer arithmetic",
+    "blocks.signals.robot.drive_conditions": "of an error byte, for people",
+    "blocks.signals.robot.describe_conditions": "of an error byte, for people",
+    "blocks.signals.robot.is_critical": "of an error byte, by integer arithmetic",
     "hal.simulated.stance._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",

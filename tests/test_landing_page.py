@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_landing")
+    return docs_script("result_tables")
 
 
 def row(arm, direction, impulse, successes):

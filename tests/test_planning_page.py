@@ -19,10 +19,10 @@ FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", PAGE, re.DOTA
 
 
 def test_the_table_of_parameters_is_up_to_date(docs_script: Callable[[str], ModuleType]) -> None:
-    script = docs_script("refresh_task_parameters")
-    written = PAGE.partition(f"<!-- {script.MARK} -->\n")[2]
-    written = written.partition(f"<!-- end of {script.MARK} -->")[0]
-    assert written == script.task_tables(), "run: python docs/refresh_task_parameters.py"
+    script = docs_script("refresh")
+    written = PAGE.partition(f"<!-- {script.TASK_PARAMETERS} -->\n")[2]
+    written = written.partition(f"<!-- end of {script.TASK_PARAMETERS} -->")[0]
+    assert written == script.task_parameter_tables(), "run: make docs"
 
 
 def test_the_task_and_the_grid_are_what_the_page_says(tmp_path: Path) -> None:

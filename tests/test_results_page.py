@@ -20,7 +20,7 @@ ROW = re.compile(r"^\| .* \| \d+ of \d+ \| .* \|$", re.MULTILINE)
 
 @pytest.fixture
 def tasks(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_tasks")
+    return docs_script("result_tables")
 
 
 def row(task: str, successes: int) -> dict[str, Any]:
@@ -29,35 +29,39 @@ def row(task: str, successes: int) -> dict[str, Any]:
 
 
 def test_readme_has_its_tasks_and_all_that_miss_their_goal(tasks: ModuleType) -> None:
-    summary = {"rows": [*(row(name, 40) for name in tasks.HEADLINE), row("a", 38), row("b", 37)]}
-    whole, short = tasks.tasks_table(summary), tasks.headline_table(summary)
+    summary = {
+        "rows": [*(row(name, 40) for name in tasks.README_TASKS), row("a", 38), row("b", 37)]
+    }
+    whole, short = tasks.tasks_table(summary), tasks.short_tasks_table(summary)
     missed = "| b | 37 of 40 | 80 % to 97 % | 95 %, missed |\n"
     met = "| a | 38 of 40 | 80 % to 97 % | 95 %, met |\n"
     assert missed in whole and met in whole
     assert missed in short and met not in short
     assert short.startswith(
-        f"{len(tasks.HEADLINE) + 1} of {len(tasks.HEADLINE) + 2} tasks and push"
+        f"{len(tasks.README_TASKS) + 1} of {len(tasks.README_TASKS) + 2} tasks and push"
     )
-    assert all(f"| {name} | 40 of 40 |" in short for name in tasks.HEADLINE)
+    assert all(f"| {name} | 40 of 40 |" in short for name in tasks.README_TASKS)
 
 
 def test_a_task_of_readme_that_a_summary_lacks_is_named(tasks: ModuleType) -> None:
-    with pytest.raises(ValueError, match=f"no task '{tasks.HEADLINE[0]}', which the README shows"):
-        tasks.headline_table({"rows": [row("a", 40)]})
+    with pytest.raises(
+        ValueError, match=f"no task '{tasks.README_TASKS[0]}', which the README shows"
+    ):
+        tasks.short_tasks_table({"rows": [row("a", 40)]})
 
 
 def test_readme_shows_rows_of_the_page_of_results(tasks: ModuleType) -> None:
     all_rows, shown = ROW.findall(RESULTS), ROW.findall(README)
     assert set(shown) <= set(all_rows)
     assert {line for line in all_rows if "missed" in line} <= set(shown)
-    for name in tasks.HEADLINE:
+    for name in tasks.README_TASKS:
         assert any(line.startswith(f"| {name} |") for line in shown)
     met = sum("missed" not in line for line in all_rows)
     assert f"{met} of {len(all_rows)} tasks and pushes met their goal" in README
 
 
 def test_the_jump_on_the_spot(docs_script: Callable[[str], ModuleType]) -> None:
-    script = docs_script("refresh_results")
+    script = docs_script("result_tables")
     metrics = {name: 0.1 for name, *_ in script.FIGURES}
     rows = [
         SeedRow(seed, seed != 2, "", {**metrics, "apex_above_standing_m": 0.1 + 0.01 * seed}, "")
@@ -65,8 +69,8 @@ def test_the_jump_on_the_spot(docs_script: Callable[[str], ModuleType]) -> None:
     ]
     begin = "Jump on the spot, seeds 6000 to 6019: **2 of 3 succeed**"
     table = script.results_table(rows)
-    assert table.startswith(f"{begin}.\n\n| | least |")
+    assert table.startswith(f"{begin}.\n\n|  | least |")
     assert "| apex above standing | 10 | 11 | 12 | cm | 10.8 to 13.2 |" in table
-    assert script.headline(rows) == (
+    assert script.results_sentence(rows) == (
         f"{begin}, with an apex above standing of 11 cm in the median (goal 10.8 to 13.2).\n"
     )

@@ -1,6 +1,7 @@
 """The table and the picture of one tick, from what ``aloft bench tick --json`` prints."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from aloft.benchmarks.rows import Row
 from aloft.benchmarks.tick.chart import tick_chart
 
+ROOT = Path(__file__).parent.parent
+PAGE, README = ROOT / "docs" / "compiled.md", ROOT / "README.md"
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),
     Row("block legs", 10.0, "us/tick"),
@@ -28,7 +31,7 @@ FOUND = {
 
 @pytest.fixture
 def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_tick")
+    return docs_script("result_tables")
 
 
 def test_the_tables(script: ModuleType) -> None:
@@ -42,27 +45,27 @@ def test_the_tables(script: ModuleType) -> None:
 
 
 def test_readme_has_its_rows_and_all_that_miss_their_goal(script: ModuleType) -> None:
-    one, *_ = script.HEADLINE
+    one, *_ = script.README_TICK
     rows = [
         *ROWS,
         Row(one, 30.0, "us/tick", "OSQP", 0.01, 1 / 30, floor=1 / 20),
         Row("process", 2.0, "s", "real time", 0.9, 1 / 5, floor=1 / 2),
     ]
-    table = script.short_table({**FOUND, "rows": [row.to_json() for row in rows]})
+    table = script.short_tick_table({**FOUND, "rows": [row.to_json() for row in rows]})
     assert "![The blocks of one tick beside its peers](docs/tick.svg)" in table
     assert "Of 4 rows with a goal 1 reach it, 2 reach only their floor, and 1 miss both." in table
     assert f"| {one} | 30 us | OSQP | 100 | 20 | 30 | goal reached |" in table
     assert "| process | 2 s | real time | 1.11 | 2 | 5 | missed |" in table
     assert all(row.name not in table for row in ROWS if row.name != "controller, fused")
     assert "| controller, fused |" not in table
-    page = script.README.read_text()
+    page = README.read_text()
     assert page.count("<!-- tick -->") == page.count("<!-- end of tick -->") == 1
 
 
 def test_the_rows_of_readme_were_measured(script: ModuleType) -> None:
-    for name in script.HEADLINE:
-        assert f"| {name} |" in script.PAGE.read_text()
-        assert f"| {name} |" in script.README.read_text()
+    for name in script.README_TICK:
+        assert f"| {name} |" in PAGE.read_text()
+        assert f"| {name} |" in README.read_text()
 
 
 def test_an_earlier_commit_has_other_blocks(script: ModuleType) -> None:

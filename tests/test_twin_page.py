@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 
 @pytest.fixture(scope="module")
 def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("refresh_twin")
+    return docs_script("result_tables")
 
 
 def run(task: str, arm: str, seed: int, success: bool, tilt: float | None = 5.0) -> dict[str, Any]:

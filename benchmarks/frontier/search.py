@@ -23,7 +23,7 @@ from ...planner.checking.plan_tests import active_limits
 from ...planner.checking.validity import InvalidPlanError
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.solving.solver_process import cpu_time
-from ...planner.task.files import PlanError, TaskError
+from ...planner.task.files import JumpTaskError, PlanError
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot
 from ...studies.journal import Outcome
@@ -215,7 +215,7 @@ def make_plan(job: PlanJob) -> Outcome:
     try:
         near = None if job.near is None else library.find(job.near)
         plan = solve_and_check(job.task, robot, near)
-    except (InvalidPlanError, PlanError, TaskError) as error:
+    except (InvalidPlanError, PlanError, JumpTaskError) as error:
         return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
     library.add(plan)

@@ -21,7 +21,7 @@ from ...planner.checking.validity import InvalidPlanError
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
 from ...planner.solving.solver_process import cpu_time
-from ...planner.task.files import PlanError, TaskError
+from ...planner.task.files import JumpTaskError, PlanError
 from ...planner.task.task import JumpTask
 from ...robots.description import RobotDescription, find_robot
 from ...studies.batch.jobs import job_results
@@ -92,7 +92,7 @@ def compile_functions(tasks: Sequence[JumpTask], robot: RobotDescription) -> flo
     started = cpu_time()
     first = {_kind(task): task for task in reversed(tasks)}
     for task in first.values():
-        with suppress(PlanError, TaskError):
+        with suppress(PlanError, JumpTaskError):
             make_problem(task, robot)
     return cpu_time() - started
 
@@ -112,7 +112,7 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
         reason = ""
         try:
             library.add(solve_and_check(job.task, robot))
-        except (InvalidPlanError, PlanError, TaskError) as error:
+        except (InvalidPlanError, PlanError, JumpTaskError) as error:
             reason = why_not(error)
         found.append(("", Outcome(not reason, reason, metrics={"cpu_s": cpu_time() - started})))
         if reason:

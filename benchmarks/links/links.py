@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...hal.bear.watchdog import Watchdog, damping_frame
+from ...hal.bear.watchdog import DriveWatchdog, damping_frame
 from ...runtime.language.stages import WATCHDOG, LinkPolicy
 from ...runtime.links.free_link import LatestReceiver, LinkHealth
 from ...runtime.links.lockstep_link import LockstepReceiver
@@ -49,7 +49,7 @@ def damping(repetitions: int = 40) -> Row:
     times = np.full(repetitions, np.inf)
     for k in range(repetitions):
         reading, writing = os.pipe()
-        watchdog = Watchdog(writing, _DEVICES, 60.0, WATCHDOG)
+        watchdog = DriveWatchdog(writing, _DEVICES, 60.0, WATCHDOG)
         try:
             heard = time.monotonic_ns()
             watchdog.beat(heard)

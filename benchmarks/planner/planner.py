@@ -23,7 +23,7 @@ import numpy as np
 from ...planner.checking.validity import InvalidPlanError, check_plan
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.problem.guess import ballistic_guess
-from ...planner.problem.problem import Problem
+from ...planner.problem.problem import FullProblem
 from ...planner.solving.solve import make_problem, solve_jump
 from ...planner.solving.solver import Solution, solve
 from ...planner.solving.solver_process import cpu_time
@@ -166,11 +166,11 @@ def solver_rows(tasks: dict[str, dict[str, Any]], rounds: int = 3) -> list[Row]:
     return rows
 
 
-def _problem(name: str, values: dict[str, Any]) -> Problem:
+def _problem(name: str, values: dict[str, Any]) -> FullProblem:
     return make_problem(make_task({"name": name, **values}), find_robot("bruce"))
 
 
-def _repeated(problem: Problem, guess: Any, solver: str, rounds: int, warm: bool = False
+def _repeated(problem: FullProblem, guess: Any, solver: str, rounds: int, warm: bool = False
               ) -> Solution:  # fmt: skip
     solve(problem, guess, solver=solver, warm=warm)  # makes the solver
     found = [solve(problem, guess, solver=solver, warm=warm) for _ in range(rounds)]
@@ -178,7 +178,7 @@ def _repeated(problem: Problem, guess: Any, solver: str, rounds: int, warm: bool
 
 
 def _snopt_rows(
-    name: str, values: dict[str, Any], problem: Problem, cold: Any, fatrop: Solution
+    name: str, values: dict[str, Any], problem: FullProblem, cold: Any, fatrop: Solution
 ) -> list[Row]:
     titles = f"solve {name}, fatrop", f"solve {name} from a near task, fatrop"
     try:

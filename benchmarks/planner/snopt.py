@@ -17,7 +17,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...planner.problem.assembly import Assembly
-from ...planner.problem.problem import Problem
+from ...planner.problem.problem import FullProblem
 from ...planner.solving.solver import violation_of
 
 OPTIONS: dict[str, float | int] = {
@@ -117,7 +117,7 @@ class SnoptProgram:
     Raises ``ImportError`` where Drake is not installed.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: FullProblem) -> None:
         from pydrake.solvers import MathematicalProgram
 
         self.is_out_of_time = False

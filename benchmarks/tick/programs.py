@@ -19,7 +19,6 @@ from ...blocks.control.whole_body_controller import WholeBodyController
 from ...blocks.control.whole_body_program import FullProgram, WholeBodyProgram
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.whole_body_qp import (
-    FrictionCone,
     friction_pyramids,
 )
 from ...runtime.running.timing import block_times
@@ -59,16 +58,18 @@ class PeerProgram(FullProgram):
         program.equality.matrix[:, :n] = model.mass_matrix[:6]
         program.equality.matrix[:, n:] = transposed[:6]
         program.equality.bound[:] = -model.nonlinear[:6]
-        cone = FrictionCone(float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]))
-        friction_pyramids(len(active), n, cone, program.cones)
+        friction_pyramids(
+            len(active), n, float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]),
+            program.cones,
+        )  # fmt: skip
         if self._limited:
             turn, limits = self._motors.to_torque, program.limits
             limits.matrix[:joints, :n] = turn @ model.mass_matrix[6:]
             limits.matrix[:joints, n:] = turn @ transposed[6:]
             limits.matrix[joints:] = -limits.matrix[:joints]
             offset = turn @ model.nonlinear[6:]
-            limits.bound[:joints] = self._motors.bounds.upper - offset
-            limits.bound[joints:] = offset - self._motors.bounds.lower
+            limits.bound[:joints] = self._motors.upper - offset
+            limits.bound[joints:] = offset - self._motors.lower
         return program
 
     def solve(self, active: Indices) -> Array | None:

@@ -41,7 +41,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.whole_body_solution import (
     NO_LIMITS,
     SOLVED,
-    Solution,
+    WholeBodySolution,
     solution_memory,
     solve_whole_body,
 )
@@ -412,7 +412,7 @@ class TsidCheck:
         self._tsid, self._block, self._dynamics = tsid, block, dynamics
         n, contacts = len(block.command.acceleration), len(block.command.force)
         self._mass = np.zeros((n, n))
-        self._found = Solution(
+        self._found = WholeBodySolution(
             np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
         )
         self._solve = KernelCall(

@@ -33,8 +33,7 @@ from ...mathematics.body_dynamics import (
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
-from ...robots.contact_kinematics import body_tree
-from ...robots.kinematics import ball_feet
+from ...robots.kinematics import ball_feet, body_tree
 from ...runtime.language.block import Input, Output
 from ...runtime.language.kernel_block import KernelBlock
 from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate

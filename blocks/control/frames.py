@@ -19,8 +19,8 @@ from ...mathematics.body_dynamics import (
 )
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...robots.contact_kinematics import body_tree
 from ...robots.description import RobotDescription
+from ...robots.kinematics import body_tree
 from ...runtime.language.steps import signal_call
 from ..signals import DynamicsTerms, JointState
 from .dynamics import write_jacobian

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from enum import IntEnum
 
 import numpy as np
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array1D
+from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import inverse, product
-from ...runtime.language.block import Input, Metric, Output, State
-from ...runtime.language.kernel_block import KernelBlock
-from ...runtime.language.parameters import live_parameter, parameter
+from ...mathematics.rotations import tilt
+from ...runtime.language.block import Block, Clock, Input, Metric, Output, State
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import (
     BaseState,
+    CommandMode,
     DrivePhase,
     JointCommand,
     JointState,
@@ -24,20 +27,116 @@ from ..signals import (
     SwitchHealth,
     WholeBodyCommand,
 )
-from ..signals.drive_conditions import HEALTHY
-from .health_limits import UNSTAMPED, HealthParameters, health_of, health_text
-from .safety_faults import SWITCH_TEXTS, TEXTS, Fault, is_of_hardware
-from .safety_watch import Bounds, Command, RobotState, Switches, Timers, Verdict, watch
+from ..signals.robot import HEALTHY, describe_conditions
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
+_CRITICAL = 0x7C
+"""The bits of a drive's condition with which it has switched its torque off."""
+_ANSWERED = 0x80
+"""The bit that every condition has."""
+UNSTAMPED = -1.0
+"""The time stamp of a robot that does not report when it measured."""
+
+
+class SafetyFault(IntEnum):
+    """The reason why the robot was put into damping."""
+
+    NONE = 0
+    TILT = 1
+    """The base leant too far for too long."""
+    JOINT_LIMIT = 2
+    """A joint went beyond its limits."""
+    JOINT_SPEED = 3
+    """A joint turned too fast for too long."""
+    STALE_SENSORS = 4
+    """Joint readings stopped changing."""
+    ABSURD_STATE = 5
+    """A state is not finite or beyond anything the robot can do."""
+    ABSURD_COMMAND = 6
+    """A command is not finite or beyond anything the drives can do."""
+    SOLVER = 7
+    """The whole-body controller failed too often in a row."""
+    DRIVE = 8
+    """A drive reports an error."""
+    SILENT_DRIVE = 9
+    """A drive has not answered for too long."""
+    VOLTAGE = 10
+    """The supply voltage of a drive was too low for too long."""
+    TEMPERATURE = 11
+    """The winding of a drive was too hot for too long."""
+    CURRENT = 12
+    """The current of a drive was too large for too long."""
+    SILENT_IMU = 13
+    """The sensor board has sent nothing for too long."""
+    INVALID_JOINTS = 14
+    """The joint readings were marked as not valid for too long."""
+    INVALID_IMU = 15
+    """The IMU's readings were marked as not valid for too long."""
+    INVALID_CONTACTS = 16
+    """The foot switches' readings were marked as not valid for too long."""
+    STALE_HEALTH = 17
+    """The robot's time stamp stopped changing."""
+    SWITCH = 18
+    """A foot switch is stuck or bounces."""
+
+
+class SafetyParams(Parameters):
+    """The parameters of ``SafetyMonitor``."""
+
+    tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
+    tilt_hold: float = parameter(0.02, unit="s", ge=0.0, text="how long the base may lean further")
+    limit_margin: float = parameter(
+        0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
+    )
+    speed_limit: PerJoint | None = parameter(
+        None, unit="rad/s", gt=0.0, text="largest joint speed; none: twice what its motors reach"
+    )
+    joint_hold: float = parameter(
+        0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
+    )
+    torque_limit: PerJoint | None = parameter(
+        None, unit="N m", gt=0.0,
+        text="a joint torque beyond this is a mistake; none: ten times the motors' peak",
+    )  # fmt: skip
+    stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
+    unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
+    damping: PerJoint | None = live_parameter(
+        None, unit="N m s/rad", ge=0.0,
+        text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
+    )  # fmt: skip
+    lowest_voltage: float | None = parameter(
+        None, unit="V", gt=0.0, text="lowest supply voltage of a drive; none: not judged"
+    )
+    highest_temperature: float = parameter(
+        80.0, gt=0.0, le=200.0, text="highest temperature of a winding [deg C]"
+    )
+    largest_current: float | None = parameter(
+        None, unit="A", gt=0.0, text="largest measured current of a drive; none: not judged"
+    )
+    health_hold: float = parameter(
+        0.02, unit="s", ge=0.0, text="how long voltage, temperature or current may be beyond"
+    )
+    answer_age: float = parameter(
+        0.02, unit="s", gt=0.0, text="oldest answer of a drive that may be used"
+    )
+    imu_age: float = parameter(
+        0.02, unit="s", gt=0.0, text="oldest packet of the sensor board that may be used"
+    )
+    invalid_hold: float = parameter(
+        0.1, unit="s", ge=0.0,
+        text="how long joints, IMU or switches may be marked as not valid",
+    )  # fmt: skip
+    stamp_age: float = parameter(
+        0.05, unit="s", gt=0.0, text="how long the robot's time stamp may stay the same"
+    )
 
 
 class SafetyState(Signal):
     """The state of ``SafetyMonitor``."""
 
     fault = Field(
-        dtype="int64", values=Fault, text="why the robot is damped; the first reason stays"
+        dtype="int64", values=SafetyFault, text="why the robot is damped; the first reason stays"
     )
     fault_tick = Field(dtype="int64", text="when")
     tilted = Field(dtype="int64", text="ticks in a row the base has leant too far")
@@ -53,13 +152,28 @@ class SafetyState(Signal):
     strong = Field("n_joints", dtype="int64", text="ticks in a row each current was too large")
     invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
     stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
-    fault_place = Field(
-        dtype="int64", text="index of the motor, or of the switch, that was at fault"
-    )
+    fault_place = Field(dtype="int64", text="index of the motor or switch that was at fault")
     fault_value = Field(text="what it measured, in the unit of its signal")
 
 
-class SafetyMonitor(KernelBlock):
+class SafetyConstants(Signal):
+    """Limits and durations that follow from the parameters and the robot."""
+
+    lower = Field("n_joints", unit="rad", text="least joint positions")
+    upper = Field("n_joints", unit="rad", text="greatest joint positions")
+    speed = Field("n_joints", unit="rad/s", text="greatest joint speeds")
+    torque = Field("n_joints", unit="N m", text="greatest torques of a command")
+    damping = Field("n_joints", unit="N m s/rad", text="joint damping after a fault")
+    lowest_voltage = Field(unit="V", text="zero: not judged")
+    largest_current = Field(unit="A", text="infinite: not judged")
+    tilt_ticks = Field(dtype="int64", text="how many ticks the base may lean too far")
+    joint_ticks = Field(dtype="int64", text="how many a joint may be beyond its limits")
+    health_ticks = Field(dtype="int64", text="how many a drive may be beyond a limit")
+    invalid_ticks = Field(dtype="int64", text="how many readings may be marked as not valid")
+    stamp_ticks = Field(dtype="int64", text="how many the time stamp may stay the same")
+
+
+class SafetyMonitor(Block):
     """Passes the joint command on until something is wrong, and from then on only damps.
 
     A fault lasts to the end of the run. The first fault is kept in the state and in the metrics
@@ -86,40 +200,11 @@ class SafetyMonitor(KernelBlock):
     block does not watch deadlines.
     """
 
-    class Params(HealthParameters):
-        tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
-        tilt_hold: float = parameter(
-            0.02, unit="s", ge=0.0, text="how long the base may lean further"
-        )
-        limit_margin: float = parameter(
-            0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
-        )
-        speed_limit: PerJoint | None = parameter(
-            None,
-            unit="rad/s",
-            gt=0.0,
-            text="largest joint speed; none: twice what its motors reach",
-        )
-        joint_hold: float = parameter(
-            0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
-        )
-        torque_limit: PerJoint | None = parameter(
-            None,
-            unit="N m",
-            gt=0.0,
-            text="a joint torque beyond this is a mistake; none: ten times the motors' peak",
-        )
-        stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
-        unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
-        damping: PerJoint | None = live_parameter(
-            None,
-            unit="N m s/rad",
-            ge=0.0,
-            text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
-        )
-
+    Params = SafetyParams
+    Constants = SafetyConstants
     needs = ("robot",)
-    params: Params
+    params: SafetyParams
+    constants: SafetyConstants
 
     desired = Input(JointCommand, text="the controller's command")
     base = Input(BaseState, text="the estimated base")
@@ -137,77 +222,378 @@ class SafetyMonitor(KernelBlock):
     command = Output(JointCommand, text="what the drives get")
     state = State(SafetyState, text="timers and the fault")
 
-    def setup(self) -> None:
-        robot, p = self.robot, self.params
-        n = len(robot.joints)
-        self._lower = robot.joint_limits[:, 0] - p.limit_margin
-        self._upper = robot.joint_limits[:, 1] + p.limit_margin
+    def prepare(self) -> None:
+        p, robot, constants, period = self.params, self.robot, self.constants, self.period
         motors, matrix = robot.motors, robot.joint_to_motor
-        self._peak = product(np.abs(matrix).T, motors.peak_torque)
+        peak = product(np.abs(matrix).T, motors.peak_torque)
         fastest = product(np.abs(inverse(matrix)), motors.no_load_speed)
-        given = p.speed_limit, p.torque_limit
-        self._speed_limit = 2.0 * fastest if given[0] is None else given[0].resolve(robot)
-        torque_limit = 10.0 * self._peak if given[1] is None else given[1].resolve(robot)
-        self._damping = np.zeros(n)
-        self.on_parameters()
-        bounds = Bounds(
-            self._lower, self._upper, self._speed_limit, torque_limit, float(p.tilt_limit),
-            round(p.tilt_hold / self.period), round(p.joint_hold / self.period), p.stale_ticks,
-            p.unsolved_ticks,
-        )  # fmt: skip
-        base, joints, state = self.base, self.joints, self.state
-        self._verdict = Verdict(np.zeros(2, np.int64), np.zeros(1))
-        watching = KernelCall(
-            watch, Command(*(getattr(self.desired, name) for name in Command._fields)),
-            RobotState(
-                base.position, base.orientation, base.linear_velocity, base.angular_velocity,
-                joints.position, joints.velocity, self.wbc.solved,
-            ),
-            bounds, Timers(*(getattr(state, name) for name in Timers._fields)),
-            health_of(p, self.period, self.health, state), Switches(*(
-                getattr(self.switches, name) for name in Switches._fields
-            )),
-            self._damping, state.fault,
-            Command(*(getattr(self.command, name) for name in Command._fields)), self._verdict,
-        )  # fmt: skip
-        self.kernel_calls = (watching,)
-        self.event = self._verdict.fault[:1]
+        given = p.speed_limit, p.torque_limit, p.damping
+        constants.lower[:] = robot.joint_limits[:, 0] - p.limit_margin
+        constants.upper[:] = robot.joint_limits[:, 1] + p.limit_margin
+        constants.speed[:] = 2.0 * fastest if given[0] is None else given[0].resolve(robot)
+        constants.torque[:] = 10.0 * peak if given[1] is None else given[1].resolve(robot)
+        constants.damping[:] = peak / _DAMPED_SPEED if given[2] is None else given[2].resolve(robot)
+        constants.lowest_voltage = p.lowest_voltage or 0.0
+        constants.largest_current = p.largest_current or np.inf
+        constants.tilt_ticks = round(p.tilt_hold / period)
+        constants.joint_ticks = round(p.joint_hold / period)
+        constants.health_ticks = round(p.health_hold / period)
+        constants.invalid_ticks = round(p.invalid_hold / period)
+        constants.stamp_ticks = max(1, round(p.stamp_age / period))
 
-    def on_parameters(self) -> None:
-        given = self.params.damping
-        self._damping[:] = (
-            self._peak / _DAMPED_SPEED if given is None else given.resolve(self.robot)
-        )
+    @kernel
+    @staticmethod
+    def step(
+        desired: JointCommand,
+        base: BaseState,
+        joints: JointState,
+        wbc: WholeBodyCommand,
+        health: RobotHealth,
+        switches: SwitchHealth,
+        command: JointCommand,
+        state: SafetyState,
+        params: SafetyParams,
+        constants: SafetyConstants,
+        clock: Clock,
+    ) -> bool:
+        fault = judge_motion(desired, base, joints, wbc, state, params, constants)
+        place, value = 0, 0.0
+        if health.state > DrivePhase.OFF and health.state < DrivePhase.DAMPED:
+            found, drive = judge_health(health, state, params, constants)
+            if fault == SafetyFault.NONE:
+                fault, place, value = found, drive, measured_value(health, found, drive)
+        if fault == SafetyFault.NONE and switches.stop:
+            fault, place = SafetyFault.SWITCH, first_bad_switch(switches)
+            value = float(switches.fault[place])
+        begins = fault != SafetyFault.NONE and state.fault == SafetyFault.NONE
+        if begins:
+            state.fault = fault
+            state.fault_tick = clock.tick
+            state.fault_place = place
+            state.fault_value = value
+        if state.fault == SafetyFault.NONE:
+            pass_on(desired, command)
+        else:
+            damp(joints.position, constants.damping, command)
+        return begins
 
     def on_event(self) -> None:
-        state, verdict = self.state, self._verdict
-        if state.fault[()] == Fault.NONE:
-            fault = Fault(int(verdict.fault[0]))
-            state.fault[()] = fault
-            state.fault_tick[()] = self.tick
-            state.fault_place[()] = verdict.fault[1]
-            state.fault_value[()] = verdict.value[0]
-            if is_of_hardware(fault):
-                self.request_stop(self._reason(fault))
+        fault = SafetyFault(int(self.state.fault))  # begins in this tick
+        if is_of_hardware(fault):
+            self.request_stop(self._reason(fault))
 
     def metrics(self) -> Mapping[str, Metric]:
-        fault = Fault(int(self.state.fault[()]))
+        fault = SafetyFault(int(self.state.fault))
         result: dict[str, Metric] = {"safety_fault": fault.name.lower()}
-        if fault != Fault.NONE:
+        if fault != SafetyFault.NONE:
             period = self.context.clock.base_period
-            result["safety_fault_time_s"] = int(self.state.fault_tick[()]) * period
+            result["safety_fault_time_s"] = int(self.state.fault_tick) * period
             result["safety_reason"] = self._reason(fault)
             if is_of_hardware(fault):
                 result["success"] = False
                 result["reason"] = f"{self.context.path}: {self._reason(fault)}"
         return result
 
-    def _reason(self, fault: Fault) -> str:
+    def _reason(self, fault: SafetyFault) -> str:
         """A fault in words."""
         if not is_of_hardware(fault):
             return TEXTS[fault]
-        if fault == Fault.SWITCH:
+        if fault == SafetyFault.SWITCH:
             point = self.robot.contacts[int(self.state.fault_place)].name
             return f"foot switch {point} {SWITCH_TEXTS[SwitchFault(int(self.state.fault_value))]}"
         motor = self.robot.transmission.motors[int(self.state.fault_place)]
         return health_text(fault, motor, float(self.state.fault_value), self.params)
+
+
+# Motion and computation
+
+
+@kernel
+def judge_motion(
+    desired: JointCommand,
+    base: BaseState,
+    joints: JointState,
+    wbc: WholeBodyCommand,
+    state: SafetyState,
+    params: SafetyParams,
+    constants: SafetyConstants,
+) -> int:
+    """The gravest fault of this tick in motion and computation; updates their timers."""
+    if not is_plausible(desired, constants.torque):
+        return SafetyFault.ABSURD_COMMAND
+    if not is_possible(base, joints):
+        return SafetyFault.ABSURD_STATE
+    state.tilted = state.tilted + 1 if tilt(base.orientation) > params.tilt_limit else 0
+    state.unsolved = 0 if wbc.solved else state.unsolved + 1
+    beyond, fast = count_beyond(joints, state, constants)
+    count_unchanged(joints, state)
+    if state.tilted > constants.tilt_ticks:
+        return SafetyFault.TILT
+    if beyond > constants.joint_ticks:
+        return SafetyFault.JOINT_LIMIT
+    if fast > constants.joint_ticks:
+        return SafetyFault.JOINT_SPEED
+    if params.stale_ticks > 0 and state.stale >= params.stale_ticks:
+        return SafetyFault.STALE_SENSORS
+    if params.unsolved_ticks > 0 and state.unsolved >= params.unsolved_ticks:
+        return SafetyFault.SOLVER
+    return SafetyFault.NONE
+
+
+@kernel
+def is_plausible(command: JointCommand, torque: Array1D) -> bool:
+    """Whether a command is finite and within what drives can do, its torques within ``torque``."""
+    for joint in range(torque.shape[0]):
+        if not abs(command.torque[joint]) <= torque[joint]:
+            return False
+    return (
+        within(command.position, 100.0)
+        and within(command.velocity, 1000.0)
+        and within(command.stiffness, 10000.0)
+        and within(command.damping, 1000.0)
+    )
+
+
+@kernel
+def is_possible(base: BaseState, joints: JointState) -> bool:
+    """Whether a state is finite and within what a robot can do."""
+    return (
+        within(joints.position, 100.0)
+        and within(joints.velocity, 1000.0)
+        and within(base.orientation, 2.0)
+        and within(base.linear_velocity, 10.0)
+        and within(base.angular_velocity, 100.0)
+        and within(base.position, 1e6)
+    )
+
+
+@kernel
+def within(values: Array1D, limit: float) -> bool:
+    """Whether all values are finite and their magnitudes at most ``limit``."""
+    inside = True
+    for i in range(values.shape[0]):
+        inside = inside and abs(values[i]) <= limit
+    return inside
+
+
+@kernel
+def count_beyond(
+    joints: JointState, state: SafetyState, constants: SafetyConstants
+) -> tuple[int, int]:
+    """Count the ticks in a row each joint was out of its limits, or too fast; returns the largest counts."""
+    beyond, fast = 0, 0
+    for k in range(joints.position.shape[0]):
+        outside = not constants.lower[k] <= joints.position[k] <= constants.upper[k]
+        above = abs(joints.velocity[k]) > constants.speed[k]
+        state.beyond[k] = state.beyond[k] + 1 if outside else 0
+        state.fast[k] = state.fast[k] + 1 if above else 0
+        beyond, fast = max(beyond, state.beyond[k]), max(fast, state.fast[k])
+    return beyond, fast
+
+
+@kernel
+def count_unchanged(joints: JointState, state: SafetyState) -> None:
+    """Count the ticks since a joint reading changed."""
+    changed = not state.started
+    for joint in range(joints.position.shape[0]):
+        if joints.position[joint] != state.last_position[joint]:
+            changed = True
+        if joints.velocity[joint] != state.last_velocity[joint]:
+            changed = True
+    state.last_position[:] = joints.position
+    state.last_velocity[:] = joints.velocity
+    state.started = True
+    state.stale = 0 if changed else state.stale + 1
+
+
+# What the robot reports of its hardware
+
+
+@kernel
+def judge_health(
+    health: RobotHealth, state: SafetyState, params: SafetyParams, constants: SafetyConstants
+) -> tuple[int, int]:
+    """The gravest fault of the hardware, and the drive that has it; updates all counts."""
+    fault, place = 0, 0
+    for k in range(health.condition.shape[0]):
+        found = judge_drive(health, state, params, constants, k)
+        if found != 0 and (fault == 0 or found < fault):
+            fault, place = found, k
+    found = judge_sensors(health, state, params, constants)
+    if fault == 0:
+        fault = found
+    return fault, place
+
+
+@kernel
+def judge_drive(
+    health: RobotHealth,
+    state: SafetyState,
+    params: SafetyParams,
+    constants: SafetyConstants,
+    k: int,
+) -> int:
+    """The gravest fault of drive ``k``; updates its counts. A voltage of zero was not measured."""
+    condition, voltage = health.condition[k], health.voltage[k]
+    low = 0.0 < voltage < constants.lowest_voltage
+    hot = not health.temperature[k] <= params.highest_temperature
+    strong = not abs(health.current[k]) <= constants.largest_current
+    state.low[k] = state.low[k] + 1 if low else 0
+    state.hot[k] = state.hot[k] + 1 if hot else 0
+    state.strong[k] = state.strong[k] + 1 if strong else 0
+    if condition & _CRITICAL != 0 or condition & _ANSWERED == 0:
+        return SafetyFault.DRIVE
+    if not health.age[k] <= params.answer_age:
+        return SafetyFault.SILENT_DRIVE
+    if state.low[k] > constants.health_ticks:
+        return SafetyFault.VOLTAGE
+    if state.hot[k] > constants.health_ticks:
+        return SafetyFault.TEMPERATURE
+    if state.strong[k] > constants.health_ticks:
+        return SafetyFault.CURRENT
+    return SafetyFault.NONE
+
+
+@kernel
+def judge_sensors(
+    health: RobotHealth, state: SafetyState, params: SafetyParams, constants: SafetyConstants
+) -> int:
+    """The gravest fault of the sensors; updates all counts."""
+    invalid, stamps, stamp = state.invalid, state.stamps, health.stamp
+    invalid[0] = 0 if health.joints_valid else invalid[0] + 1
+    invalid[1] = 0 if health.imu_valid else invalid[1] + 1
+    invalid[2] = 0 if health.contacts_valid else invalid[2] + 1
+    same = stamp >= 0.0 and stamp == stamps[0]
+    stamps[1] = stamps[1] + 1.0 if same else 0.0
+    stamps[0] = stamp
+    if not health.imu_age <= params.imu_age:
+        return SafetyFault.SILENT_IMU
+    for k in range(3):
+        if invalid[k] > constants.invalid_ticks:
+            return SafetyFault.INVALID_JOINTS + k
+    if stamps[1] > constants.stamp_ticks:
+        return SafetyFault.STALE_HEALTH
+    return SafetyFault.NONE
+
+
+@kernel
+def measured_value(health: RobotHealth, fault: int, place: int) -> float:
+    """The measured value of a fault, in the unit of its signal."""
+    if fault == SafetyFault.DRIVE:
+        return float(health.condition[place])
+    if fault == SafetyFault.SILENT_DRIVE:
+        return float(health.age[place])
+    if fault == SafetyFault.VOLTAGE:
+        return float(health.voltage[place])
+    if fault == SafetyFault.TEMPERATURE:
+        return float(health.temperature[place])
+    if fault == SafetyFault.CURRENT:
+        return float(health.current[place])
+    if fault == SafetyFault.SILENT_IMU:
+        return float(health.imu_age)
+    return 0.0
+
+
+@kernel
+def first_bad_switch(switches: SwitchHealth) -> int:
+    """The first foot switch that is at fault; the last one if none is."""
+    place = 0
+    while place < switches.fault.shape[0] - 1 and switches.fault[place] == SwitchFault.NONE:
+        place += 1
+    return place
+
+
+# What the drives get
+
+
+@kernel
+def pass_on(desired: JointCommand, command: JointCommand) -> None:
+    """Pass the command on."""
+    command.mode = desired.mode
+    command.torque[:] = desired.torque
+    command.position[:] = desired.position
+    command.velocity[:] = desired.velocity
+    command.stiffness[:] = desired.stiffness
+    command.damping[:] = desired.damping
+
+
+@kernel
+def damp(position: Array1D, damping: Array1D, command: JointCommand) -> None:
+    """Command damping where the joints are; all values are finite."""
+    command.mode = CommandMode.DAMPING
+    command.torque[:] = 0.0
+    command.velocity[:] = 0.0
+    command.stiffness[:] = 0.0
+    command.damping[:] = damping
+    for joint in range(position.shape[0]):
+        angle = position[joint]
+        command.position[joint] = angle if math.isfinite(angle) else 0.0
+
+
+# Reasons in words
+
+
+TEXTS = {
+    SafetyFault.TILT: "the base leant more than `tilt_limit`",
+    SafetyFault.JOINT_LIMIT: "a joint went beyond its limits",
+    SafetyFault.JOINT_SPEED: "a joint turned faster than `speed_limit`",
+    SafetyFault.STALE_SENSORS: "the joint readings stopped changing",
+    SafetyFault.ABSURD_STATE: "the state is not finite, or beyond anything the robot can do",
+    SafetyFault.ABSURD_COMMAND: "the command is not finite, or beyond anything the drives can do",
+    SafetyFault.SOLVER: "the whole-body controller failed too often in a row",
+}
+"""The faults of motion and computation in words; those of the hardware name a drive and a value."""
+
+
+SWITCH_TEXTS = {
+    SwitchFault.STUCK_CLOSED: "is stuck: it was closed in the air",
+    SwitchFault.STUCK_OPEN: "is stuck: it was open under a foot that stood",
+    SwitchFault.BOUNCING: "bounces: it opened and closed too often",
+}
+"""What is wrong with a foot switch, in words."""
+
+
+def is_of_hardware(fault: SafetyFault) -> bool:
+    """Whether the robot's hardware reported the fault, so that the run must end."""
+    return fault >= SafetyFault.DRIVE
+
+
+def health_text(fault: SafetyFault, motor: str, value: float, params: SafetyParams) -> str:
+    """A fault of the hardware in words, with its limit and the measured value.
+
+    Args:
+        motor: the motor of the drive that is at fault.
+        value: the measured value, in the unit of its signal.
+    """
+    match fault:
+        case SafetyFault.DRIVE:
+            return f"drive {motor}: {describe_conditions(int(value))}"
+        case SafetyFault.SILENT_DRIVE:
+            return (
+                f"drive {motor} has not answered for {1e3 * value:.0f} ms; answer_age is "
+                f"{1e3 * params.answer_age:g} ms"
+            )
+        case SafetyFault.VOLTAGE:
+            return (
+                f"drive {motor}: {value:.1f} V is below lowest_voltage, {params.lowest_voltage:g} V"
+            )
+        case SafetyFault.TEMPERATURE:
+            return (
+                f"drive {motor}: its winding has {value:.0f} deg C; highest_temperature is "
+                f"{params.highest_temperature:g}"
+            )
+        case SafetyFault.CURRENT:
+            return f"drive {motor}: {value:.1f} A; largest_current is {params.largest_current:g} A"
+        case SafetyFault.SILENT_IMU:
+            return (
+                f"the sensor board has sent nothing for {1e3 * value:.0f} ms; imu_age is "
+                f"{1e3 * params.imu_age:g} ms"
+            )
+        case SafetyFault.STALE_HEALTH:
+            return f"the robot has measured nothing new for {1e3 * params.stamp_age:g} ms"
+    sensor = {
+        SafetyFault.INVALID_JOINTS: "joint",
+        SafetyFault.INVALID_IMU: "IMU's",
+        SafetyFault.INVALID_CONTACTS: "foot switches'",
+    }[fault]
+    return f"the {sensor} readings were marked as not valid for more than {1e3 * params.invalid_hold:g} ms"

@@ -16,10 +16,9 @@ from ...mathematics.kernel import kernel
 from ...mathematics.quadratic_program import QuadraticProgramSolver
 from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ...mathematics.whole_body_qp import (
-    Bounds,
     RigidBodyTerms,
     TaskRows,
-    TorqueSpeedCurves,
+    TorqueLimits,
     joint_torque,
     share_weight,
 )
@@ -29,9 +28,8 @@ from ...mathematics.whole_body_solution import (
     NO_CONTACT,
     NO_LIMITS,
     SOLVED,
-    Motors,
-    Solution,
-    Weights,
+    ProgramWeights,
+    WholeBodySolution,
     limit_motors,
     solution_memory,
     solve_whole_body,
@@ -265,18 +263,15 @@ class WholeBodyController(KernelBlock):
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
         self._weight = robot.total_mass * GRAVITY
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
-        self._weights = Weights(*(np.zeros(1) for _ in Weights._fields))
+        self._weights = ProgramWeights(*(np.zeros(1) for _ in ProgramWeights._fields))
         limited, by_motor = p.limits != "none", p.limits == "motor"
         limits = MOTOR_LIMITS if by_motor else JOINT_LIMITS if limited else NO_LIMITS
         motors = robot.motors
-        curves = TorqueSpeedCurves(np.zeros(n_joints), motors.corner_speed, motors.no_load_speed)
-        self._motors = Motors(
-            robot.joint_to_motor,
-            robot.torque_to_motor if by_motor else np.eye(n_joints),
-            curves,
-            np.zeros(n_joints),
-            Bounds(np.zeros(n_joints), np.zeros(n_joints)),
-        )
+        self._motors = TorqueLimits(
+            robot.joint_to_motor, robot.torque_to_motor if by_motor else np.eye(n_joints),
+            np.zeros(n_joints), motors.corner_speed, motors.no_load_speed,
+            *(np.zeros(n_joints) for _ in range(3)),
+        )  # fmt: skip
         self._product, self._zero_acceleration = np.zeros(n_joints), np.zeros(n)
         self._model = RigidBodyTerms(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
@@ -291,7 +286,7 @@ class WholeBodyController(KernelBlock):
             solve_whole_body_cones if is_round else solve_whole_body,
             self._rows, self._model, self.phase.stance, self.joints.velocity, self._weights, limits,
             self._motors, (cone_solution_memory if is_round else solution_memory)(n, n_contacts),
-            Solution(command.torque, command.acceleration, command.force, self._code),
+            WholeBodySolution(command.torque, command.acceleration, command.force, self._code),
         )  # fmt: skip
         self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
         self._active_calls = ActiveCalls(*(np.zeros(1, np.int64) for _ in ActiveCalls._fields))
@@ -342,7 +337,7 @@ class WholeBodyController(KernelBlock):
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
         peak = self.robot.motors.peak_torque
-        np.multiply(p.torque_margin, peak, out=self._motors.curves.peak)
+        np.multiply(p.torque_margin, peak, out=self._motors.peak)
         changed = {kind: self._task_params(kind) for kind in PHASE_KINDS}
         for kind, params in changed.items():
             for task, each in zip(self._tasks[kind], params, strict=True):

@@ -13,16 +13,16 @@ from ...mathematics.whole_body_qp import (
     Constraints,
     Cost,
     CostScratch,
-    FrictionCone,
     RigidBodyTerms,
     TaskRows,
+    TorqueLimits,
     TorqueScratch,
     assemble_cost,
     base_dynamics,
     friction_pyramids,
     torque_limits,
 )
-from ...mathematics.whole_body_solution import Motors, Weights
+from ...mathematics.whole_body_solution import ProgramWeights
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class FullProgram:
         solver: str,
         rows: TaskRows,
         model: RigidBodyTerms,
-        motors: Motors,
-        weights: Weights,
+        motors: TorqueLimits,
+        weights: ProgramWeights,
         *,
         limited: bool,
         n_contacts: int,
@@ -106,13 +106,12 @@ class FullProgram:
             self._rows, float(w.acceleration[0]), float(w.force[0]), self._scratch, program.cost
         )
         base_dynamics(self._model, active, program.equality)
-        cone = FrictionCone(float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]))
-        friction_pyramids(count, self._n, cone, program.cones)
+        friction_pyramids(
+            count, self._n, float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]),
+            program.cones,
+        )  # fmt: skip
         if self._limited:
-            torque_limits(
-                self._model, active, self._motors.to_torque, self._motors.bounds,
-                program.scratch, program.limits,
-            )  # fmt: skip
+            torque_limits(self._model, active, self._motors, program.scratch, program.limits)
         return program
 
     def solve(self, active: Indices) -> Array | None:

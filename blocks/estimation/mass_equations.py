@@ -24,7 +24,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...mathematics.mass_filter import (
-    LegScratch,
+    BaseForceScratch,
     base_force_map,
     correct_row,
     fade,
@@ -105,7 +105,7 @@ class Scratch(NamedTuple):
     """For n joints and s unknowns: ``map`` (6, n), ``rows`` (6, s), ``acceleration`` and ``force``
     (6 + n,), ``known``, ``unknown`` and ``joint`` (n,), ``base`` and ``residual`` (6,), ``seen`` (s,)."""
 
-    leg: LegScratch
+    leg: BaseForceScratch
     map: Array2D
     rows: Array2D
     acceleration: Array1D

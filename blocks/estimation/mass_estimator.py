@@ -9,7 +9,7 @@ import numpy as np
 
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.mass_filter import LegScratch
+from ...mathematics.mass_filter import BaseForceScratch
 from ...robots.description import RobotDescription
 from ...robots.limb import chain_to
 from ...runtime.language.block import Block, Input, Metric, Output, State
@@ -226,6 +226,6 @@ def _model(robot: RobotDescription, legs: list[tuple[int, ...]]) -> Model:
 
 def _scratch(n: int, size: int, longest: int) -> Scratch:
     """Memory for ``n`` joints, ``size`` unknowns and legs of up to ``longest`` joints."""
-    leg = LegScratch(np.zeros((longest, longest)), np.zeros((6, longest)))
+    leg = BaseForceScratch(np.zeros((longest, longest)), np.zeros((6, longest)))
     shapes = (6, n), (6, size), 6 + n, 6 + n, n, n, n, 6, 6, size
     return Scratch(leg, *(np.zeros(shape) for shape in shapes))

@@ -1,5 +1,7 @@
 """Motions of the whole body that follow from those of its feet, centre of mass and base.
 
+``GuidedReference`` is the base of the blocks that play back such a motion.
+
 In stance the feet stand still as far as their contact points can hold them: a point foot keeps its
 position, a line foot its position and the direction of its line, a flat foot its whole pose. Given
 as well are the velocity of the centre of mass and, for each axis, either the base's angular
@@ -18,19 +20,25 @@ choice; it takes the velocities nearest to those that lead back to its standing 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.kernel import kernel
+from ...planner.library.jump_table import JumpTable, TableRows, read_table, table_rows
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
-from ...runtime.language.block import Misfit
+from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters, parameter
+from ..signals import DelayEstimate, JumpReference
 
 _STEP = 0.002
 """Longest step of the integration [s]."""
@@ -41,7 +49,7 @@ ROWS_OF_FOOT = {FootKind.POINT: 3, FootKind.LINE: 5, FootKind.FLAT: 6}
 
 
 @dataclass
-class Motion:
+class GuidedMotion:
     """The desired motion of the body at one instant.
 
     ``rotation`` is, axis by axis, the angular momentum about the centre of mass [N m s, world]
@@ -146,7 +154,7 @@ class GuidedBody:
         self.pinocchio.computeCentroidalMomentum(self.model, self.data, q, v)
         return np.array(self.data.hg.angular)
 
-    def velocity(self, q: Array, motion: Motion) -> Array:
+    def velocity(self, q: Array, motion: GuidedMotion) -> Array:
         """The generalised velocity of the motion."""
         pin, matrix, wanted = self.pinocchio, self._matrix, self._wanted
         pin.computeJointJacobians(self.model, self.data, q)
@@ -222,7 +230,9 @@ class MotionRecorder:
         self.time: list[float] = []
         self.rows: dict[str, list[Array]] = {}
 
-    def run(self, duration: float, motion: Callable[[float], Motion], keep: bool = True) -> None:
+    def run(
+        self, duration: float, motion: Callable[[float], GuidedMotion], keep: bool = True
+    ) -> None:
         """Integrate a motion over ``duration`` [s], by the Runge-Kutta method of order four."""
         body, count = self.body, max(2, math.ceil(duration / _STEP))
         h = duration / count
@@ -241,7 +251,7 @@ class MotionRecorder:
             self.q = body.integrate(self.q, h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
         self.now += duration
 
-    def _keep(self, time: float, motion: Motion, v: Array) -> None:
+    def _keep(self, time: float, motion: GuidedMotion, v: Array) -> None:
         body, q = self.body, self.q
         prescribed = np.array(motion.by_momentum)
         momentum = np.where(prescribed, motion.rotation, body.angular_momentum(q, v))
@@ -288,3 +298,48 @@ def check_limits(robot: RobotDescription, columns: dict[str, Array]) -> None:
             f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, "
             f"but {robot.motors.profile} reaches {most[worst]:.1f} rad/s; {hint}"
         )
+
+
+class GuidedParameters(Parameters):
+    """The parameter of all references that guide the whole body from a few numbers."""
+
+    lead: float = parameter(
+        0.002, unit="s", ge=0.0, le=0.02, text="delay from sensing to torque that is compensated"
+    )
+
+
+class GuidedReference(Block):
+    """A table made at load, of which each tick publishes its instant, or the one ``delay.ahead`` later."""
+
+    Params = GuidedParameters
+    needs = ("floating base", "feet")
+    params: GuidedParameters
+    delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
+    reference = Output(JumpReference, text="the plan at the present instant")
+    hold = 0.0
+    """What is fed forward is the mean over so many seconds."""
+
+    @classmethod
+    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+        """Report too few joints to move the centre of mass and the base with all feet standing."""
+        return too_few_joints(robot)
+
+    @abstractmethod
+    def make_table(self) -> JumpTable:
+        """The motion of the block's robot."""
+
+    def setup(self) -> None:
+        self.table = table_rows(self.make_table())
+
+    @kernel
+    @staticmethod
+    def step(
+        delay: DelayEstimate,
+        reference: JumpReference,
+        table: TableRows,
+        hold: float,
+        params: GuidedParameters,
+        clock: Clock,
+    ) -> None:
+        time = clock.base_period * clock.tick + delay.ahead
+        read_table(table, time, params.lead, hold, reference)

@@ -23,7 +23,7 @@ from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 
 
-class Condition(IntEnum):
+class PhaseCondition(IntEnum):
     """A condition of a tick that may lead to another phase."""
 
     PLAN_SQUATS = 0
@@ -46,31 +46,31 @@ class Condition(IntEnum):
     """No point has had contact for too long."""
 
 
-class Transition(NamedTuple):
-    """From ``phase`` to ``to`` when the condition ``when`` holds."""
+class PhaseTransition(NamedTuple):
+    """From ``phase`` to the ``following`` one when the ``condition`` holds."""
 
     phase: Phase
-    when: Condition
-    to: Phase
+    condition: PhaseCondition
+    following: Phase
 
 
 TRANSITIONS = (
-    Transition(Phase.STAND, Condition.LOST_CONTACT, Phase.FAULT),
-    Transition(Phase.STAND, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
-    Transition(Phase.STAND, Condition.PLAN_THRUSTS, Phase.THRUST),
-    Transition(Phase.STAND, Condition.PLAN_SQUATS, Phase.SQUAT),
-    Transition(Phase.SQUAT, Condition.LOST_CONTACT, Phase.FAULT),
-    Transition(Phase.SQUAT, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
-    Transition(Phase.SQUAT, Condition.PLAN_THRUSTS, Phase.THRUST),
-    Transition(Phase.THRUST, Condition.LOST_CONTACT, Phase.FAULT),
-    Transition(Phase.THRUST, Condition.LIFT_OFF_DUE, Phase.FLIGHT),
-    Transition(Phase.THRUST, Condition.LEFT_EARLY, Phase.FLIGHT),
-    Transition(Phase.FLIGHT, Condition.TOUCHED_DOWN, Phase.LANDING),
-    Transition(Phase.FLIGHT, Condition.OVERDUE, Phase.FAULT),
-    Transition(Phase.LANDING, Condition.LOST_CONTACT, Phase.FAULT),
-    Transition(Phase.LANDING, Condition.THRUSTS_AGAIN, Phase.THRUST),
-    Transition(Phase.LANDING, Condition.RESTED, Phase.RECOVER),
-    Transition(Phase.RECOVER, Condition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.STAND, PhaseCondition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.STAND, PhaseCondition.LIFT_OFF_DUE, Phase.FLIGHT),
+    PhaseTransition(Phase.STAND, PhaseCondition.PLAN_THRUSTS, Phase.THRUST),
+    PhaseTransition(Phase.STAND, PhaseCondition.PLAN_SQUATS, Phase.SQUAT),
+    PhaseTransition(Phase.SQUAT, PhaseCondition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.SQUAT, PhaseCondition.LIFT_OFF_DUE, Phase.FLIGHT),
+    PhaseTransition(Phase.SQUAT, PhaseCondition.PLAN_THRUSTS, Phase.THRUST),
+    PhaseTransition(Phase.THRUST, PhaseCondition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.THRUST, PhaseCondition.LIFT_OFF_DUE, Phase.FLIGHT),
+    PhaseTransition(Phase.THRUST, PhaseCondition.LEFT_EARLY, Phase.FLIGHT),
+    PhaseTransition(Phase.FLIGHT, PhaseCondition.TOUCHED_DOWN, Phase.LANDING),
+    PhaseTransition(Phase.FLIGHT, PhaseCondition.OVERDUE, Phase.FAULT),
+    PhaseTransition(Phase.LANDING, PhaseCondition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.LANDING, PhaseCondition.THRUSTS_AGAIN, Phase.THRUST),
+    PhaseTransition(Phase.LANDING, PhaseCondition.RESTED, Phase.RECOVER),
+    PhaseTransition(Phase.RECOVER, PhaseCondition.LOST_CONTACT, Phase.FAULT),
 )
 """All transitions. In each phase the first transition whose condition holds is taken; a phase
 without transitions, such as FAULT, lasts to the end of the run."""
@@ -100,7 +100,7 @@ def find_conditions(
         times, limits: see ``NOW`` and ``LATE_LIFT_OFF``.
         planned: the phase that the plan is in.
         another: whether the plan has a flight after the one that ``times`` is about.
-        holds: becomes true for each ``Condition`` that holds.
+        holds: becomes true for each ``PhaseCondition`` that holds.
     """
     now, in_phase = times[NOW], times[IN_PHASE]
     lift_off, unloaded = times[LIFT_OFF], times[UNLOADED]
@@ -108,19 +108,19 @@ def find_conditions(
     due = now >= lift_off
     waiting = unloaded == 0.0 and now < lift_off + limits[LATE_LIFT_OFF]
     share = limits[TOUCHDOWN_SHARE] * (in_phase + times[REMAINING])
-    holds[Condition.PLAN_SQUATS] = planned >= Phase.SQUAT
-    holds[Condition.PLAN_THRUSTS] = planned >= Phase.THRUST or due
-    holds[Condition.LIFT_OFF_DUE] = due and not waiting
-    holds[Condition.LEFT_EARLY] = (
+    holds[PhaseCondition.PLAN_SQUATS] = planned >= Phase.SQUAT
+    holds[PhaseCondition.PLAN_THRUSTS] = planned >= Phase.THRUST or due
+    holds[PhaseCondition.LIFT_OFF_DUE] = due and not waiting
+    holds[PhaseCondition.LEFT_EARLY] = (
         now + in_phase >= lift_off and not due and unloaded >= limits[EARLY_LIFT_OFF]
     )
     ahead = times[AHEAD]
     early = ahead > LEAST_AHEAD and times[REMAINING] < ahead * limits[EARLY_LANDING]
-    holds[Condition.TOUCHED_DOWN] = (unloaded == 0.0 or early) and in_phase >= share
-    holds[Condition.OVERDUE] = in_phase > flight + limits[LOST_CONTACT]
-    holds[Condition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
-    holds[Condition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
-    holds[Condition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+    holds[PhaseCondition.TOUCHED_DOWN] = (unloaded == 0.0 or early) and in_phase >= share
+    holds[PhaseCondition.OVERDUE] = in_phase > flight + limits[LOST_CONTACT]
+    holds[PhaseCondition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
+    holds[PhaseCondition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
+    holds[PhaseCondition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
 
 
 @kernel
@@ -162,7 +162,7 @@ class JumpPhase(Block):
     FAULT         never; entered from any other phase on the conditions below
     ============  =====================================================================
 
-    The table that the block works from is ``phase_table.TRANSITIONS``. FAULT follows where no point
+    The table that the block works from is ``TRANSITIONS``. FAULT follows where no point
     has had contact for ``lost_contact`` while the robot should stand, or where the flight has
     lasted that much longer than the plan predicted at its start.
 
@@ -233,7 +233,9 @@ class JumpPhase(Block):
         """What a step computes on its way."""
 
         times = Field(7, unit="s", text="see NOW")
-        holds = Field(len(Condition), dtype="bool", text="the conditions that hold in this tick")
+        holds = Field(
+            len(PhaseCondition), dtype="bool", text="the conditions that hold in this tick"
+        )
 
     needs = ("feet",)
     params: Params

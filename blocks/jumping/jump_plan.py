@@ -2,52 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
-from ...planner.library.jump_table import JumpTable, JumpTableReader
-from ...runtime.language.block import Context, Input, Metric, Misfit, Output, State
+from ...mathematics.kernel import kernel
+from ...planner.library.jump_table import (
+    FlightRotation,
+    JumpTable,
+    TableRows,
+    flight_rotation,
+    read_table,
+    table_rows,
+)
+from ...runtime.language.block import Block, Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
-from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference
 from .plan_progress import (
-    FallSettings,
-    Progress,
-    ProgressSettings,
-    following_calls,
-    plan_instant,
+    PlanProgress,
+    ProgressConstants,
+    ProgressParameters,
+    follow_fall,
+    follow_thrust,
+    follow_turn,
 )
-from .turn_timing import Body, Pose, Rotation, Turning, TurnProgress, TurnSettings, follow_turn
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
     from ...planner.library.library import PlanLibrary
-    from ...planner.task.plan import JumpPlan as Plan
+    from ...planner.task.plan import PlannedJump
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
 
 
-FASTEST = 0.5
-"""By how much a plan is slowed down or hastened at most, as a share of time."""
-
-
-class PlanProgress(Signal):
-    """The state of ``JumpPlan``."""
-
-    late = Field(unit="s", text="how much later than by the clock the plan is read")
-    before = Field(unit="s", text="the same before the thrust's last part")
-    spin = Field(unit="", text="how fast a somersault turns, as a share of the plan's rate")
-
-
-class JumpPlan(KernelBlock):
+class JumpPlan(Block):
     """The reference motion of a jump, found by the kino-dynamic planner (paper, III).
 
     The task is a file (``tasks/in_situ.yaml``; looked for beside the graph, then among the shipped
@@ -86,7 +79,7 @@ class JumpPlan(KernelBlock):
     at touchdown, there ``delay' = toes_gain (f - touchdown_time + time)``.
 
     **Somersaults.** With ``turning`` a plan that turns over is timed in flight by how far the robot has
-    turned and how long it will fly (``turn_timing.follow_turn``). Other plans are followed as without.
+    turned and how long it will fly (``plan_progress.follow_turn``). Other plans are followed as without.
 
     What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
     the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
@@ -100,7 +93,7 @@ class JumpPlan(KernelBlock):
     plan must be valid and is not; the message says which constraint or test.
     """
 
-    class Params(Parameters):
+    class Params(ProgressParameters):
         task: str | Mapping[str, Any] = parameter(
             "tasks/in_situ.yaml",
             text="a task's file, the task's parameters, or a file and parameters that change it",
@@ -114,24 +107,6 @@ class JumpPlan(KernelBlock):
             ge=0.0,
             le=0.02,
             text="delay from sensing to torque that is compensated; none: the one at `delay`",
-        )
-        by: Literal["progress", "clock"] = parameter(
-            "progress", text="what ends the thrust: the speed reached, if `terms` is wired, or time"
-        )
-        progress_time: float = parameter(
-            0.06, unit="s", gt=0.0, text="how long before lift-off the motion counts"
-        )
-        progress_gain: float = parameter(
-            40.0, unit="1/s", ge=0.0, text="rate at which an error of the speed is corrected"
-        )
-        progress_limit: float = parameter(
-            0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
-        )
-        toes_gain: float = parameter(
-            5.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
-        )
-        turning: Turning | None = parameter(
-            None, text="how a somersault is timed by its rotation in flight; none: by the clock"
         )
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
@@ -147,9 +122,11 @@ class JumpPlan(KernelBlock):
             True, text="whether what a rehearsal of this plan has learnt is told to the graph"
         )
 
+    Constants = ProgressConstants
     needs = ("floating base", "feet")
     files_folder = "library"
     params: Params
+    constants: ProgressConstants
     terms = Input(DynamicsTerms, default={}, text="the measured motion, for by: progress")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
@@ -159,13 +136,13 @@ class JumpPlan(KernelBlock):
     def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.library import shipped_tasks
-        from ...planner.task.task import TaskError
+        from ...planner.task.task import JumpTaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
         robot = context.robot
         try:
             task = read_or_make_task(params.task, context)
-        except TaskError as error:
+        except JumpTaskError as error:
             for line in str(error).splitlines():
                 place, _, rest = line.partition(": ")
                 key = rest.partition(": ")[0] if place == "task" else ""
@@ -210,13 +187,13 @@ class JumpPlan(KernelBlock):
     def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """The ground and the score's expectation that follow from the task."""
         from ...planner.task.ground import scene_of
-        from ...planner.task.task import TaskError
+        from ...planner.task.task import JumpTaskError
 
         assert isinstance(params, cls.Params) and context.robot is not None
         task = read_or_make_task(params.task, context)
         try:
             scene = scene_of(task, context.robot)
-        except TaskError as error:
+        except JumpTaskError as error:
             scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
         end, hops = task.places()[-1], task.hops()
         velocity, momentum = cls._corrections(task, params, context)
@@ -263,45 +240,45 @@ class JumpPlan(KernelBlock):
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
         table = reference_table_once(plan, robot, self.params.stand_time)
-        reader = JumpTableReader(table, self.reference)
-        self.kernel_calls = [*self._calls(reader), *self._turning(reader.instant, table)]
+        self.table = table_rows(table)
+        self.rotation = self._time_progress(table)
 
-    def _calls(self, reader: JumpTableReader) -> list[KernelCall]:
-        """Find the instant of the plan, read it, and follow the motion where that is asked for."""
-        p, clock, period, reference = self.params, self.context.clock, self.period, self.reference
-        progress = Progress(self.progress.late, self.progress.before)
-        lead = self.delay.delay if p.lead is None else np.array(p.lead, np.float64)
-        calls = [
-            KernelCall(
-                plan_instant, clock.present, clock.base_period, progress.late, lead,
-                self.delay.ahead, period, reader.instant,
-            ),
-            reader.call,
-        ]  # fmt: skip
-        if p.by == "progress" and "terms" in self.context.wired:
-            thrust = ProgressSettings(
-                float(p.progress_time), float(p.progress_gain), float(p.progress_limit), FASTEST,
-                period,
-            )  # fmt: skip
-            fall = FallSettings(float(p.toes_gain), FASTEST, period)
-            calls += following_calls(reader.instant, self.terms, reference, thrust, fall, progress)
-        return calls
+    def _time_progress(self, table: JumpTable) -> FlightRotation:
+        """Write the constants; returns the rotation of the flight, empty where it is not followed."""
+        p, constants, turning = self.params, self.constants, self.params.turning
+        measured = "terms" in self.context.wired
+        rotation = flight_rotation(table, self.robot) if measured and turning is not None else None
+        constants.lead = -1.0 if p.lead is None else p.lead
+        constants.follows_motion = measured and p.by == "progress"
+        constants.follows_turn = rotation is not None
+        constants.period = self.period
+        if turning is not None:
+            constants.gain, constants.aim = turning.gain, turning.aim
+            constants.early, constants.late = turning.early, turning.late
+        return rotation or FlightRotation(*(np.zeros(1) for _ in FlightRotation._fields))
 
-    def _turning(self, instant: Array, table: JumpTable) -> Iterator[KernelCall]:
-        """Follow the rotation of a somersault in flight where that is asked for."""
-        from ...planner.library.jump_table import flight_rotation
-
-        given, terms, reference = self.params.turning, self.terms, self.reference
-        if given is None or "terms" not in self.context.wired:
-            return
-        rotation = flight_rotation(table, self.robot)
-        if rotation is not None:
-            yield KernelCall(
-                follow_turn, instant, Body(*(getattr(terms, name) for name in Body._fields)),
-                Pose(*(getattr(reference, name) for name in Pose._fields)), Rotation(*rotation),
-                TurnSettings(given.gain, given.early, given.late, given.aim, self.period),
-                TurnProgress(self.progress.late, self.progress.spin),
-            )  # fmt: skip
+    @kernel
+    @staticmethod
+    def step(
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        reference: JumpReference,
+        progress: PlanProgress,
+        table: TableRows,
+        rotation: FlightRotation,
+        params: Params,
+        constants: ProgressConstants,
+        clock: Clock,
+    ) -> None:
+        lead = delay.delay if constants.lead < 0.0 else constants.lead
+        early = min(delay.ahead, lead)
+        time = clock.base_period * clock.tick - progress.late + early
+        read_table(table, time, lead - early, constants.period, reference)
+        if constants.follows_motion:
+            follow_thrust(time, terms, reference, progress, params, constants)
+            follow_fall(time, terms, reference, progress, params, constants)
+        if constants.follows_turn:
+            follow_turn(time, terms, reference, rotation, progress, constants)
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report
@@ -318,7 +295,7 @@ class JumpPlan(KernelBlock):
             + report.explain(),
         )
 
-    def _report_validity(self, plan: Plan) -> ValidityReport | None:
+    def _report_validity(self, plan: PlannedJump) -> ValidityReport | None:
         """The validity report of a plan that need not be valid; ``None`` if it must be valid."""
         if self.params.check == "required":
             return None
@@ -330,8 +307,8 @@ class JumpPlan(KernelBlock):
             raise BlockError(f"the plan {plan.task.name!r} is broken: {broken[0].where}")
         return report
 
-    def _plan(self, task: JumpTask, robot: RobotDescription) -> Plan:
-        from ...planner.task.files import TaskError
+    def _plan(self, task: JumpTask, robot: RobotDescription) -> PlannedJump:
+        from ...planner.task.files import JumpTaskError
         from ...planner.task.plan import PlanFileError
 
         library = plan_library(self.params, robot)
@@ -345,7 +322,7 @@ class JumpPlan(KernelBlock):
                 plan = library.attempt(task)
             else:
                 plan, _ = library.plan(task)
-        except (TaskError, PlanFileError) as error:
+        except (JumpTaskError, PlanFileError) as error:
             raise BlockError(str(error)) from error
         kept = library.path_of(task)
         self.files_read = (kept,) if kept is not None else ()
@@ -363,7 +340,7 @@ def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
     """The task of a block, in the formulation that is planned.
 
     Raises:
-        LookupError, TaskError: as ``read_or_make_task``.
+        LookupError, JumpTaskError: as ``read_or_make_task``.
     """
     return _as_planned(read_or_make_task(params.task, context), params.formulation)
 
@@ -381,7 +358,7 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.
-        TaskError: it cannot be read as a task.
+        JumpTaskError: it cannot be read as a task.
     """
     from ...planner.library.library import find_task
     from ...planner.task.read_task import changed_task, read_task, spoken_name

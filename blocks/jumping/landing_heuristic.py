@@ -36,14 +36,18 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Field
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
 from .landing_prediction import (
     LAST,
-    Prediction,
+    PredictionConstants,
     PredictionGains,
+    PredictionMemory,
+    PredictionProgram,
+    PredictionScratch,
     choose_shift_of_feet,
-    landing_prediction,
+    describe_soles,
+    prediction_program,
     scale_gains,
 )
 
@@ -104,7 +108,7 @@ class LandingParams(PredictionGains):
     )
 
 
-class LandingMemory(Signal):
+class LandingMemory(PredictionMemory):
     """The state of ``LandingHeuristic``."""
 
     flying = Field(dtype="bool", text="whether the robot flew at the last tick")
@@ -112,43 +116,31 @@ class LandingMemory(Signal):
         ("n_feet", 3), unit="m", frame="world", text="feet at lift-off, measured minus planned"
     )
     goal = Field(("n_feet", 3), unit="m", frame="world", text="where the feet last aimed")
-    planned = Field(("n_feet", 3), unit="m", frame="world", text="planned feet from the com")
     swing = Field(("n_feet", 3), unit="m/s", frame="world", text="their planned speed from the com")
     linear = Field(3, unit="kg m/s", frame="world", text="planned linear momentum")
     angular = Field(3, unit="N m s", frame="world", text="planned angular momentum")
-    orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
-    shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
     started = Field(dtype="bool", text="whether the plan's place in the world is known")
     origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or next")
-    planned_touchdown = Field(3, unit="m", frame="world", text="planned com at touchdown")
-    flight_time = Field(unit="s", text="lift-off to touchdown with the planned length of the legs")
 
 
-class LandingConstants(Signal):
+class LandingConstants(PredictionConstants):
     """What the law knows of the robot."""
 
     side = Field("n_feet", unit="", text="1: the foot is on the left, -1: right, 0: in the middle")
     stance = Field(("n_feet", 3), unit="m", frame="body", text="feet from the com in standing")
-    mass = Field(unit="kg", text="that of the description")
 
 
-class LandingScratch(Signal):
+class LandingScratch(PredictionScratch):
     """What the law computes on its way."""
 
     place = Field(("n_feet", 3), unit="m", frame="world", text="of each foot from the com")
     centre = Field(("n_feet", 3), unit="m", frame="world", text="of the limits p_max, from the com")
     speed = Field(3, unit="m/s", frame="world", text="of the foot in hand from the com")
-    linear = Field(3, unit="kg m/s", frame="world", text="the linear momentum that is fed back")
-    angular = Field(3, unit="N m s", frame="world", text="the angular momentum that is fed back")
-    miss = Field(3, unit="m", frame="world", text="by which unshifted feet miss their place")
-    quaternion = Field(4, unit="", text="the base's orientation")
     turn = Field(4, unit="", text="of the frame in which the targets are fixed")
     rotation = Field((3, 3), unit="", text="the same as a matrix")
     rate = Field(3, unit="rad/s", text="angular velocity of that frame")
-    heading = Field((3, 3), unit="", text="of a sole")
     com_body = Field(3, unit="m", frame="body", text="the com from the base")
-    vector = Field(3, text="for a moment")
 
 
 class LandingHeuristic(Block):
@@ -232,12 +224,12 @@ class LandingHeuristic(Block):
         robot, stance = self.robot, standing_feet(self.robot)
         sides = foot_sides(stance)
         self.constants.side[:], self.constants.stance[:] = sides, stance
-        self.constants.mass = robot.total_mass
         self._height = -float(stance[:, 2].mean())
-        self.prediction = landing_prediction(robot, sides)
+        self.program = prediction_program(robot)
+        describe_soles(robot, sides, self.constants)
 
     def prepare(self) -> None:
-        scale_gains(self.params, self.robot.total_mass, self._height, self.prediction.gains)
+        scale_gains(self.params, self._height, self.constants, self.program.cost)
 
     @kernel
     @staticmethod
@@ -250,7 +242,7 @@ class LandingHeuristic(Block):
         params: LandingParams,
         constants: LandingConstants,
         scratch: LandingScratch,
-        prediction: Prediction,
+        program: PredictionProgram,
         period: float,
     ) -> None:
         flying, landing = phase.phase == Phase.FLIGHT, phase.phase == Phase.LANDING
@@ -266,7 +258,7 @@ class LandingHeuristic(Block):
         memory.flying = flying
         elapsed, left = phase.time_in_phase, phase.time_to_touchdown
         if flying and params.law == "predicted":
-            left = predict(reference, terms, elapsed, left, prediction, memory, scratch)
+            left = predict(reference, terms, phase, memory, params, constants, scratch, program)
         reach = params.reach_share * max(elapsed + left, period)
         share, rate, _ = minimum_jerk(elapsed / reach)
         drawn_in = params.retraction
@@ -364,28 +356,29 @@ def lift_off(terms: DynamicsTerms, memory: LandingMemory) -> None:
 def predict(
     plan: JumpReference,
     terms: DynamicsTerms,
-    elapsed: float,
-    left: float,
-    prediction: Prediction,
+    phase: PhaseState,
     memory: LandingMemory,
+    params: LandingParams,
+    constants: LandingConstants,
     scratch: LandingScratch,
+    program: PredictionProgram,
 ) -> float:
     """Choose the shift; returns the time [s] to a touchdown with the legs that much shorter.
 
-    ``left`` is the time to touchdown with the planned legs, which ends at zero. Shorter legs fall on.
+    The time to touchdown in ``phase`` is that with the planned legs, which ends at zero. Shorter legs
+    fall on.
     """
+    elapsed: float = phase.time_in_phase
+    left: float = phase.time_to_touchdown
     if left > 0.0:
         memory.flight_time = elapsed + left
     left = memory.flight_time - elapsed
     scratch.miss[:] = terms.com_velocity * left + terms.com - memory.planned_touchdown
     speed = max(GRAVITY * left - terms.com_velocity[2], SLOWEST_DESCENT)
+    scratch.fall_speed = speed
     later = fall_time(speed, memory.shift[3])
     if left + later >= LAST:
-        choose_shift_of_feet(
-            terms, plan.foot_yaw, memory.planned, memory.orientation, scratch.linear,
-            scratch.angular, scratch.miss, left, memory.flight_time, speed, prediction,
-            memory.shift,
-        )  # fmt: skip
+        choose_shift_of_feet(plan, terms, left, memory, params, constants, scratch, program)
         later = fall_time(speed, memory.shift[3])
     return max(left + later, 0.0)
 

@@ -8,14 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import (
-    Array1D,
-    Array2D,
-    Indices1D,
-    Matrix3,
-    Rows3,
-    Vector3,
-)
+from ...mathematics.arrays import Array1D
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.landing_law import (
@@ -31,7 +24,8 @@ from ...mathematics.landing_law import (
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, live_parameter
-from ..signals import DynamicsTerms
+from ...runtime.language.signals import Field, Signal
+from ..signals import DynamicsTerms, JumpReference
 
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
@@ -96,178 +90,158 @@ class PredictionGains(Parameters):
     )
 
 
-class Soles(NamedTuple):
-    """Of the robot: its ``mass`` [kg], and for every contact point the number of its foot, the foot's
-    side (1, -1 or 0), (n_contacts,) both, and its place from the sole's, (n_contacts, 3) [m]."""
+class PredictionConstants(Signal):
+    """What the law knows of the robot, and ``PredictionGains`` for its size."""
 
-    mass: float
-    foot_of_point: Indices1D
-    side: Array1D
-    offset: Rows3
-
-
-class Gains(NamedTuple):
-    """``PredictionGains`` for a robot of some size: arrays of one element, or of more where said.
-
-    Attributes:
-        cost: what the shift is judged by; its goal and its bounds are computed in every tick.
-        per_linear, per_angular: way of the feet ahead and aside per momentum, (2,).
-        clearance: way apart per lateral momentum [s/kg].
-        lowest, highest: shifts downwards and upwards that are never exceeded [m].
-        early: share of the flight by which stretched legs may touch down early.
-        stroke: of the legs per square of the speed of the fall [s^2/m].
-        damping: where a leg is nearly stretched [m].
-        place_gain: share of a small miss of the planned place that is corrected.
-        place_range: way at which half of it is [m].
-    """
-
-    cost: LandingCost
-    per_linear: Array1D
-    per_angular: Array1D
-    clearance: Array1D
-    lowest: Array1D
-    highest: Array1D
-    early: Array1D
-    stroke: Array1D
-    damping: Array1D
-    place_gain: Array1D
-    place_range: Array1D
+    mass = Field(unit="kg", text="that of the description")
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    point_side = Field(
+        "n_contacts", unit="", text="1: its foot is on the left, -1: right, 0: middle"
+    )
+    point_offset = Field(("n_contacts", 3), unit="m", frame="body", text="from its foot's sole")
+    per_linear = Field(2, unit="s/kg", text="way of the feet ahead and aside per linear momentum")
+    per_angular = Field(2, unit="s/(kg m)", text="the way per angular momentum about y and x")
+    apart = Field(unit="s/kg", text="way apart per lateral momentum")
+    lowest = Field(unit="m", text="shift downwards that is never exceeded")
+    highest = Field(unit="m", text="shift upwards that is never exceeded")
+    stroke = Field(unit="s^2/m", text="stroke of the legs per square of the speed of the fall")
+    damping = Field(unit="m", text="damping where a leg is nearly stretched")
+    place_range = Field(unit="m", text="way at which half of a missed place is corrected")
 
 
-class PredictionScratch(NamedTuple):
-    """``way`` (3 n_contacts,), ``heading`` (3, 3), ``vector`` (3,), ``quaternion`` and ``turned`` (4,),
-    ``tilt`` (2,), ``turn`` (2, 4), ``matrix`` (4, 4)."""
+class PredictionMemory(Signal):
+    """What the law remembers."""
+
+    planned = Field(("n_feet", 3), unit="m", frame="world", text="planned feet from the com")
+    orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
+    shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
+    planned_touchdown = Field(3, unit="m", frame="world", text="planned com at touchdown")
+    flight_time = Field(unit="s", text="lift-off to touchdown with the planned length of the legs")
+
+
+class PredictionScratch(Signal):
+    """What the law computes on its way."""
+
+    linear = Field(3, unit="kg m/s", frame="world", text="the linear momentum that is fed back")
+    angular = Field(3, unit="N m s", frame="world", text="the angular momentum that is fed back")
+    miss = Field(3, unit="m", frame="world", text="by which unshifted feet miss their place")
+    heading = Field((3, 3), unit="", text="of a sole")
+    vector = Field(3, text="for a moment")
+    fall_speed = Field(
+        unit="m/s", text="at touchdown; its inverse is the delay per shorter leg [s/m]"
+    )
+    quaternion = Field(4, unit="", text="the base's orientation")
+    turned = Field(4, unit="", text="the base's orientation from the planned one")
+    tilt = Field(2, unit="rad", text="roll and pitch at touchdown without a shift")
+    tilt_per_shift = Field((2, 4), unit="rad/m", text="their derivatives by the shift")
+    matrix = Field((4, 4), text="for a moment")
+
+
+class PredictionProgram(NamedTuple):
+    """The robot's flight as a linear map, the cost of a shift, and how far every contact point is from
+    its planned place, (3 n_contacts,) [m]."""
 
     flight: FlightMap
+    cost: LandingCost
     way: Array1D
-    heading: Matrix3
-    vector: Vector3
-    quaternion: Array1D
-    turned: Array1D
-    tilt: Array1D
-    turn: Array2D
-    matrix: Array2D
 
 
-class Prediction(NamedTuple):
-    """What ``choose_shift_of_feet`` needs beside the present state."""
-
-    soles: Soles
-    gains: Gains
-    scratch: PredictionScratch
-
-
-def landing_prediction(robot: RobotDescription, sides: Sequence[float]) -> Prediction:
-    """The memory of the law for a robot with feet; its gains are zero.
-
-    Args:
-        sides: 1, -1 or 0 for every foot.
-    """
-    foot_of_point = robot.foot_of_contact()
-    offset = [
-        np.array(point.position) - np.array(robot.feet[foot].sole)
-        for point, foot in zip(robot.contacts, foot_of_point, strict=True)
-    ]
+def prediction_program(robot: RobotDescription) -> PredictionProgram:
+    """The memory of the program for a robot with feet."""
     n = len(robot.contacts)
-    soles = Soles(
-        robot.total_mass, np.array(foot_of_point, dtype=np.int64),
-        np.array([sides[foot] for foot in foot_of_point]), np.array(offset),
-    )  # fmt: skip
     cost = LandingCost(np.zeros(3), np.zeros(6), np.zeros((2, 2)), np.zeros(2))
-    gains = Gains(cost, np.zeros(2), np.zeros(2), *np.zeros((8, 1)))
-    shapes = 3 * n, (3, 3), 3, 4, 4, 2, (2, 4), (4, 4)
-    flight = flight_map(len(robot.joints), n)
-    return Prediction(
-        soles, gains, PredictionScratch(flight, *(np.zeros(shape) for shape in shapes))
-    )
+    return PredictionProgram(flight_map(len(robot.joints), n), cost, np.zeros(3 * n))
 
 
-def scale_gains(p: PredictionGains, mass: float, height: float, gains: Gains) -> None:
-    """Write the parameters for a robot of a ``mass`` [kg] and standing ``height`` [m] to ``gains``."""
+def describe_soles(
+    robot: RobotDescription, sides: Sequence[float], constants: PredictionConstants
+) -> None:
+    """Write what the law knows of the robot; ``sides`` are 1, -1 or 0 for every foot."""
+    feet = robot.foot_of_contact()
+    constants.mass, constants.foot_of_point[:] = robot.total_mass, feet
+    for k, (point, foot) in enumerate(zip(robot.contacts, feet, strict=True)):
+        constants.point_side[k] = sides[foot]
+        constants.point_offset[k] = np.array(point.position) - np.array(robot.feet[foot].sole)
+
+
+def scale_gains(
+    p: PredictionGains, height: float, constants: PredictionConstants, cost: LandingCost
+) -> None:
+    """Write the parameters for a robot of the mass in ``constants`` and the standing ``height`` [m]."""
+    mass = float(constants.mass)
     rate = math.sqrt(GRAVITY / height)
     capture, capture_turn = 1.0 / (mass * rate), rate / (mass * GRAVITY)
     aside, back, ahead = p.free_tilt
-    gains.cost.weight[:] = (
+    cost.weight[:] = (
         1.0, 1.0, p.apart_cost**2, p.height_cost**2,
         (height * p.tilt_cost[0]) ** 2, (height * p.tilt_cost[1]) ** 2,
     )  # fmt: skip
-    gains.cost.free[:] = (-aside, aside), (-back, ahead)
-    gains.per_linear[:] = capture * p.capture[0], capture * p.capture[1]
-    gains.per_angular[:] = capture_turn * p.capture_turn[0], capture_turn * p.capture_turn[1]
-    gains.clearance[0] = capture * p.clearance
-    gains.lowest[0], gains.highest[0] = height * p.height_range[0], height * p.height_range[1]
-    gains.early[0] = p.early
-    gains.stroke[0] = 0.5 / (GRAVITY * p.stop_acceleration)
-    gains.damping[0] = height * p.stretch_damping
-    gains.place_gain[0], gains.place_range[0] = p.place_gain, height * p.place_range
+    cost.free[:] = (-aside, aside), (-back, ahead)
+    constants.per_linear[:] = capture * p.capture[0], capture * p.capture[1]
+    constants.per_angular[:] = capture_turn * p.capture_turn[0], capture_turn * p.capture_turn[1]
+    constants.apart = capture * p.clearance
+    constants.lowest, constants.highest = height * p.height_range[0], height * p.height_range[1]
+    constants.stroke = 0.5 / (GRAVITY * p.stop_acceleration)
+    constants.damping = height * p.stretch_damping
+    constants.place_range = height * p.place_range
 
 
 @kernel
 def choose_shift_of_feet(
+    plan: JumpReference,
     terms: DynamicsTerms,
-    foot_yaw: Array1D,
-    planned: Array2D,
-    orientation: Array1D,
-    linear: Array1D,
-    angular: Array1D,
-    miss: Array1D,
     left: float,
-    duration: float,
-    speed: float,
-    prediction: Prediction,
-    shift: Array1D,
+    memory: PredictionMemory,
+    params: PredictionGains,
+    constants: PredictionConstants,
+    scratch: PredictionScratch,
+    program: PredictionProgram,
 ) -> None:
-    """Choose the ``shift`` (4,) [m] of all feet: ahead, to the left, apart, upwards.
+    """Choose the shift of all feet.
 
-    Args:
-        foot_yaw: the planned heading of every foot [rad], (n_feet,).
-        planned: places of the feet from the centre of mass, (n_feet, 3).
-        orientation: the planned one, quaternion x, y, z, w.
-        linear, angular: the momenta that were not planned.
-        miss: by how much unshifted feet will miss their planned place in the world [m], (3,).
-        left: time until touchdown with the planned length of the legs [s]; shorter legs may fall on
-            when it is over.
-        speed: of the fall then [m/s]; by 1 / speed does every metre of shorter legs delay touchdown.
+    ``left`` is the time until touchdown with the planned length of the legs [s]; shorter legs may fall
+    on when it is over.
     """
-    soles, gains, scratch = prediction.soles, prediction.gains, prediction.scratch
-    cost = gains.cost
+    cost, linear, angular = program.cost, scratch.linear, scratch.angular
+    speed = scratch.fall_speed
     map_flight(
-        terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, soles.mass,
-        gains.damping[0], scratch.flight,
+        terms.centroidal_matrix, terms.contact_jacobian, terms.base_rotation, constants.mass,
+        constants.damping, program.flight,
     )  # fmt: skip
-    find_ways(terms, foot_yaw, planned, soles, scratch)
+    find_ways(plan, terms, memory, constants, scratch, program.way)
     from_matrix(terms.base_rotation, scratch.quaternion)
-    conjugate(orientation, scratch.turned)
+    conjugate(memory.orientation, scratch.turned)
     multiply(scratch.quaternion, scratch.turned, scratch.turned)
     logarithm(scratch.turned, scratch.vector)
     predict_tilt(
-        scratch.flight, scratch.vector, angular, scratch.way, left, 1.0 / speed, soles.side,
-        scratch.tilt, scratch.turn,
+        program.flight, scratch.vector, angular, program.way, left, 1.0 / speed,
+        constants.point_side, scratch.tilt, scratch.tilt_per_shift,
     )  # fmt: skip
-    cost.bounds[0] = max(gains.lowest[0], -gains.early[0] * duration * speed)
-    cost.bounds[1] = max(gains.highest[0] - speed * speed * gains.stroke[0], 0.0)
-    ahead = gains.per_linear[0] * linear[0]
-    cost.goal[0] = ahead + gains.per_angular[0] * angular[1]
-    aside = gains.per_linear[1] * linear[1]
-    cost.goal[1] = aside - gains.per_angular[1] * angular[0]
-    cost.goal[2] = gains.clearance[0] * abs(linear[1])
-    pull_to_place(cost.goal, miss, gains.place_gain[0], gains.place_range[0])
-    choose_shift(scratch.tilt, scratch.turn, cost, scratch.matrix, shift)
+    cost.bounds[0] = max(constants.lowest, -params.early * memory.flight_time * speed)
+    cost.bounds[1] = max(constants.highest - speed * speed * constants.stroke, 0.0)
+    ahead = constants.per_linear[0] * linear[0]
+    cost.goal[0] = ahead + constants.per_angular[0] * angular[1]
+    aside = constants.per_linear[1] * linear[1]
+    cost.goal[1] = aside - constants.per_angular[1] * angular[0]
+    cost.goal[2] = constants.apart * abs(linear[1])
+    pull_to_place(cost.goal, scratch.miss, params.place_gain, constants.place_range)
+    choose_shift(scratch.tilt, scratch.tilt_per_shift, cost, scratch.matrix, memory.shift)
 
 
 @kernel
 def find_ways(
+    plan: JumpReference,
     terms: DynamicsTerms,
-    foot_yaw: Array1D,
-    planned: Rows3,
-    soles: Soles,
+    memory: PredictionMemory,
+    constants: PredictionConstants,
     scratch: PredictionScratch,
+    way: Array1D,
 ) -> None:
     """How far every contact point is from its planned place, with flat soles."""
-    for point in range(soles.foot_of_point.shape[0]):
-        foot = soles.foot_of_point[point]
-        heading_matrix(foot_yaw[foot], scratch.heading)
-        scratch.vector[:] = scratch.heading @ soles.offset[point]
-        scratch.way[3 * point : 3 * point + 3] = (
-            scratch.vector + planned[foot] + terms.com - terms.contact_position[point]
+    for point in range(constants.foot_of_point.shape[0]):
+        foot = constants.foot_of_point[point]
+        heading_matrix(plan.foot_yaw[foot], scratch.heading)
+        scratch.vector[:] = scratch.heading @ constants.point_offset[point]
+        way[3 * point : 3 * point + 3] = (
+            scratch.vector + memory.planned[foot] + terms.com - terms.contact_position[point]
         )

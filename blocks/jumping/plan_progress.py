@@ -1,28 +1,102 @@
-"""How far a plan's thrust has come, by the motion and not by the clock."""
+"""When a plan is read: by how far the thrust, the fall or the rotation of the robot has come."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal
 
-from ...mathematics.arrays import (
-    Array,
-    Array0D,
-    Array1D,
-    Array2D,
-    Flags0D,
-    Indices0D,
-    Indices1D,
-)
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array1D, Array2D, Matrix3
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import pitch_angle
+from ...planner.library.jump_table import FlightRotation, locate
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference, Phase
+from .jump_phase import planned_touchdown_height, time_to_height
 
+FASTEST = 0.5
+"""By how much a plan is slowed down or hastened at most, as a share of time."""
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
 LEAST_PUSH = 8.0
 """Acceleration [m/s^2] by which at least a delay of the plan is taken to speed the robot up."""
+PITCH = 1
+"""The axis of a somersault: the world's y axis, which is the body's too."""
+SETTLED = 0.02
+"""From so long after lift-off on [s] the measured momentum is that of the flight."""
+FULL = 0.95
+"""The rate of rotation is measured while the planned one is at least this share of its greatest."""
+SPIN_TIME, SPIN_RANGE = 0.03, 0.2
+"""Time constant of its mean [s], and by what share it may differ from the plan's."""
+TUCKED_SHIFT, OPEN_SHIFT = 0.3, 0.4
+"""By how much the plan is hastened or slowed down at most before and after the legs have left the tuck,
+as a share of time."""
+CLOSING = 0.008
+"""So long before touchdown [s] the plan is on time again."""
+
+
+class Turning(Parameters):
+    """How the flight of a somersault is retimed; see ``follow_turn``."""
+
+    gain: float = parameter(
+        50.0, unit="1/s", ge=0.0, text="rate at which an error of the rotation is corrected"
+    )
+    early: float = parameter(
+        0.04, unit="s", ge=0.0, le=0.1, text="by how much earlier the legs leave the tuck at most"
+    )
+    late: float = parameter(
+        0.005, unit="s", ge=0.0, le=0.05,
+        text="by how much later; then they must hurry, and their feet are faster at touchdown",
+    )  # fmt: skip
+    aim: float = parameter(
+        0.0, unit="rad", ge=-0.5, le=0.5,
+        text="how much further than planned the body has turned at touchdown",
+    )  # fmt: skip
+
+
+class ProgressParameters(Parameters):
+    """How ``JumpPlan`` keeps its plan in time with the robot."""
+
+    by: Literal["progress", "clock"] = parameter(
+        "progress", text="what ends the thrust: the speed reached, if `terms` is wired, or time"
+    )
+    progress_time: float = parameter(
+        0.06, unit="s", gt=0.0, text="how long before lift-off the motion counts"
+    )
+    progress_gain: float = parameter(
+        40.0, unit="1/s", ge=0.0, text="rate at which an error of the speed is corrected"
+    )
+    progress_limit: float = parameter(
+        0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
+    )
+    toes_gain: float = parameter(
+        5.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
+    )
+    turning: Turning | None = parameter(
+        None, text="how a somersault is timed by its rotation in flight; none: by the clock"
+    )
+
+
+class PlanProgress(Signal):
+    """The state of ``JumpPlan``."""
+
+    late = Field(unit="s", text="how much later than by the clock the plan is read")
+    before = Field(unit="s", text="``late`` when the last part of the thrust began")
+    spin = Field(unit="", text="how fast a somersault turns, as a share of the plan's rate")
+
+
+class ProgressConstants(Signal):
+    """What follows from the parameters, the plan and the wires."""
+
+    lead = Field(unit="s", text="delay from sensing to torque; negative: the one at ``delay``")
+    follows_motion = Field(dtype="bool", text="thrusts and falls end when the robot's do")
+    follows_turn = Field(dtype="bool", text="the plan is a somersault that is retimed")
+    gain = Field(unit="1/s", text="``Turning.gain``")
+    early = Field(unit="s", text="``Turning.early``")
+    late = Field(unit="s", text="``Turning.late``")
+    aim = Field(unit="rad", text="``Turning.aim``")
+    period = Field(unit="s", text="of the block")
 
 
 @kernel
@@ -59,141 +133,57 @@ def delay_change(error: float, push: float, gain: float, fastest: float, period:
     return min(max(rate, -fastest), fastest) * period
 
 
-class Motion(NamedTuple):
-    """The measured or the planned motion that tells the progress.
-
-    ``com`` and ``com_velocity`` (3,) [m, m/s], and ``foot_position`` (n_feet, 3) [m], all in the world.
-    """
-
-    com: Array1D
-    com_velocity: Array1D
-    foot_position: Array2D
-
-
-class Planned(NamedTuple):
-    """What else the plan says: its phase, when it lifts off [s], of shape () each, and the
-    acceleration of the centre of mass [m/s^2, world], (3,)."""
-
-    phase: Indices0D
-    lift_off_time: Array0D
-    com_acceleration: Array1D
-
-
-class ProgressSettings(NamedTuple):
-    """The parameters of ``JumpPlan`` about progress, the largest rate of the delay, and the period."""
-
-    time: float
-    gain: float
-    limit: float
-    fastest: float
-    period: float
-
-
-class Flight(NamedTuple):
-    """What else the plan says of a flight: its phase, when it ends [s], and whether the toes land first,
-    of shape () each."""
-
-    phase: Indices0D
-    touchdown_time: Array0D
-    toes_first: Flags0D
-
-
-class FallSettings(NamedTuple):
-    """The parameters of ``JumpPlan`` about such a flight, the largest rate of the delay, and the period."""
-
-    gain: float
-    fastest: float
-    period: float
-
-
-class Progress(NamedTuple):
-    """The fields of ``PlanProgress``, of shape () each."""
-
-    late: Array0D
-    before: Array0D
-
-
 @kernel
-def plan_instant(
-    present: Indices1D,
-    base_period: float,
-    late: Array0D,
-    lead: Array0D,
-    ahead: Array0D,
-    hold: float,
-    instant: Array1D,
-) -> None:
-    """The instant at which the plan is read.
-
-    Args:
-        present: the tick, (1,).
-        base_period: the seconds of a tick.
-        late: how much later than by the clock the plan is read [s], of shape ().
-        lead: how far ahead the feedforward is read [s], of shape ().
-        ahead: how much of that all of the plan is read ahead [s], of shape ().
-        hold: the seconds over which the feedforward is the mean.
-        instant: the time, the lead and the hold [s], (3,).
-    """
-    early = min(ahead[()], lead[()])
-    instant[0] = base_period * present[0] - late[()] + early
-    instant[1] = lead[()] - early
-    instant[2] = hold
-
-
-@kernel
-def follow_motion(
-    instant: Array1D,
-    measured: Motion,
-    reference: Motion,
-    planned: Planned,
-    settings: ProgressSettings,
-    progress: Progress,
+def follow_thrust(
+    time: float,
+    terms: DynamicsTerms,
+    reference: JumpReference,
+    progress: PlanProgress,
+    params: ProgressParameters,
+    constants: ProgressConstants,
 ) -> None:
     """Delay or hasten the end of a thrust by the speed and height of the centre of mass.
 
-    Args:
-        instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
+    ``reference`` is the plan at ``time`` [s].
     """
-    left = planned.lift_off_time[()] - instant[0]
-    if planned.phase[()] != Phase.THRUST or not 0.0 < left <= settings.time:
-        progress.before[()] = progress.late[()]
+    left = reference.lift_off_time - time
+    if reference.phase != Phase.THRUST or not 0.0 < left <= params.progress_time:
+        progress.before = progress.late
         return
     error = speed_error(
-        measured.com[2] - mean_height(measured.foot_position),
-        measured.com_velocity[2],
+        terms.com[2] - mean_height(terms.foot_position),
+        terms.com_velocity[2],
         reference.com[2] - mean_height(reference.foot_position),
         reference.com_velocity[2],
     )
-    push, before = planned.com_acceleration[2], progress.before[()]
-    late = progress.late[()] - before
-    late += delay_change(error, push, settings.gain, settings.fastest, settings.period)
-    late = min(max(late, -settings.limit), settings.limit)
-    progress.late[()] = before + late
+    push, before = reference.com_acceleration[2], progress.before
+    late, limit = progress.late - before, params.progress_limit
+    late += delay_change(error, push, params.progress_gain, FASTEST, constants.period)
+    progress.late = before + min(max(late, -limit), limit)
 
 
 @kernel
 def follow_fall(
-    instant: Array1D,
-    measured: Motion,
-    reference: Motion,
-    planned: Flight,
-    settings: FallSettings,
-    progress: Progress,
+    time: float,
+    terms: DynamicsTerms,
+    reference: JumpReference,
+    progress: PlanProgress,
+    params: ProgressParameters,
+    constants: ProgressConstants,
 ) -> None:
     """Hasten or delay a flight whose toes land first, so that it ends when the fall does.
 
-    Args:
-        instant: as ``plan_instant`` writes it; all others but ``measured`` are of that instant.
+    ``reference`` is the plan at ``time`` [s].
     """
-    if planned.phase[()] != Phase.FLIGHT or not planned.toes_first[()]:
+    if reference.phase != Phase.FLIGHT or not reference.toes_first:
         return
-    left = planned.touchdown_time[()] - instant[0]
+    left = reference.touchdown_time - time
     sinking = GRAVITY * left - reference.com_velocity[2]
     lowest = reference.com[2] - 0.5 * (sinking - reference.com_velocity[2]) * left
-    fall = time_to_fall(measured.com[2] - lowest, measured.com_velocity[2])
-    rate = settings.gain * (fall - left)
-    rate = min(max(rate, -settings.fastest), settings.fastest)
-    progress.late[()] = progress.late[()] + rate * settings.period
+    fall = time_to_fall(terms.com[2] - lowest, terms.com_velocity[2])
+    rate = params.toes_gain * (fall - left)
+    rate = min(max(rate, -FASTEST), FASTEST)
+    progress.late += rate * constants.period
 
 
 @kernel
@@ -212,21 +202,78 @@ def mean_height(position: Array2D) -> float:
     return total / len(position)
 
 
-def following_calls(
-    instant: Array,
+@kernel
+def follow_turn(
+    time: float,
     terms: DynamicsTerms,
     reference: JumpReference,
-    thrust: ProgressSettings,
-    fall: FallSettings,
-    progress: Progress,
-) -> tuple[KernelCall, KernelCall]:
-    """The calls of ``follow_motion`` and ``follow_fall``, with the measured ``terms``."""
-    measured, planned = (
-        Motion(*(getattr(signal, name) for name in Motion._fields)) for signal in (terms, reference)
-    )
-    others = Planned(*(getattr(reference, name) for name in Planned._fields))
-    flight = Flight(*(getattr(reference, name) for name in Flight._fields))
-    return (
-        KernelCall(follow_motion, instant, measured, planned, others, thrust, progress),
-        KernelCall(follow_fall, instant, measured, planned, flight, fall, progress),
-    )
+    rotation: FlightRotation,
+    progress: PlanProgress,
+    constants: ProgressConstants,
+) -> None:
+    """Hasten or slow down the plan in flight, by how far the robot has turned and how long it will fly.
+
+    Let the plan be read at tau, with w(tau) its rate of rotation with the joints held, G(tau) the
+    rest of this rotation until touchdown, and w_td its last rate. Let the robot turn c w where the
+    plan turns w, and have turned further than the plan by s. Angular momentum is conserved, so::
+
+        s' = w (c - tau'),     at touchdown:  s_td = s + (c - 1) G - w_td d
+
+    where d is by how much the plan must still be shifted, with its legs out, to land when the robot
+    falls onto its feet. A shift in the tuck instead changes s_td by w_td - w for every second of it::
+
+        tau' = 1 + gain (s_td - aim) / (w - w_td)
+
+    From when the legs are tucked until they are out, as far as d stays between -``early`` and ``late``.
+    Then tau' is what makes d zero shortly before touchdown.
+
+    ``reference`` is the plan at ``time`` [s], ``rotation`` that of its flight.
+    """
+    if reference.phase != Phase.FLIGHT or time < rotation.time[0] + SETTLED:
+        progress.spin = 1.0
+        return
+    planned = reference.touchdown_time - time
+    falls = time_to_height(
+        terms.com[2], terms.com_velocity[2],
+        planned_touchdown_height(reference.com[2], reference.com_velocity[2], planned),
+    )  # fmt: skip
+    tucked, out = rotation.marks[0], rotation.marks[1]
+    if falls < CLOSING or time < tucked:
+        return
+    shift, period = planned - falls, constants.period
+    if time >= out:
+        change = shift / max(falls - CLOSING, period)
+        progress.late -= min(max(change, -OPEN_SHIFT), OPEN_SHIFT) * period
+        return
+    rate = value_at(rotation.time, rotation.rate, time)
+    left = value_at(rotation.time, rotation.left, time)
+    lands = rotation.rate[rotation.rate.shape[0] - 1]
+    sign = rotation.marks[3]
+    if rate >= FULL * rotation.marks[2]:
+        inertia = terms.centroidal_matrix[3 + PITCH, 3 + PITCH]
+        spin = sign * terms.angular_momentum[PITCH] / (inertia * rate)
+        spin = min(max(spin, 1.0 - SPIN_RANGE), 1.0 + SPIN_RANGE)
+        progress.spin += (spin - progress.spin) * period / SPIN_TIME
+    surplus = sign * turned_beyond(terms.base_rotation, reference.orientation)
+    surplus += (progress.spin - 1.0) * left - lands * shift - constants.aim
+    if rate == lands:  # the plan turns as fast as with its legs out: a shift would change nothing
+        return
+    change = constants.gain * surplus / (rate - lands)
+    change = min(max(change, -TUCKED_SHIFT), TUCKED_SHIFT) * period
+    progress.late -= min(max(change, shift - constants.late), shift + constants.early)
+
+
+@kernel
+def value_at(times: Array1D, values: Array1D, time: float) -> float:
+    """The value at a time in a table that is linear between its rows; (n,) each."""
+    low, share = locate(times, time)
+    return float(values[low] + share * (values[low + 1] - values[low]))
+
+
+@kernel
+def turned_beyond(rotation: Matrix3, orientation: Array1D) -> float:
+    """By how much [rad] a body of this ``rotation`` has turned further about its y axis than one
+    of the planned ``orientation``, a quaternion x, y, z, w."""
+    planned = pitch_angle(orientation)
+    measured = math.atan2(-rotation[2, 0], rotation[0, 0])
+    return math.atan2(math.sin(measured - planned), math.cos(measured - planned))

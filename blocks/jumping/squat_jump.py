@@ -10,7 +10,7 @@ feet stand, because a thigh that is level has the yaw and roll axes of its hip i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,46 +19,109 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.interpolation import minimum_jerk, quintic
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
-from ...robots.pinocchio_model import PinocchioModel
-from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
+from ...robots.pinocchio_model import PinocchioModel, build_pinocchio_model
+from ...runtime.language.parameters import parameter
+from .guided_motion import (
+    GuidedBody,
+    GuidedMotion,
+    GuidedParameters,
+    GuidedReference,
+    MotionRecorder,
+    check_limits,
+)
 
 
-@dataclass(frozen=True)
-class SquatJumpTask:
-    """The parameters of a jump. Heights are those of the centre of mass; drops and depths are below
-    its height in standing.
+class SquatJumpParameters(GuidedParameters):
+    """A jump. Drops and depths are heights of the centre of mass below that in standing."""
 
-    Attributes:
-        rise: apex above standing [m].
-        squat_depth, lift_off_drop, touchdown_drop, landing_depth: heights below standing [m] at
-            the bottom of the squat, at lift-off, at touchdown and where the landing comes to rest.
-        lean: forward pitch of the torso at the bottom of the squat [rad].
-        touchdown_pitch: forward pitch of the torso at touchdown [rad].
-        distance: how far ahead the feet land [m].
-        unloading: the share of the weight taken off the feet at lift-off; 1 for no load.
-        settle_time: how long after lift-off the legs take to their landing posture [s].
-        stand_time, squat_time, pause_time, landing_time, recover_time: durations [s].
+    rise: float = parameter(
+        0.09, unit="m", gt=0.0, le=1.0, text="apex of the centre of mass above standing"
+    )
+    distance: float = parameter(
+        0.0, unit="m", ge=-1.0, le=1.0, text="how far ahead of the start the feet land"
+    )
+    lean: float = parameter(
+        0.8, unit="rad", ge=0.0, le=1.3, text="forward pitch of the torso in the squat"
+    )
+    touchdown_pitch: float = parameter(
+        -0.06, unit="rad", ge=-0.5, le=0.5, text="forward pitch of the torso at touchdown"
+    )
+    squat_depth: float = parameter(
+        0.094, unit="m", gt=0.0, le=0.5, text="bottom of the squat below standing"
+    )
+    lift_off_drop: float = parameter(
+        0.029, unit="m", ge=-0.1, le=0.3, text="height at lift-off below standing"
+    )
+    touchdown_drop: float = parameter(
+        0.009, unit="m", ge=-0.1, le=0.3, text="height at touchdown below standing"
+    )
+    landing_depth: float = parameter(
+        0.06, unit="m", ge=0.0, le=0.5, text="where the landing comes to rest below standing"
+    )
+    unloading: float = parameter(
+        0.7, ge=0.0, le=1.0, text="share of the weight taken off the feet at lift-off"
+    )
+    settle_time: float = parameter(
+        0.1, unit="s", gt=0.02, le=0.5, text="from lift-off to the legs' landing posture"
+    )
+    stand_time: float = parameter(
+        0.4, unit="s", gt=0.0, text="standing, for the estimator to settle"
+    )
+    squat_time: float = parameter(0.5, unit="s", gt=0.1, text="going down")
+    pause_time: float = parameter(0.15, unit="s", gt=0.0, text="waiting at the bottom")
+    landing_time: float = parameter(0.35, unit="s", gt=0.05, text="coming to rest")
+    recover_time: float = parameter(0.6, unit="s", gt=0.05, text="rising to standing")
+
+
+class SquatJumpReference(GuidedReference):
+    """A squat, thrust, flight and landing of the whole body, planned from a few numbers.
+
+    It serves any robot whose feet stand level in its standing pose and that has joints enough to
+    move its centre of mass and base with all feet on the ground: bipeds with line or flat feet,
+    quadrupeds with point feet. The defaults are BRUCE's.
+
+    The take-off speed is that of a ballistic rise, V^2 = 2 g (rise + lift_off_drop); the thrust
+    goes from the squat's bottom to lift-off with, over u from 0 to 1 in its time T,
+
+        v(u) = V (3 u^2 - 2 u^3) - unloading g T (u^3 - u^2),
+
+    so that it begins without a jerk and ends with nearly unloaded feet. All joints follow from
+    the feet, the centre of mass and the pitching momentum (see ``guided_motion``); the momentum
+    at lift-off is solved for so that the torso touches down at ``touchdown_pitch``. Leaving the
+    ground early, well before the legs are straight and with the torso still leaning, is what
+    keeps the hips slow: their speed, not torque, limits the height.
+
+    Torque follows its command with a delay, so acceleration and the rate of angular momentum, which
+    are fed forward, are published ``lead`` ahead of time.
+
+    The plan is made at load (about 0.2 s) and read by the time since the run began; after its end
+    the reference stands still. The block knows nothing of what the robot really does, plans no
+    lateral jump and no twist, and leaves forces and torque limits to the controller. The load
+    report names a robot with too few joints; ``setup`` raises ``BlockError`` where a joint would
+    exceed its limit or a motor its speed.
     """
 
-    rise: float
-    squat_depth: float
-    lift_off_drop: float
-    touchdown_drop: float
-    landing_depth: float
-    lean: float
-    touchdown_pitch: float
-    distance: float
-    unloading: float
-    settle_time: float
-    stand_time: float
-    squat_time: float
-    pause_time: float
-    landing_time: float
-    recover_time: float
+    Params = SquatJumpParameters
+    params: SquatJumpParameters
+
+    def make_table(self) -> JumpTable:
+        """The squat, the jump and the landing."""
+        return _plan(self.robot.model_dump_json(), self.params)
+
+    def setup(self) -> None:
+        super().setup()
+        self.hold = self.period
+
+
+@lru_cache(maxsize=8)
+def _plan(robot: str, task: SquatJumpParameters) -> JumpTable:
+    """The plan for a robot given as JSON; it is computed once for all runs of a process."""
+    description = RobotDescription.model_validate_json(robot)
+    return plan_squat_jump(build_pinocchio_model(description), description, task)
 
 
 def plan_squat_jump(
-    built: PinocchioModel, robot: RobotDescription, task: SquatJumpTask
+    built: PinocchioModel, robot: RobotDescription, task: SquatJumpParameters
 ) -> JumpTable:
     """The whole jump, from standing to standing.
 
@@ -114,7 +177,7 @@ def _lift_off_momentum(jump: _Jump, body: GuidedBody, bottom: Array, start: floa
 class _Jump:
     """The motion of every phase, as functions of the time in it."""
 
-    def __init__(self, task: SquatJumpTask, body: GuidedBody, q: Array) -> None:
+    def __init__(self, task: SquatJumpParameters, body: GuidedBody, q: Array) -> None:
         self.task = task
         self.feet = body.feet(q)
         self.home = body.com(q)
@@ -178,17 +241,17 @@ class _Jump:
             for i in range(self.feet.shape[0])
         ]
 
-    def _motion(self, com: Array) -> Motion:
-        return Motion(
+    def _motion(self, com: Array) -> GuidedMotion:
+        return GuidedMotion(
             com, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), (False, False, False),
             np.zeros(self.feet.shape),
         )  # fmt: skip
 
-    def rest(self, t: float) -> Motion:
+    def rest(self, t: float) -> GuidedMotion:
         """Standing still."""
         return self._motion(self.home)
 
-    def squat(self, t: float) -> Motion:
+    def squat(self, t: float) -> GuidedMotion:
         """Going down and leaning forward, with minimum jerk."""
         motion = self._rise_or_sink(self.home, self.bottom, t / self.task.squat_time,
                                     self.task.squat_time)  # fmt: skip
@@ -196,11 +259,11 @@ class _Jump:
         motion.rotation = np.array([0.0, rate * self.task.lean, 0.0])
         return motion
 
-    def pause(self, t: float) -> Motion:
+    def pause(self, t: float) -> GuidedMotion:
         """Waiting at the bottom."""
         return self._motion(self.bottom)
 
-    def thrust(self, t: float, momentum: float) -> Motion:
+    def thrust(self, t: float, momentum: float) -> GuidedMotion:
         """Going up, while the pitching momentum grows to that of lift-off."""
         total = self.thrust_time
         u = t / total
@@ -216,7 +279,7 @@ class _Jump:
         motion.rotation_rate = np.array([0.0, rate / total * momentum, 0.0])
         return motion
 
-    def flight(self, t: float, momentum: float) -> Motion:
+    def flight(self, t: float, momentum: float) -> GuidedMotion:
         """Ballistic flight, in which the legs go to their landing posture."""
         fall = np.array([0.0, 0.0, -GRAVITY])
         motion = self._motion(self.lift_off_com + t * self.take_off + 0.5 * t**2 * fall)
@@ -230,7 +293,7 @@ class _Jump:
             motion.foot_velocity += [[leg.velocity(t) for leg in foot] for foot in self.legs]
         return motion
 
-    def landing(self, t: float, pitch: float) -> Motion:
+    def landing(self, t: float, pitch: float) -> GuidedMotion:
         """Going down to rest over the feet, while the torso turns upright from ``pitch``."""
         duration = self.task.landing_time
         speed = np.array([self.forward, 0.0, -self.fall])
@@ -256,14 +319,16 @@ class _Jump:
         motion.rotation = np.array([0.0, -rate * pitch, 0.0])
         return motion
 
-    def recover(self, t: float) -> Motion:
+    def recover(self, t: float) -> GuidedMotion:
         """Going up to standing height, with minimum jerk."""
         low = np.array([self.task.distance, 0.0, self.rest_height])
         high = np.array([self.task.distance, 0.0, float(self.home[2])])
         duration = self.task.recover_time
         return self._rise_or_sink(low, high, t / duration, duration)
 
-    def _rise_or_sink(self, start: Array, end: Array, share: float, duration: float) -> Motion:
+    def _rise_or_sink(
+        self, start: Array, end: Array, share: float, duration: float
+    ) -> GuidedMotion:
         way, rate, bend = minimum_jerk(share)
         motion = self._motion(start + way * (end - start))
         motion.com_velocity = rate / duration * (end - start)

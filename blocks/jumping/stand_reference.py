@@ -12,8 +12,14 @@ from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.parameters import parameter
-from .guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
-from .guided_reference import GuidedParameters, GuidedReference
+from .guided_motion import (
+    GuidedBody,
+    GuidedMotion,
+    GuidedParameters,
+    GuidedReference,
+    MotionRecorder,
+    check_limits,
+)
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
@@ -54,9 +60,6 @@ class StandReference(GuidedReference):
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
         return _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
 
-    def step(self) -> None:
-        self._reader.read(self.time + float(self.delay.ahead), self.params.lead)
-
 
 @lru_cache(maxsize=8)
 def _plan(robot: str, depth: float, times: tuple[float, float, float, float]) -> JumpTable:
@@ -86,9 +89,9 @@ def plan_stand(
     low = np.array([0.0, 0.0, float(home[2]) - depth])
     high = np.array([0.0, 0.0, float(home[2])])
 
-    def between(start: Array, end: Array, duration: float, t: float) -> Motion:
+    def between(start: Array, end: Array, duration: float, t: float) -> GuidedMotion:
         share, rate, bend = minimum_jerk(t / duration)
-        return Motion(
+        return GuidedMotion(
             com=start + share * (end - start),
             com_velocity=rate / duration * (end - start),
             com_acceleration=bend / duration**2 * (end - start),

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Indices1D
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
@@ -24,16 +23,23 @@ PLANE = 3
 """The number of loaded points by which a sole with at least as many is flat on the ground."""
 
 
-class Ball(NamedTuple):
-    """A foot that is a ball: its number and its radius [m], the limb that it ends as a ``Limb`` has
-    it, and scratch: the ``angles`` (n,) of the limb's joints, their ``anchors`` (n, 6), the ``pose``
-    (4, 3) of the foot, and its upward ``axis`` (3,) in the world."""
+class BallFeet(NamedTuple):
+    """The n feet that are balls, and what their positions are computed with.
 
-    foot: int
-    radius: float
-    joints: Indices1D
-    links: Array2D
-    tip: Array1D
+    Attributes:
+        foot, radius, size: of each its index, its radius [m], and the number of joints of the limb that
+            it ends, (n,) each; a limb has at most m joints.
+        joints, links, tip: of each limb as ``Limb`` has them, (n, m), (n, m, 7), (n, 7).
+        angles, anchors, pose, axis: room for the joints of a limb (m,) and (m, 6), for the pose of the
+            foot (4, 3) and for its upward axis in the world (3,).
+    """
+
+    foot: Indices1D
+    radius: Array1D
+    size: Indices1D
+    joints: Indices2D
+    links: Array3D
+    tip: Array2D
     angles: Array1D
     anchors: Array2D
     pose: Array2D
@@ -51,38 +57,38 @@ class Footing:
 
     def __init__(self, robot: RobotDescription) -> None:
         self.foot_of_point = np.array(robot.foot_of_contact(), np.int64)
-        self._feet = len(robot.feet)
-        self._balls = [
-            Ball(
-                ball.foot, float(ball.radius), np.array(limb.joints, np.int64), limb.links, limb.tip,
-                np.zeros(len(limb.joints)), np.zeros((len(limb.joints), 6)), np.zeros((4, 3)),
-                np.zeros(3),
-            )
-            for ball in ball_feet(robot)
-            for limb in (read_limb(robot, ball.foot),)
-        ]  # fmt: skip
         self.weight = float(robot.total_mass * GRAVITY)
         self.standing_height = -float(standing_heights(robot).min())
+        self._robot = robot
 
     @property
     def fall_height(self) -> float:
-        """A base lower above the ground than this has fallen, unless told otherwise [m]."""
+        """By default a base lower above the ground than this has fallen [m]."""
         return float(round(FALL_SHARE * self.standing_height, 3))
 
     @property
     def load_share(self) -> float:
-        """The least share of the weight on each foot at rest, unless told otherwise."""
-        return LOAD_SHARE / self._feet
+        """By default the least share of the weight on each foot at rest."""
+        return LOAD_SHARE / len(self._robot.feet)
 
-    def measuring(
-        self, points: Array, orientation: Array, middle: Array, direction: Array
-    ) -> KernelCall:
-        """Measures the horizontal position and direction of every foot: see ``measure_feet``."""
-        return KernelCall(measure_feet, self.foot_of_point, points, orientation, middle, direction)
-
-    def unrolling(self, joints: Array, orientation: Array, middle: Array) -> tuple[KernelCall, ...]:
-        """Subtracts from the positions of ball feet how far they have rolled: see ``unroll``."""
-        return tuple(KernelCall(unroll, ball, joints, orientation, middle) for ball in self._balls)
+    def ball_feet(self) -> BallFeet:
+        """The feet that are balls."""
+        balls = ball_feet(self._robot)
+        limbs = [read_limb(self._robot, ball.foot) for ball in balls]
+        n, m = len(balls), max((len(limb.joints) for limb in limbs), default=0)
+        feet = BallFeet(
+            np.array([ball.foot for ball in balls], np.int64),
+            np.array([ball.radius for ball in balls], np.float64),
+            np.array([len(limb.joints) for limb in limbs], np.int64),
+            np.zeros((n, m), np.int64), np.zeros((n, m, 7)), np.zeros((n, 7)),
+            np.zeros(m), np.zeros((m, 6)), np.zeros((4, 3)), np.zeros(3),
+        )  # fmt: skip
+        for k, limb in enumerate(limbs):
+            size = len(limb.joints)
+            feet.joints[k, :size], feet.links[k, :size], feet.tip[k] = (
+                limb.joints, limb.links, limb.tip,
+            )  # fmt: skip
+        return feet
 
 
 @kernel
@@ -141,8 +147,8 @@ def measure_feet(
 
 
 @kernel
-def unroll(ball: Ball, joints: Array1D, orientation: Array1D, middle: Array2D) -> None:
-    """Subtract from the position of a ball foot how far it has rolled.
+def unroll(balls: BallFeet, joints: Array1D, orientation: Array1D, middle: Array2D) -> None:
+    """Subtract from the positions of ball feet how far they have rolled.
 
     A ball that rolls without sliding moves by its radius times the angle by which its foot
     leans, in the direction of the lean. The remaining position changes only if the foot slides.
@@ -150,19 +156,22 @@ def unroll(ball: Ball, joints: Array1D, orientation: Array1D, middle: Array2D) -
     Args:
         joints: positions of the joints [rad or m], (n_joints,).
         orientation: of the base, quaternion x, y, z, w.
-        middle: the middle of every foot's points (n_feet, 2), changed for this foot.
+        middle: the middle of every foot's points (n_feet, 2), changed for these feet.
     """
-    for k in range(ball.joints.shape[0]):
-        ball.angles[k] = joints[ball.joints[k]]
-    place_limb(ball.links, ball.tip, ball.angles, ball.anchors, ball.pose)
-    rotate(orientation, ball.pose[1:, 2], ball.axis)
-    x, y, z = ball.axis[0], ball.axis[1], ball.axis[2]
-    leaning = sqrt(x * x + y * y)
-    way = ball.radius
-    if leaning > 1e-12:
-        way = ball.radius * atan2(leaning, z) / leaning
-    middle[ball.foot, 0] -= way * x
-    middle[ball.foot, 1] -= way * y
+    for ball in range(balls.foot.shape[0]):
+        size = balls.size[ball]
+        for k in range(size):
+            balls.angles[k] = joints[balls.joints[ball, k]]
+        links, tip = balls.links[ball, :size], balls.tip[ball]
+        place_limb(links, tip, balls.angles, balls.anchors, balls.pose)
+        rotate(orientation, balls.pose[1:, 2], balls.axis)
+        x, y, z = balls.axis[0], balls.axis[1], balls.axis[2]
+        leaning, foot = sqrt(x * x + y * y), balls.foot[ball]
+        arc = balls.radius[ball]
+        if leaning > 1e-12:
+            arc = balls.radius[ball] * atan2(leaning, z) / leaning
+        middle[foot, 0] -= arc * x
+        middle[foot, 1] -= arc * y
 
 
 @kernel

@@ -1,4 +1,8 @@
-"""When a jump counts as a success: the tolerances, and the judgement of a recorded jump."""
+"""When a jump, or a row of jumps, counts as a success: its record, tolerances and judgement.
+
+The last jump of a row is judged like any jump; those before it by their flight, their lift-off speed,
+their apex and where they land.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,8 @@ from math import atan2, cos, degrees, pi, radians, sin
 from ...mathematics.arrays import Array2D
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import parameter
-from ...runtime.language.signals import Field
-from .stand_criteria import (
+from ...runtime.language.signals import Field, Signal
+from .standing import (
     NEVER,
     StandCriteria,
     StandRecord,
@@ -49,6 +53,28 @@ class JumpRecord(StandRecord):
     planned_foot = Field(("n_feet", 2), unit="m", text="feet of the reference now")
     planned_yaw_start = Field(unit="rad", text="mean heading of the reference's feet at the start")
     planned_yaw = Field(unit="rad", text="mean heading of the reference's feet now")
+
+
+class JumpSeries(Signal):
+    """The jumps of a row that are over. Every figure is that of the worst of these jumps."""
+
+    made = Field(dtype="int64", text="number of jumps that have touched down")
+    landed_time = Field(unit="s", text="when the last of them touched down")
+    planned_lift_off = Field(unit="s", text="the planned lift-off of the jump under way or next")
+    flight_share = Field(unit="", text="least share of the planned flight time")
+    flight_jump = Field(dtype="int64", text="number of that jump, from 1")
+    speed_error = Field(
+        unit="", text="greatest error of the lift-off speed, as a share of the planned one"
+    )
+    speed_jump = Field(dtype="int64", text="number of that jump")
+    rise_error = Field(unit="", text="greatest error of the apex, as a share of the planned rise")
+    rise_jump = Field(dtype="int64", text="number of that jump")
+    place_error = Field(unit="m", text="greatest distance of the feet from where they should land")
+    place_now = Field(unit="m", text="error of the present landing")
+    place_jump = Field(dtype="int64", text="number of that jump")
+    turn_error = Field(unit="rad", text="greatest error of the feet's heading")
+    turn_now = Field(unit="rad", text="error of the present landing")
+    turn_jump = Field(dtype="int64", text="number of that jump")
 
 
 class JumpCriteria(StandCriteria):
@@ -199,3 +225,50 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
             f"{c.landing_height:.3f} m"
         ),
     )
+
+
+def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:
+    """The first criterion of a row of jumps that does not hold, in words, or ``None``.
+
+    ``made`` is the number of jumps that are over, including the last.
+    """
+    s, c = series, limits
+    verdicts = (
+        (made == c.jumps, f"made {made} of {c.jumps} jumps"),
+        (
+            s.flight_share >= c.flight_share,
+            (
+                f"jump {int(s.flight_jump)}: flight of {float(s.flight_share):.0%} of the planned one, "
+                f"below {c.flight_share:.0%}"
+            ),
+        ),
+        (
+            s.speed_error <= c.lift_off_tolerance,
+            (
+                f"jump {int(s.speed_jump)}: lift-off speed {float(s.speed_error):.0%} off the plan, "
+                f"limit {c.lift_off_tolerance:.0%}"
+            ),
+        ),
+        (
+            s.rise_error <= c.rise_tolerance,
+            (
+                f"jump {int(s.rise_jump)}: apex {float(s.rise_error):.0%} off the planned rise, limit "
+                f"{c.rise_tolerance:.0%}"
+            ),
+        ),
+        (
+            s.place_error <= c.series_distance_tolerance,
+            (
+                f"jump {int(s.place_jump)}: landed {1e3 * float(s.place_error):.1f} mm from its place, "
+                f"limit {1e3 * c.series_distance_tolerance:.0f} mm"
+            ),
+        ),
+        (
+            s.turn_error <= c.yaw_tolerance,
+            (
+                f"jump {int(s.turn_jump)}: landed {degrees(float(s.turn_error)):.1f} deg off its "
+                f"heading, limit {degrees(c.yaw_tolerance):.0f} deg"
+            ),
+        ),
+    )
+    return next((text for holds, text in verdicts if not holds), None)

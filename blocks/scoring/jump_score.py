@@ -3,24 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import degrees, hypot
+from enum import IntEnum
+from math import degrees, hypot, pi, sqrt
 
-import numpy as np
-
-from ...mathematics.compiling.kernel_call import KernelCall
-from ...runtime.language.block import Input, Metric, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...mathematics.arrays import Array0D, Indices0D
+from ...mathematics.constants import GRAVITY
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import tilt
+from ...runtime.language.block import Block, Input, Metric, State
+from ...runtime.language.context import Clock
+from ...runtime.language.signals import Field, Signal
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
-from .footing import Footing
-from .jump_criteria import JumpCriteria, JumpRecord, feet_moved, feet_turned, first_failure
-from .jump_following import Ending, Reference, Times, Verdict, follow_jump, follow_reference
-from .jump_series import Jump, JumpSeries, Planned, Series, series_failure
-from .stand_criteria import NEVER
-from .stand_following import Stand, Truth, fields_of, following_limits
-from .stand_metrics import judgement_metrics, rest_metrics
+from .footing import BallFeet, Footing
+from .jump_criteria import (
+    JumpCriteria,
+    JumpRecord,
+    JumpSeries,
+    feet_moved,
+    feet_turned,
+    first_failure,
+    mean_turn,
+    series_failure,
+)
+from .standing import (
+    NEVER,
+    StandConstants,
+    judgement_metrics,
+    largest_of,
+    record_fall,
+    record_feet,
+    record_rest,
+    record_robot,
+    rest_metrics,
+)
+
+EARLY_LIFT_OFF = 0.1
+"""Feet that leave the ground more than this time [s] before the planned lift-off have bounced."""
 
 
-class JumpScore(KernelBlock):
+class Ending(IntEnum):
+    """Why a judge asks for the end of the run."""
+
+    NONE = 0
+    FELL = 1
+    ALONE = 2
+    """No other jump of a row has come."""
+    RESTED = 3
+
+
+class JumpConstants(StandConstants):
+    """What the record of a jump needs to know beside its tolerances."""
+
+    planned = Field(dtype="bool", text="there is a reference to compare the jump with")
+
+
+class RunEnd(Signal):
+    """What a tick asks for."""
+
+    ending = Field(dtype="int64", values=Ending, text="why the run should end; see Ending")
+    landed = Field(unit="s", text="how long after touchdown that is")
+
+
+class JumpScore(Block):
     """Judges one jump and ends the run. No controller can see it.
 
     A jump is a success when all of these hold; every tolerance is a parameter:
@@ -57,8 +101,12 @@ class JumpScore(KernelBlock):
     """
 
     Params = JumpCriteria
+    Constants = JumpConstants
+    Scratch = RunEnd
     needs = ("floating base", "feet")
     params: JumpCriteria
+    constants: JumpConstants
+    scratch: RunEnd
     truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
     reference = Input(JumpReference, default={}, text="the planned jump, for its targets")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
@@ -66,51 +114,56 @@ class JumpScore(KernelBlock):
     series = State(JumpSeries, text="the jumps of a row that are over")
 
     def setup(self) -> None:
-        """Group the contact points by foot, and bind what a tick needs."""
-        footing, truth, record = Footing(self.robot), self.truth, self.record
-        limits = self.params.for_robot(footing)
-        assert isinstance(limits, JumpCriteria)
-        self._limits = limits
-        self._planned = "reference" in self.context.wired
-        clock = self.context.clock
-        planned = Planned(*(getattr(record, f"planned_{name}") for name in Planned._fields))
-        series = fields_of(Series, self.series)
-        reference = fields_of(Reference, self.reference)
-        self._verdict = Verdict(np.zeros(1, np.int64), np.zeros(1))
-        comparing = KernelCall(
-            follow_reference, clock.present, clock.base_period, record.ticks, reference, planned,
-            series,
-        )  # fmt: skip
-        following = KernelCall(
-            follow_jump, clock.present, clock.base_period, fields_of(Truth, truth),
-            truth.angular_momentum, reference, self.wbc.failures, fields_of(Stand, record),
-            fields_of(Jump, record), planned, series,
-            following_limits(limits, footing, limits.slip_delay, self.period),
-            Times(
-                limits.flight_confirmation, limits.rest_time, limits.settle_time,
-                limits.slip_delay, limits.jumps, self._planned,
-            ),
-            self._verdict,
-        )  # fmt: skip
-        self.kernel_calls = (
-            footing.measuring(
-                truth.contact_position, truth.base_orientation, record.foot, record.direction
-            ),
-            *footing.unrolling(truth.joint_position, truth.base_orientation, record.foot),
-            *((comparing,) if self._planned else ()),
-            following,
-        )
-        self.event = self._verdict.ending
+        footing = Footing(self.robot)
+        self.balls = footing.ball_feet()
+        criteria = self.params.for_robot(footing)
+        assert isinstance(criteria, JumpCriteria)
+        self._criteria = criteria
+        self.constants.fill(footing, criteria, criteria.slip_delay, self.period)
+        self.constants.planned = "reference" in self.context.wired
+
+    @kernel
+    @staticmethod
+    def step(
+        truth: RobotTruth,
+        reference: JumpReference,
+        wbc: WholeBodyCommand,
+        record: JumpRecord,
+        series: JumpSeries,
+        balls: BallFeet,
+        params: JumpCriteria,
+        constants: JumpConstants,
+        scratch: RunEnd,
+        clock: Clock,
+    ) -> bool:
+        now, first = clock.base_period * clock.tick, record.ticks == 0
+        scratch.ending = Ending.NONE
+        record_robot(now, truth, wbc, record, balls, constants)
+        if constants.planned:
+            record_reference(now, first, reference, record, series)
+        if first:
+            begin_jump(truth, record)
+        if record_fall(truth, record, params, constants):
+            scratch.ending = Ending.FELL
+        early = reference.time < reference.lift_off_time - EARLY_LIFT_OFF
+        bounces = constants.planned and series.made > 0 and early
+        record_flight(truth, record, series, params, constants, bounces)
+        if record.touchdown_time != NEVER:
+            record_landing(truth, record, params, constants, scratch)
+        elif series.made != 0:
+            record_row(truth, record, series, params, constants, scratch)
+        record.vertical_speed = truth.com_velocity[2]
+        return bool(scratch.ending != Ending.NONE)
 
     def on_event(self) -> None:
         """Ask for the end of the run."""
-        landed = float(self._verdict.landed[0])
+        landed = float(self.scratch.landed)
         self.request_stop(
             {
                 Ending.FELL: "the robot fell",
                 Ending.ALONE: f"no other jump {landed:.2f} s after touchdown",
                 Ending.RESTED: f"{landed:.2f} s after touchdown",
-            }[Ending(int(self._verdict.ending[0]))]
+            }[Ending(int(self.scratch.ending))]
         )
 
     def metrics(self) -> Mapping[str, Metric]:
@@ -118,7 +171,8 @@ class JumpScore(KernelBlock):
         record = self.record
         if record.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}
-        failure = first_failure(record, self._limits, self._planned)
+        planned = bool(self.constants.planned)
+        failure = first_failure(record, self._criteria, planned)
         made = int(self.series.made) + int(record.touchdown_time != NEVER)
         if self.params.jumps > 1 and record.fall_time == NEVER and not record.forbidden:
             failure = series_failure(self.series, self.params, made) or failure
@@ -150,7 +204,7 @@ class JumpScore(KernelBlock):
             }
         if judged:
             values |= rest_metrics(record)
-        if self._planned:
+        if planned:
             values |= {
                 "planned_flight_time_s": float(record.planned_flight),
                 "planned_lift_off_speed_m_s": float(record.planned_speed),
@@ -159,3 +213,209 @@ class JumpScore(KernelBlock):
                 ),
             }
         return values
+
+
+@kernel
+def record_reference(
+    now: float, first: bool, reference: JumpReference, record: JumpRecord, series: JumpSeries
+) -> None:
+    """Record what the reference plans: its flight, its apex, and where the feet should be."""
+    feet, turn, height = record.planned_foot.shape[0], 0.0, reference.com[2]
+    record.planned_foot[:] = reference.foot_position[:, :2]
+    for foot in range(feet):
+        turn += reference.foot_yaw[foot]
+    record.planned_yaw = turn / feet
+    if first:
+        record.planned_start[:] = record.planned_foot
+        record.planned_yaw_start = record.planned_yaw
+        record.planned_standing = height
+        record.planned_apex = height
+        record.planned_speed_time = NEVER
+    record.planned_apex = max(record.planned_apex, height)
+    time, lift_off = reference.time, reference.lift_off_time
+    taken_off = lift_off - 1e-9 <= time < reference.touchdown_time
+    fresh = record.planned_speed_time == NEVER
+    if fresh or taken_off:  # from the middle of a flight on the reference names the next
+        record.planned_flight = reference.touchdown_time - lift_off
+    later = lift_off > series.planned_lift_off
+    if taken_off and (fresh or later):
+        series.planned_lift_off = lift_off
+        if not fresh:
+            record.planned_apex = height
+        record.planned_speed_time = now
+        # The plan's own ballistic flight takes it back to the planned instant.
+        record.planned_speed = reference.com_velocity[2] + GRAVITY * (time - lift_off)
+
+
+@kernel
+def begin_jump(truth: RobotTruth, record: JumpRecord) -> None:
+    """Begin the record of a jump in its first tick."""
+    record.unloaded_time = NEVER
+    record.lift_off_time = NEVER
+    record.touchdown_time = NEVER
+    record.planned_speed_time = NEVER
+    record.squat_height = truth.com[2]
+    record.apex_height = truth.com[2]
+    record.start_foot[:] = record.foot
+    record.start_direction[:] = record.direction
+
+
+@kernel
+def any_loaded(truth: RobotTruth) -> bool:
+    """Whether any contact point carries load."""
+    found = False
+    for point in range(truth.contact_touched.shape[0]):
+        found = found or bool(truth.contact_touched[point])
+    return found
+
+
+@kernel
+def record_flight(
+    truth: RobotTruth,
+    record: JumpRecord,
+    series: JumpSeries,
+    params: JumpCriteria,
+    constants: JumpConstants,
+    bounces: bool,
+) -> None:
+    """Lift-off, apex and touchdown, by the simulator's contacts.
+
+    ``bounces`` says that a foot off the ground would be no lift-off: it is between two jumps.
+    """
+    height, now, loaded = truth.com[2], record.now, any_loaded(truth)
+    if record.lift_off_time == NEVER:
+        record.squat_height = min(record.squat_height, height)
+        if loaded or bounces:
+            record.unloaded_time = NEVER
+            return
+        if record.unloaded_time == NEVER:
+            # Nothing touched during the whole of the tick before.
+            record.unloaded_time = max(0.0, now - constants.period)
+            record.unloaded_speed = record.vertical_speed if now > 0.0 else truth.com_velocity[2]
+            record.unloaded_momentum[:] = truth.angular_momentum
+            record.apex_height = height
+        if now - record.unloaded_time >= params.flight_confirmation - 1e-9:
+            record.lift_off_time = record.unloaded_time
+            record.lift_off_speed = record.unloaded_speed
+            record.lift_off_momentum[:] = record.unloaded_momentum
+            if series.made != 0:
+                keep_place(series)
+    elif record.touchdown_time == NEVER and loaded:
+        record.touchdown_time = now - constants.period
+        record.touchdown_speed = -record.vertical_speed
+        if series.made + 1 < params.jumps:  # more jumps must follow
+            record_jump(record, series, constants.planned)
+            record.peak_tilt = 0.0
+            return
+    if record.touchdown_time == NEVER:
+        record.apex_height = max(record.apex_height, height)
+
+
+@kernel
+def record_landing(
+    truth: RobotTruth,
+    record: JumpRecord,
+    params: JumpCriteria,
+    constants: JumpConstants,
+    scratch: RunEnd,
+) -> None:
+    """Peaks since touchdown, feet that slide or step, and the rest when its time comes."""
+    landed = record.now - record.touchdown_time
+    stay = landed >= params.slip_delay - 1e-9
+    record.peak_tilt = max(record.peak_tilt, tilt(truth.base_orientation))
+    record_feet(truth.contact_touched, record, params, constants, stay)
+    if record.steps != 0:
+        landed = min(landed, record.now - largest_of(record.step_end))
+    if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:
+        record_rest(truth, record, constants)
+        record.ground_low = truth.ground_height[0]
+        record.ground_high = truth.ground_height[0]
+        for point in range(1, truth.ground_height.shape[0]):
+            record.ground_low = min(record.ground_low, truth.ground_height[point])
+            record.ground_high = max(record.ground_high, truth.ground_height[point])
+    if landed >= params.rest_time + params.settle_time - 1e-9:
+        end_run(scratch, Ending.RESTED, landed)
+
+
+@kernel
+def record_row(
+    truth: RobotTruth,
+    record: JumpRecord,
+    series: JumpSeries,
+    params: JumpCriteria,
+    constants: JumpConstants,
+    scratch: RunEnd,
+) -> None:
+    """Between two jumps: where the feet stand, and whether another comes."""
+    if constants.planned and any_loaded(truth):
+        compare_place(record, series)
+    landed = record.now - series.landed_time
+    if record.lift_off_time == NEVER and landed >= params.rest_time - 1e-9:
+        end_run(scratch, Ending.ALONE, landed)
+
+
+@kernel
+def end_run(scratch: RunEnd, ending: int, landed: float) -> None:
+    """Ask for the end of the run, unless the same tick has asked for it already."""
+    if scratch.ending == Ending.NONE:
+        scratch.ending = ending
+        scratch.landed = landed
+
+
+@kernel
+def record_jump(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
+    """Record a jump of a row that has touched down, and prepare for the next lift-off.
+
+    ``planned`` says that there is a reference to compare the jump with.
+    """
+    made = series.made + 1
+    series.made = made
+    series.landed_time = record.touchdown_time
+    if made == 1:
+        series.flight_share = 1e9
+    if planned:
+        flight = record.touchdown_time - record.lift_off_time
+        share = flight / max(record.planned_flight, 1e-9)
+        if share < series.flight_share:
+            series.flight_share = share
+            series.flight_jump = made
+        speed = record.planned_speed
+        error = abs(record.lift_off_speed - speed) / max(abs(speed), 1e-9)
+        keep_worst(series.speed_error, series.speed_jump, error, made)
+        rise = record.planned_apex - record.planned_standing
+        error = abs(record.apex_height - record.standing_height - rise) / max(rise, 1e-9)
+        keep_worst(series.rise_error, series.rise_jump, error, made)
+    record.lift_off_time = NEVER
+    record.touchdown_time = NEVER
+    record.unloaded_time = NEVER
+
+
+@kernel
+def compare_place(record: JumpRecord, series: JumpSeries) -> None:
+    """How far the feet are from their planned positions and headings, between two jumps."""
+    x, y, feet = 0.0, 0.0, record.foot.shape[0]
+    for k in range(feet):
+        moved = record.foot[k, 0] - record.start_foot[k, 0]
+        x += (moved - (record.planned_foot[k, 0] - record.planned_start[k, 0])) / feet
+        moved = record.foot[k, 1] - record.start_foot[k, 1]
+        y += (moved - (record.planned_foot[k, 1] - record.planned_start[k, 1])) / feet
+    series.place_now = sqrt(x * x + y * y)
+    turn = record.planned_yaw - record.planned_yaw_start
+    error = abs(mean_turn(record.start_direction, record.direction) - turn)
+    # Half a turn to the left is the same as half a turn to the right.
+    series.turn_now = abs(error - 2.0 * pi) if error > pi else error
+
+
+@kernel
+def keep_place(series: JumpSeries) -> None:
+    """When the next jump lifts off: keep the last landing's error if it is the largest."""
+    keep_worst(series.place_error, series.place_jump, series.place_now, series.made)
+    keep_worst(series.turn_error, series.turn_jump, series.turn_now, series.made)
+
+
+@kernel
+def keep_worst(worst: Array0D, of_jump: Indices0D, error: float, jump: int) -> None:
+    """``error`` becomes the ``worst`` one if it is larger, and ``jump`` the number of its jump."""
+    if error > worst[()]:
+        worst[()] = error
+        of_jump[()] = jump

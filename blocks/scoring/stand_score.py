@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import degrees
-from typing import NamedTuple
 
-import numpy as np
-
-from ...mathematics.arrays import Array0D, Array1D, Indices0D, Indices1D
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
-from ...runtime.language.block import Input, Metric, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Metric, State
+from ...runtime.language.context import Clock
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
-from .footing import Footing
-from .stand_criteria import (
+from .footing import BallFeet, Footing
+from .standing import (
     NEVER,
+    StandConstants,
     StandCriteria,
     StandRecord,
     Verdict,
@@ -27,27 +23,16 @@ from .stand_criteria import (
     judge_machine,
     judge_rest,
     judge_safety,
+    judgement_metrics,
+    record_fall,
+    record_feet,
+    record_rest,
+    record_robot,
+    rest_metrics,
 )
-from .stand_following import (
-    Limits,
-    Stand,
-    Truth,
-    begin,
-    fields_of,
-    following_limits,
-    keep_largest,
-    keep_least,
-    note_fall,
-    note_feet,
-    note_machine,
-    note_rest,
-)
-from .stand_metrics import judgement_metrics, rest_metrics
 
 SETTLING = 0.15
 """A foot that has taken a step may settle for so long [s]."""
-_FELL, _JUDGED = 1, 2
-"""Why the end of the run is asked for."""
 
 
 class SquatRecord(StandRecord):
@@ -56,14 +41,6 @@ class SquatRecord(StandRecord):
     lowest_height = Field(unit="m", text="least height of the com so far")
     planned_standing = Field(unit="m", text="com height of the reference at the start")
     planned_lowest = Field(unit="m", text="least com height of the reference so far")
-
-
-class Squat(NamedTuple):
-    """The fields of ``SquatRecord`` beside those of ``StandRecord``."""
-
-    lowest_height: Array0D
-    planned_standing: Array0D
-    planned_lowest: Array0D
 
 
 class SquatCriteria(StandCriteria):
@@ -81,7 +58,7 @@ class SquatCriteria(StandCriteria):
     depth_tolerance: float = parameter(0.1, ge=0, text="of that depth, as a share of it")
 
 
-class StandScore(KernelBlock):
+class StandScore(Block):
     """Judges a robot that stands, squats or takes a push, and ends the run. No controller sees it.
 
     It is a success when all of these hold, which are those of a jump that concern standing;
@@ -104,38 +81,55 @@ class StandScore(KernelBlock):
     """
 
     Params = SquatCriteria
+    Constants = StandConstants
     needs = ("floating base", "feet")
     params: SquatCriteria
+    constants: StandConstants
     truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
     reference = Input(JumpReference, default={}, text="the planned squat, for its depth")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
     record = State(SquatRecord, text="everything the judgement needs")
 
     def setup(self) -> None:
-        """Group the contact points by foot, and bind what a tick needs."""
-        footing, truth, record = Footing(self.robot), self.truth, self.record
-        self._limits = self.params.for_robot(footing)
+        footing = Footing(self.robot)
+        self.balls = footing.ball_feet()
+        self._criteria = self.params.for_robot(footing)
         self._planned = "reference" in self.context.wired
-        clock, params = self.context.clock, self.params
-        self._ending = np.zeros(1, np.int64)
-        following = KernelCall(
-            follow_stand, clock.present, clock.base_period, fields_of(Truth, truth),
-            self.reference.com, self.wbc.failures, fields_of(Stand, record),
-            fields_of(Squat, record), following_limits(self._limits, footing, SETTLING, self.period),
-            params.settle_time, params.judge_time, self._ending,
-        )  # fmt: skip
-        self.kernel_calls = (
-            footing.measuring(
-                truth.contact_position, truth.base_orientation, record.foot, record.direction
-            ),
-            *footing.unrolling(truth.joint_position, truth.base_orientation, record.foot),
-            following,
-        )
-        self.event = self._ending
+        self.constants.fill(footing, self._criteria, SETTLING, self.period)
+
+    @kernel
+    @staticmethod
+    def step(
+        truth: RobotTruth,
+        reference: JumpReference,
+        wbc: WholeBodyCommand,
+        record: SquatRecord,
+        balls: BallFeet,
+        params: SquatCriteria,
+        constants: StandConstants,
+        clock: Clock,
+    ) -> bool:
+        now, height, planned = clock.base_period * clock.tick, truth.com[2], reference.com[2]
+        if record.ticks == 0:
+            record.lowest_height = height
+            record.planned_standing = planned
+            record.planned_lowest = planned
+        record_robot(now, truth, wbc, record, balls, constants)
+        fell = record_fall(truth, record, params, constants)
+        record.lowest_height = min(record.lowest_height, height)
+        record.planned_lowest = min(record.planned_lowest, planned)
+        settled = now >= params.settle_time - 1e-9
+        if settled:
+            record.peak_tilt = max(record.peak_tilt, tilt(truth.base_orientation))
+        record_feet(truth.contact_touched, record, params, constants, settled)
+        judged = record.judged_time == NEVER and now >= params.judge_time - 1e-9
+        if judged:
+            record_rest(truth, record, constants)
+        return fell or judged
 
     def on_event(self) -> None:
         """Ask for the end of the run."""
-        fell = self._ending[0] == _FELL
+        fell = self.record.fall_time == self.record.now
         self.request_stop("the robot fell" if fell else f"judged at {self.time:.2f} s")
 
     def metrics(self) -> Mapping[str, Metric]:
@@ -155,7 +149,7 @@ class StandScore(KernelBlock):
 
     def _judge(self) -> Iterator[Verdict]:
         """Every criterion, in the order in which a failure explains those behind it."""
-        r, c = self.record, self._limits
+        r, c = self.record, self._criteria
         yield from judge_safety(r, c)
         yield from judge_machine(r, c)
         yield (
@@ -176,48 +170,3 @@ class StandScore(KernelBlock):
                     f"{1e3 * target:.1f} mm"
                 ),
             )
-
-
-@kernel
-def follow_stand(
-    tick: Indices1D,
-    base_period: float,
-    truth: Truth,
-    planned_com: Array1D,
-    failures: Indices0D,
-    stand: Stand,
-    squat: Squat,
-    limits: Limits,
-    settle_time: float,
-    judge_time: float,
-    ending: Indices1D,
-) -> None:
-    """Follow a robot on its feet by one tick, once these have been measured.
-
-    Args:
-        tick: the present tick, (1,), each of ``base_period`` [s].
-        planned_com: the reference's [m], (3,).
-        failures: of the solver so far, without a dimension.
-        settle_time, judge_time: of ``SquatCriteria`` [s].
-        ending: becomes why the end of the run is asked for, or zero, (1,).
-    """
-    now, height, planned = base_period * tick[0], truth.com[2], planned_com[2]
-    stand.now[()] = now
-    if stand.ticks[()] == 0:
-        begin(stand, truth)
-        squat.lowest_height[()] = height
-        squat.planned_standing[()] = squat.planned_lowest[()] = planned
-    stand.ticks[()] = stand.ticks[()] + 1
-    note_machine(stand, truth)
-    stand.failures[()] = failures[()]
-    ending[0] = _FELL if note_fall(stand, truth, limits) else 0
-    keep_least(squat.lowest_height, height)
-    keep_least(squat.planned_lowest, planned)
-    settled = now >= settle_time - 1e-9
-    if settled:
-        keep_largest(stand.peak_tilt, tilt(truth.base_orientation))
-    note_feet(stand, truth.contact_touched, limits, settled)
-    if stand.judged_time[()] == NEVER and now >= judge_time - 1e-9:
-        note_rest(stand, truth, limits)
-        if ending[0] == 0:
-            ending[0] = _JUDGED

@@ -5,6 +5,7 @@ Units, frames and orders are those of the package ``signals``.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 from ...runtime.language.signals import Field, Signal
@@ -55,6 +56,50 @@ class DrivePhase(IntEnum):
     """They follow the commands."""
     DAMPED = 4
     """In damping, and until the end of the run."""
+
+
+HEALTHY = 0x80
+"""The error byte of a drive that has nothing to report: bit 7 is always set."""
+
+
+@dataclass(frozen=True)
+class DriveCondition:
+    """One bit of the error byte.
+
+    A warning passes by itself. With an error the actuator has switched its torque off.
+    """
+
+    bit: int
+    critical: bool
+    text: str
+
+
+CONDITIONS = (
+    DriveCondition(0, False, "it received a damaged packet"),
+    DriveCondition(1, False, "its winding is hotter than temp_limit_low"),
+    DriveCondition(2, True, "it cannot read its absolute position"),
+    DriveCondition(3, True, "its watchdog ran out, or the emergency stop is pressed"),
+    DriveCondition(4, True, "it is outside its position limits"),
+    DriveCondition(5, True, "its supply voltage is out of range, or its gate driver failed"),
+    DriveCondition(6, True, "its flash memory is corrupt"),
+)
+
+
+def drive_conditions(error_byte: int) -> tuple[DriveCondition, ...]:
+    """What an error byte reports; nothing where the actuator is healthy."""
+    return tuple(c for c in CONDITIONS if error_byte & 1 << c.bit)
+
+
+def is_critical(error_byte: int) -> bool:
+    """Whether the actuator has switched its torque off, or its reply is no reply at all."""
+    return not error_byte & HEALTHY or any(c.critical for c in drive_conditions(error_byte))
+
+
+def describe_conditions(error_byte: int) -> str:
+    """The conditions in words; empty where the actuator is healthy."""
+    if not error_byte & HEALTHY:
+        return f"its error byte is {error_byte:#04x}, whose highest bit should be set"
+    return "; ".join(c.text for c in drive_conditions(error_byte))
 
 
 class RobotHealth(Signal):

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from ...files.problems import LoadError
 from ...runtime.language.errors import AloftError, ExitCode, RunError
-from ...runtime.loading.problems import LoadError
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ...planner.library.library import PlanLibrary
     from ...planner.library.nearest_feasible import NearestFeasible
     from ...planner.task.files import PlanError
-    from ...planner.task.plan import JumpPlan
+    from ...planner.task.plan import PlannedJump
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
     from ...studies.batch.plan_grid import GridRow
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
 
 
-def print_plan(screen: Console, plan: JumpPlan, *, tests: bool = True) -> None:
+def print_plan(screen: Console, plan: PlannedJump, *, tests: bool = True) -> None:
     """Print what the recipe chose, what the plan does, how it was solved, and every test."""
     chosen = [
         (each["parameter"], _shown(each["value"]), each["why"])
@@ -79,7 +79,7 @@ def _shown(value: Any) -> str:
 
 
 def plan_json(
-    plan: JumpPlan, robot: RobotDescription, path: Path | None, kept: bool, reason: str
+    plan: PlannedJump, robot: RobotDescription, path: Path | None, kept: bool, reason: str
 ) -> dict[str, Any]:
     """A plan as an entry of the JSON output."""
     return {
@@ -182,7 +182,7 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
     return [(row.task.name, row.reason.partition("\n")[0]) for row in rows]
 
 
-def recorded_motion(plan: JumpPlan, robot: RobotDescription) -> RecordedMotion:
+def recorded_motion(plan: PlannedJump, robot: RobotDescription) -> RecordedMotion:
     """The plan as a motion with time series, with an instant about every 10 ms."""
     from ...logs.recording.motion_recording import RecordedMotion
     from ...planner.checking.evidence import Evidence
@@ -297,7 +297,7 @@ def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -
     """Compile before the workers start; otherwise each of them would compile the same functions."""
     from ...planner.solving.solve import make_problem
     from ...planner.task.files import PlanError
-    from ...planner.task.task import TaskError
+    from ...planner.task.task import JumpTaskError
 
     # In the plane and out of it there are other functions, and for every formulation.
     kinds = {(t.formulation, bool(t.distance_y or t.twist), t.impact): t for t in tasks}
@@ -309,5 +309,5 @@ def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -
         for task in kinds.values():
             try:
                 make_problem(task, library.robot, progress=progress)
-            except (PlanError, TaskError, ValueError):
+            except (PlanError, JumpTaskError, ValueError):
                 continue  # the task itself will say so

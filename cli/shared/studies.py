@@ -174,7 +174,7 @@ def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) 
 
 def print_tuned(screen: Console, study: Study, best: Mapping[str, Draw]) -> None:
     """Print the best draw of every arm."""
-    from ...runtime.loading.reading.nodes import text_of
+    from ...files.nodes import text_of
 
     assert study.tuning is not None
     cells = [

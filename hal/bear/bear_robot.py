@@ -16,7 +16,7 @@ from .configuration import Hardware, HardwareError
 from .driven_robot import DrivenRobot, DriveParameters, missing_sensors, read_hardware
 from .driver import DriveLaw, Driver
 from .motor_loop import CommandQueue, MotorThread
-from .watchdog import AlwaysHeld, DeadMansSwitch, Watchdog, open_switch, wait_until_held
+from .watchdog import AlwaysHeld, DeadMansSwitch, DriveWatchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""
@@ -102,7 +102,7 @@ class BearRobot(DrivenRobot):
         gains = joint_gains(self.params, self.robot)
         self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
         self._thread: MotorThread | None = None
-        self._watchdog: Watchdog | None = None
+        self._watchdog: DriveWatchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()
         self._queue: CommandQueue | None = None
         self._opened_at = self._cycle = 0.0
@@ -129,15 +129,20 @@ class BearRobot(DrivenRobot):
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
-                self._watchdog = Watchdog(descriptor, devices, params.graph_timeout, silence)
+                self._watchdog = DriveWatchdog(descriptor, devices, params.graph_timeout, silence)
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
-            age = min(params.command_age, self.context.clock.command_limit or params.command_age)
-            self._thread = MotorThread(driver.loop, age, self._stop_reason)
+            self._thread = MotorThread(driver.loop, self.oldest_command, self._stop_reason)
             self._thread.start()
         else:
             self._queue = CommandQueue(driver.loop, self.robot, params.latency, self.period)
+
+    @property
+    def oldest_command(self) -> float:
+        """The age of a command at which the drives are damped [s]: also that of a silent link."""
+        limit = self.context.clock.command_limit
+        return min(self.params.command_age, limit) if limit else self.params.command_age
 
     def now(self) -> float:
         """The time since ``open`` [s]: of the clock, or of the exchanges."""

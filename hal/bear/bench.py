@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
 from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware, MotorSettings
@@ -87,7 +87,7 @@ def calibrate(
         BusError: a drive is silent, is switched on, or moves.
     """
     wanted = np.zeros(len(robot.joints))
-    Transmission(robot).motor_motion(pose, wanted)
+    TransmissionMap(robot).motor_motion(pose, wanted)
     offsets: dict[str, float] = {}
     for k, name in enumerate(robot.transmission.motors):
         motor = hardware.motors[name]
@@ -156,7 +156,7 @@ def jog(
     bus.write(motor.id, {"torque_enable": Torque.OFF})
     reply = bus.ping(motor.id)
     if is_critical(reply.error_byte):
-        raise BusError(f"drive {name}: {describe(reply.error_byte)}")
+        raise BusError(f"drive {name}: {describe_conditions(reply.error_byte)}")
     start = motor.sign * bus.read(motor.id, "present_position")["present_position"] - motor.offset
     for end in (start, start + angle):
         if not motor.low <= end <= motor.high:
@@ -189,7 +189,7 @@ def jog(
                 raise BusError(f"drive {name} does not answer any more")
             condition = int(bulk.error_bytes.item(0))
             if is_critical(condition):
-                raise BusError(f"drive {name}: {describe(condition)}")
+                raise BusError(f"drive {name}: {describe_conditions(condition)}")
             if not next_cycle():
                 raise BusError("the dead man's switch was let go")
             yield goal, motor.sign * bulk.values.item(0) - motor.offset

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...blocks.signals.drive_conditions import HEALTHY
+from ...blocks.signals.robot import HEALTHY
 from .bus import BearBus, BusError, register_of
 from .protocol import BROADCAST, HEADER, LONGEST, Instruction, Register, checksum
 

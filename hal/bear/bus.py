@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...runtime.language.errors import AloftError
 from .protocol import (
     BROADCAST,
     CONFIG,
     STATUS,
-    Frame,
+    BusFrame,
     FrameReader,
     Instruction,
     Register,
@@ -69,7 +69,7 @@ class Reply:
     @property
     def problem(self) -> str:
         """What the error byte reports, in words."""
-        return describe(self.error_byte)
+        return describe_conditions(self.error_byte)
 
     @property
     def failed(self) -> bool:
@@ -138,11 +138,11 @@ class BearBus:
         """Give the port back."""
         self.port.close()
 
-    def overhear(self, received: bytes | bytearray | memoryview, own: bytes = b"") -> None:
+    def overhear(self, received: bytes | bytearray | memoryview, own: bytes | None = None) -> None:
         """Look for instructions among bytes that are no answers to a question of ours.
 
         An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data
-        of an instruction of ours, which some adapters send back.
+        of an instruction of ours, if one was sent: some adapters send it back.
         """
         for frame in self._listener.feed(received):
             if _is_instruction(frame) and frame.data != own:
@@ -265,14 +265,14 @@ class BearBus:
                     return Reply(device, frame.code, frame.data)
                 self.counts.stray += 1
 
-    def _read_frames(self, size: int) -> list[Frame]:
+    def _read_frames(self, size: int) -> list[BusFrame]:
         before = self._reader.damaged
         frames = self._reader.feed(self.port.read(size))
         self.counts.damaged += self._reader.damaged - before
         return frames
 
 
-def _is_instruction(frame: Frame) -> bool:
+def _is_instruction(frame: BusFrame) -> bool:
     """Whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a
     right checksum by chance."""
     size = len(frame.data)

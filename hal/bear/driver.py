@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ...blocks.signals import DrivePhase
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission, motor_gains
+from ...robots.transmission import TransmissionMap, motor_gains
 from ..drive_control import DriveGoals
 from .bus import BearBus, BusError, Reply, SerialPort
 from .configuration import Hardware
@@ -100,7 +100,7 @@ def clear_errors(bus: BearBus, hardware: Hardware) -> None:
             if not is_critical(condition):
                 break
         else:
-            raise BusError(f"drive {name} (address {motor.id}): {describe(condition)}")
+            raise BusError(f"drive {name} (address {motor.id}): {describe_conditions(condition)}")
 
 
 def configure(
@@ -247,7 +247,7 @@ class Driver:
         )
         self.loop = MotorLoop(robot, hardware, self.bus, self.board, law.goals, law.motor_stiffness)
         self._standing = np.zeros(len(names))
-        Transmission(robot).motor_motion(robot.standing_position, self._standing)
+        TransmissionMap(robot).motor_motion(robot.standing_position, self._standing)
 
     def connect(self) -> None:
         """Find all drives and the board, and measure once. Nothing is switched on.

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import ContactSwitches, ImuReading, JointState
-from ...blocks.signals.drive_conditions import describe, is_critical
+from ...blocks.signals.robot import describe_conditions, is_critical
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
 from ...runtime.language.signals import Signal
 from .bulk import BulkExchange
 from .configuration import Hardware
@@ -60,7 +60,7 @@ class Measurement:
         self.joint_torque = np.zeros(n)
         self.specific_force, self.angular_velocity = np.zeros(3), np.zeros(3)
         self.closed = np.zeros(len(robot.contacts), dtype=np.bool_)
-        self._transmission = Transmission(robot)
+        self._transmission = TransmissionMap(robot)
         self.sum, self.count = np.zeros(3), 0
         self.current_sum, self.exchanges = np.zeros(n), 0
         points = [contact.name for contact in robot.contacts]
@@ -229,7 +229,7 @@ class Supervision:
             return ""
         for k, condition in enumerate(bulk.error_bytes.tolist()):
             if is_critical(condition):
-                return f"{self._who[k]}: {describe(condition)}"
+                return f"{self._who[k]}: {describe_conditions(condition)}"
         voltage = _first_lasting(
             measured.voltage, settings.lowest_voltage, self.low, settings.bad_cycles, -1.0
         )

@@ -40,7 +40,7 @@ class Instruction(IntEnum):
 
 
 @dataclass(frozen=True)
-class Frame:
+class BusFrame:
     """One whole frame. ``code`` is the instruction, or the error byte of a reply."""
 
     device: int
@@ -94,7 +94,7 @@ class FrameReader:
         self.skipped += len(self._pending)
         self._pending.clear()
 
-    def feed(self, received: bytes | bytearray | memoryview) -> list[Frame]:
+    def feed(self, received: bytes | bytearray | memoryview) -> list[BusFrame]:
         """The frames that are whole with these bytes, in the order of their arrival."""
         pending = self._pending
         pending += received
@@ -115,7 +115,7 @@ class FrameReader:
                 self.skipped += 1
                 self.damaged += 1
                 continue
-            frames.append(Frame(device, pending[start + 4], bytes(pending[start + 5 : end - 1])))
+            frames.append(BusFrame(device, pending[start + 4], bytes(pending[start + 5 : end - 1])))
             start = end
         del pending[:start]
         return frames

@@ -30,7 +30,7 @@ def damping_frame(devices: list[int]) -> bytes:
     return frame_bytes(BROADCAST, Instruction.BULK, head + goals)
 
 
-class Watchdog:
+class DriveWatchdog:
     """A process that commands damping when ``beat`` was not called for ``limit`` seconds, when
     links have brought no commands for ``silence`` seconds, or when this process has died. It shares
     the open port, so no opening can fail then.

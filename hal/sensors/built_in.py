@@ -60,7 +60,7 @@ def sample_switches(
             drawn += 1
 
 
-class Switches(Sensor):
+class SwitchSensors(Sensor):
     """A switch in every contact point of the robot, or none at all. A switch has no numbers, so its
     errors are the spread of the force that closes it and how long it bounces."""
 

@@ -117,22 +117,21 @@ class FieldErrors:
         return [normal_call(self._noise_stream, self.arrays.draws)]
 
 
-class DelayLine(NamedTuple):
-    """Past samples of ``n`` numbers: a ring ``samples`` (slots, n), of which slot ``taken % slots`` is
-    written next (``taken`` (1,)), and how many samples each number is late, ``delay`` (n,)."""
-
-    samples: Array2D
-    taken: Indices1D
-    delay: Indices1D
-
-
 @kernel
-def delay_sample(sample: Array1D, line: DelayLine, reading: Array1D) -> None:
-    """Put a ``sample`` (n,) into the line, and write the ``reading`` (n,) that is late; before the
-    first samples there was what the first one says."""
-    slots, count = line.samples.shape[0], line.taken[0]
+def delay_sample(
+    sample: Array1D, ring: Array2D, taken: Indices1D, delay: Indices1D, reading: Array1D
+) -> None:
+    """Put a ``sample`` (n,) into a ring of past ones, and write the ``reading`` (n,) that is late; before
+    the first samples there was what the first one says.
+
+    Args:
+        ring: past samples, (slots, n), of which slot ``taken % slots`` is written next.
+        taken: how many samples were taken, (1,).
+        delay: how many samples each number is late, (n,).
+    """
+    slots, count = ring.shape[0], taken[0]
+    ring[count % slots, :] = sample
     for k in range(sample.shape[0]):
-        line.samples[count % slots, k] = sample[k]
-        late = min(line.delay[k], count)
-        reading[k] = line.samples[(count - late) % slots, k]
-    line.taken[0] = count + 1
+        late = min(delay[k], count)
+        reading[k] = ring[(count - late) % slots, k]
+    taken[0] = count + 1

@@ -11,7 +11,7 @@ from ...blocks.signals import RobotTruth
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.steps import as_record
+from ...runtime.language.steps import signal_call
 
 if TYPE_CHECKING:
     from mujoco import MjData
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
 @kernel
 def report_fixed(truth: RobotTruth) -> None:
     """The pose and velocity of a base at the world's origin."""
-    for axis in range(3):
-        truth.base_position[axis] = truth.base_orientation[axis] = 0.0
-        truth.base_linear_velocity[axis] = truth.base_angular_velocity[axis] = 0.0
+    truth.base_position[:] = 0.0
+    truth.base_orientation[:] = 0.0
     truth.base_orientation[3] = 1.0
+    truth.base_linear_velocity[:] = 0.0
+    truth.base_angular_velocity[:] = 0.0
 
 
 @kernel
-def report_planar(position: Array, velocity: Array, truth: RobotTruth) -> None:
+def report_planar(position: Array1D, velocity: Array1D, truth: RobotTruth) -> None:
     """The pose and velocity of a base whose coordinates in the simulator are x, z and the pitch."""
-    half = 0.5 * float(position[2])
+    half = 0.5 * position[2]
     report_fixed(truth)
-    truth.base_position[0], truth.base_position[2] = float(position[0]), float(position[1])
+    truth.base_position[0], truth.base_position[2] = position[0], position[1]
     truth.base_orientation[1], truth.base_orientation[3] = math.sin(half), math.cos(half)
-    truth.base_linear_velocity[0] = float(velocity[0])
-    truth.base_linear_velocity[2] = float(velocity[1])
-    truth.base_angular_velocity[1] = float(velocity[2])
+    truth.base_linear_velocity[0], truth.base_linear_velocity[2] = velocity[0], velocity[1]
+    truth.base_angular_velocity[1] = velocity[2]
 
 
 @kernel
@@ -50,7 +50,7 @@ def report_floating(position: Array1D, velocity: Array1D, truth: RobotTruth) -> 
 
 
 @kernel
-def read_pitch_rate(velocity: Array, rate: Array) -> None:
+def read_pitch_rate(velocity: Array1D, rate: Array1D) -> None:
     """The angular velocity (3,) [rad/s, body] of a planar base, from the simulator's velocities."""
     rate[1] = velocity[2]
 
@@ -92,7 +92,7 @@ class FixedBase:
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
-        return KernelCall(report_fixed, as_record(truth))
+        return signal_call(report_fixed, truth)
 
 
 class PlanarBase(FixedBase):
@@ -134,8 +134,7 @@ class PlanarBase(FixedBase):
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
-        data = self._data
-        return KernelCall(report_planar, data.qpos, data.qvel, as_record(truth))
+        return signal_call(report_planar, self._data.qpos, self._data.qvel, truth)
 
 
 class FloatingBase(FixedBase):
@@ -173,8 +172,7 @@ class FloatingBase(FixedBase):
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
         """Writes the base's pose and velocity."""
-        data = self._data
-        return KernelCall(report_floating, data.qpos, data.qvel, as_record(truth))
+        return signal_call(report_floating, self._data.qpos, self._data.qvel, truth)
 
 
 BASES: dict[Literal["floating", "planar", "fixed"], type[FixedBase]] = {

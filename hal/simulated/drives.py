@@ -21,19 +21,17 @@ from ...mathematics.arrays import (
     Counts,
     Flags1D,
     Indices0D,
-    Indices1D,
 )
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
-from ...runtime.language.steps import as_record
-from ..drive_control import Targets
+from ...runtime.language.steps import signal_call
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops
 from .state import DriveState, TickRecord, update_maximum, update_minimum
 
 
-class Motors(NamedTuple):
+class DriveTrain(NamedTuple):
     """What the motors of a robot can do, and how they move its joints.
 
     ``joint_to_motor``, ``torque_to_motor`` and ``motor_to_torque``, each (n, n), map joint
@@ -126,7 +124,11 @@ def clip_joint_torque(
 
 @kernel
 def drive_motors(
-    velocity: Array1D, torque: Array1D, motors: Motors, scratch: MotorScratch, record: TickRecord
+    velocity: Array1D,
+    torque: Array1D,
+    motors: DriveTrain,
+    scratch: MotorScratch,
+    record: TickRecord,
 ) -> None:
     """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
     the motors come to their limits. Of what is not a number the record says so too."""
@@ -151,19 +153,6 @@ def drive_motors(
         record.joint_torque[k] += torque[k]
 
 
-_ACTIVE, _DAMPING = int(CommandMode.ACTIVE), int(CommandMode.DAMPING)
-
-
-class CommandRing(NamedTuple):
-    """A ring of commands, of which one is active and some are on their way: see ``DriveState``."""
-
-    active: Indices0D
-    pending: Indices0D
-    due: Indices1D
-    mode: Indices1D
-    targets: Targets
-
-
 class Joints(NamedTuple):
     """What the drives of all joints read and give in a physics step: the count of the step, without a
     dimension, whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
@@ -177,13 +166,13 @@ class Joints(NamedTuple):
 
 
 @kernel
-def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) -> None:
+def follow_commands(commands: DriveState, released: Array1D, joints: Joints) -> None:
     """Let the commands act that are due, and write the joint torques that the active one asks for.
 
     Args:
         released: the damping in the damping mode [N m s/rad], (n_joints,).
     """
-    active, pending = commands.active[()], commands.pending[()]
+    active, pending = commands.active, commands.pending
     joints.arrived[0] = False
     while pending > 0:
         following = (active + 1) % commands.due.shape[0]
@@ -191,28 +180,27 @@ def follow_commands(commands: CommandRing, released: Array1D, joints: Joints) ->
             break
         active, pending = following, pending - 1
         joints.arrived[0] = True
-    commands.active[()] = active
-    commands.pending[()] = pending
+    commands.active = active
+    commands.pending = pending
     mode = commands.mode[active]
-    if mode == _ACTIVE:
+    if mode == CommandMode.ACTIVE:
         joint_feedback_torque(
-            commands.targets.torque[active], commands.targets.stiffness[active],
-            commands.targets.damping[active], commands.targets.position[active],
-            commands.targets.velocity[active], joints.position, joints.velocity, joints.torque,
+            commands.torque[active], commands.stiffness[active], commands.damping[active],
+            commands.position[active], commands.velocity[active], joints.position,
+            joints.velocity, joints.torque,
         )  # fmt: skip
-        return
-    for k in range(joints.torque.shape[0]):
-        joints.torque[k] = joints.velocity[k] * -released[k]
-        if mode != _DAMPING:
-            joints.torque[k] = 0.0
+    elif mode == CommandMode.DAMPING:
+        joints.torque[:] = joints.velocity * -released
+    else:
+        joints.torque[:] = 0.0
 
 
 @kernel
 def drive_joints(
-    commands: CommandRing,
+    commands: DriveState,
     released: Array1D,
     joints: Joints,
-    motors: Motors,
+    motors: DriveTrain,
     scratch: MotorScratch,
     record: TickRecord,
 ) -> None:
@@ -223,21 +211,21 @@ def drive_joints(
 
 @kernel
 def drive_loops(
-    commands: CommandRing,
+    commands: DriveState,
     released: Array1D,
     loops: MotorLoops,
     joints: Joints,
-    motors: Motors,
+    motors: DriveTrain,
     scratch: MotorScratch,
     record: TickRecord,
 ) -> None:
     """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
     follow_commands(commands, released, joints)
-    active = int(commands.active[()])
-    if commands.mode[active] == _ACTIVE:
+    active = commands.active
+    if commands.mode[active] == CommandMode.ACTIVE:
         close_loops(
-            loops, commands.targets, active, bool(joints.arrived[0]), joints.position,
-            joints.velocity, joints.torque,
+            loops, commands, active, joints.arrived[0], joints.position, joints.velocity,
+            joints.torque,
         )  # fmt: skip
     drive_motors(joints.velocity, joints.torque, motors, scratch, record)
 
@@ -254,34 +242,25 @@ class CommandLatency(NamedTuple):
 
 @kernel
 def send_command(
-    command: JointCommand,
-    step: Indices0D,
-    latency: CommandLatency,
-    commands: CommandRing,
-    last_due: Indices0D,
+    command: JointCommand, step: Indices0D, latency: CommandLatency, commands: DriveState
 ) -> None:
-    """Put a command into the ring, behind those that have not arrived.
-
-    ``step`` and ``last_due``, the arrival of the command sent last, have no dimension.
-    """
+    """Put a command into the ring in the physics step ``step``, a count without a dimension. It arrives
+    as late as its ``latency`` is long, but not before earlier commands."""
     delay = latency.minimum[0]
     if latency.jitter != 0.0:
         delay += latency.jitter * latency.draw[0]
     due = step[()] + math.ceil(delay / latency.timestep - 1e-9)
-    due = max(due, last_due[()])
-    pending = commands.pending[()]
-    slot = (commands.active[()] + 1 + pending) % commands.due.shape[0]
-    targets = commands.targets
-    commands.mode[slot] = command.mode[()]
-    for k in range(command.torque.shape[0]):
-        targets.torque[slot, k] = command.torque[k]
-        targets.position[slot, k] = command.position[k]
-        targets.velocity[slot, k] = command.velocity[k]
-        targets.stiffness[slot, k] = command.stiffness[k]
-        targets.damping[slot, k] = command.damping[k]
+    due = max(due, commands.last_due)
+    slot = (commands.active + 1 + commands.pending) % commands.due.shape[0]
+    commands.mode[slot] = command.mode
+    commands.torque[slot, :] = command.torque
+    commands.position[slot, :] = command.position
+    commands.velocity[slot, :] = command.velocity
+    commands.stiffness[slot, :] = command.stiffness
+    commands.damping[slot, :] = command.damping
     commands.due[slot] = due
-    last_due[()] = due
-    commands.pending[()] = pending + 1
+    commands.last_due = due
+    commands.pending += 1
 
 
 class MotorLimits:
@@ -290,7 +269,7 @@ class MotorLimits:
 
     def __init__(self, robot: RobotDescription, record: TickRecord) -> None:
         motors = robot.motors
-        self.motors = Motors(
+        self.motors = DriveTrain(
             np.ascontiguousarray(robot.joint_to_motor),
             np.ascontiguousarray(robot.torque_to_motor),
             np.ascontiguousarray(robot.joint_to_motor.T),
@@ -300,12 +279,12 @@ class MotorLimits:
         )
         n = len(robot.joints)
         self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
-        self.record = as_record(record)
+        self.record = record
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""
 
 
-class Drives:
+class SimulatedDrives:
     """Turns commands into joint torques at the physics rate, because drives close their own loops.
 
     A command takes effect at the first physics step at or after its arrival and stays in effect
@@ -331,10 +310,6 @@ class Drives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
-        self._commands = CommandRing(
-            state.active, state.pending, state.due, state.mode,
-            Targets(*(getattr(state, name) for name in Targets._fields)),
-        )  # fmt: skip
         self._damping = damping
         self._motors = limits.motors, limits.scratch, limits.record
 
@@ -347,10 +322,10 @@ class Drives:
             velocity: the joint velocity [rad/s], (n_joints,).
         """
         joints = Joints(step, np.zeros(1, np.bool_), position, velocity, out)
-        first = self._commands, self._damping
+        first = self._state, self._damping
         if self._feedback is None:
-            return KernelCall(drive_joints, *first, joints, *self._motors)
-        return KernelCall(drive_loops, *first, self._feedback.loops, joints, *self._motors)
+            return signal_call(drive_joints, *first, joints, *self._motors)
+        return signal_call(drive_loops, *first, self._feedback.loops, joints, *self._motors)
 
     def hold(self, position: Array, torque: Array, stiffness: Array, damping: Array) -> None:
         """Drop all commands and from now on hold the joints at a position with these gains.
@@ -378,8 +353,5 @@ class Drives:
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
     def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
-        """Sends a command in the physics step ``step``, a count without a dimension. It arrives as
-        late as its ``latency`` is long, but not before earlier commands."""
-        return KernelCall(
-            send_command, as_record(command), step, latency, self._commands, self._state.last_due
-        )
+        """Sends a command in the physics step ``step``, a count without a dimension."""
+        return signal_call(send_command, command, step, latency, self._state)

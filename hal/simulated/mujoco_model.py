@@ -36,12 +36,12 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
+from ...runtime.language.terrain import Terrain
 from ..random_streams import Purpose, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .geared_rotors import shared_motors, unsupported_motor
-from .scenes import Scene
 from .simulated_robot import SimulatorParameters
+from .unsupported import shared_motors, unsupported_motor
 
 if TYPE_CHECKING:
     from mujoco import MjModel, MjSpec
@@ -71,7 +71,7 @@ class Variation:
 def build_mujoco_model(
     robot: RobotDescription,
     *,
-    scene: Scene | None = None,
+    scene: Terrain | None = None,
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjModel:
@@ -96,7 +96,7 @@ def build_mujoco_model(
 def mujoco_spec(
     robot: RobotDescription,
     *,
-    scene: Scene | None = None,
+    scene: Terrain | None = None,
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjSpec:
@@ -118,7 +118,7 @@ def mujoco_spec(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
-    _add_ground(spec, scene or Scene(), variation)
+    _add_ground(spec, scene or Terrain(), variation)
     _add_robot(spec, robot, variation)
     _add_mounted_sensors(spec, robot)
     _add_sensors(spec, robot)
@@ -162,7 +162,7 @@ def _surface(variation: Variation) -> dict[str, Any]:
     }
 
 
-def _add_ground(spec: MjSpec, scene: Scene, variation: Variation) -> None:
+def _add_ground(spec: MjSpec, scene: Terrain, variation: Variation) -> None:
     import mujoco
 
     surface = {**_surface(variation), "contype": GROUND_BIT, "conaffinity": 0}
@@ -170,9 +170,8 @@ def _add_ground(spec: MjSpec, scene: Scene, variation: Variation) -> None:
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1], pos=[0, 0, scene.floor],
         **surface,
     )  # fmt: skip
-    for k, box in enumerate(scene.boxes):
-        low = np.array([box.x[0], box.y[0], box.bottom])
-        high = np.array([box.x[1], box.y[1], box.top])
+    for k, block in enumerate(scene.blocks):
+        low, high = np.array(block.least), np.array(block.most)
         spec.worldbody.add_geom(
             name=f"box/{k}", type=mujoco.mjtGeom.mjGEOM_BOX, size=(high - low) / 2,
             pos=(high + low) / 2, **surface,
@@ -345,7 +344,7 @@ class _CachedModel(NamedTuple):
     """A model that has been built, and what it was built from."""
 
     robot: RobotDescription
-    scene: Scene
+    scene: Terrain
     timestep: float
     variation: Variation
     model: MjModel

@@ -13,11 +13,10 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, Misfit, State
 from ...runtime.language.parameters import Parameters
 from ..drive_control import gain_misfits, lost_gains
-from .geared_rotors import unsupported_motor
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters
-from .stance import uneven_contacts
 from .state import DriveState, TickRecord
+from .unsupported import uneven_contacts, unsupported_motor
 
 
 class MujocoRobot(SimulatedRobot):
@@ -156,7 +155,7 @@ class MujocoRobot(SimulatedRobot):
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
         from ..random_streams import Purpose, uniform_call
-        from .drives import CommandLatency, Drives
+        from .drives import CommandLatency, SimulatedDrives
         from .plant import Plant
         from .stance import RELEASED
 
@@ -173,7 +172,7 @@ class MujocoRobot(SimulatedRobot):
         if params.bus_period is not None:
             exchange = round(params.bus_period / params.timestep)
             feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
-        drives = self._drives = Drives(robot, damping, self.drives, self.record, feedback)
+        drives = self._drives = SimulatedDrives(robot, damping, self.drives, self.record, feedback)
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
             *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),

@@ -31,7 +31,7 @@ from ...mathematics.compiling.library_call import LibraryCall, address_of
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
-from ...runtime.language.steps import as_record
+from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
@@ -235,7 +235,7 @@ class Plant:
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
-        self.clearing = KernelCall(clear, as_record(record))
+        self.clearing = signal_call(clear, record)
         self.start_delay = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -265,11 +265,10 @@ class Plant:
         first = model.nsensordata - 4 * len(self._robot.contacts)
         load = data.sensordata[first:].reshape(-1, 4)
         self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
-        record, sensors = self.record, self.sensors
-        self._note = KernelCall(
+        sensors = self.sensors
+        self._note = signal_call(
             record_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
-            *self._limits, sensors.ground_force, sensors.bounce_steps,
-            as_record(record),
+            *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
         )  # fmt: skip
         self._encoding = KernelCall(
             read_encoders, self.position, sensors.encoder_offset, self._encoder

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
+from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Misfit, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -22,6 +23,23 @@ class PushState(Signal):
     stood = Field(dtype="bool", text="whether the robot has touched the ground")
     waiting = Field(dtype="int64", text="ticks since the trigger")
     pushed = Field(unit="s", text="how long the push has lasted so far")
+
+
+@kernel
+def ticks_since_trigger(at_start: bool, truth: RobotTruth, progress: PushState) -> int:
+    """The ticks since the trigger, up to now; negative before the trigger."""
+    if at_start:
+        progress.waiting = progress.waiting + 1
+        return int(progress.waiting - 1)
+    for point in range(truth.contact_touched.shape[0]):
+        if truth.contact_touched[point]:
+            progress.stood = True
+            progress.waiting = 0
+            return -1
+    if not progress.stood:
+        return -1
+    progress.waiting = progress.waiting + 1
+    return int(progress.waiting)
 
 
 class Push(Block):
@@ -55,8 +73,13 @@ class Push(Block):
         delay: float = live_parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
         point: str = parameter("torso_com", text="a named point of the robot's description")
 
+    class Constants(Signal):
+        force = Field(3, unit="N", frame="world", text="the force while it lasts")
+        point = Field(dtype="int64", text="index of the point it acts at")
+
     needs = ("robot",)
     params: Params
+    constants: Constants
     truth = Input(RobotTruth, reads_truth=True, text="whether the robot is in the air")
     push = Output(ExternalForce, text="the force; it is zero except during the push")
     progress = State(PushState, text="the progress of the push")
@@ -76,45 +99,30 @@ class Push(Block):
                 fix=f"point: {near[0]}" if near else "",
             )
 
-    def setup(self) -> None:
+    def prepare(self) -> None:
         """Find the point and compute the force."""
-        self._point = list(self.robot.points).index(self.params.point)
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
-        """Compute the force from its parameters."""
-        params = self.params
+        params, constants = self.params, self.constants
         flat, force = math.cos(params.elevation), params.force
         if params.speed_change is not None:
             force = self.robot.total_mass * params.speed_change / params.duration
         direction = [flat * math.cos(params.angle), flat * math.sin(params.angle)]
-        self._force = force * np.array([*direction, math.sin(params.elevation)])
+        constants.force[:] = force * np.array([*direction, math.sin(params.elevation)])
+        constants.point = list(self.robot.points).index(params.point)
 
-    def step(self) -> None:
+    @kernel
+    @staticmethod
+    def step(
+        truth: RobotTruth, push: ExternalForce, progress: PushState, params: Params,
+        constants: Constants, period: float,
+    ) -> None:  # fmt: skip
         """Wait for the trigger, then for the delay, then push."""
-        progress, out, period = self.progress, self.push, self.period
-        out.point[()] = self._point
-        out.force.fill(0.0)
-        remaining = self.params.duration - float(progress.pushed)
+        push.point = constants.point
+        push.force[:] = 0.0
+        remaining = params.duration - progress.pushed
         if remaining <= 1e-9 * period:
             return
-        waited = self._waited() * period
-        if progress.pushed > 0.0 or waited >= self.params.delay - 1e-9:
+        ticks = ticks_since_trigger(params.trigger == "start", truth, progress)
+        if progress.pushed > 0.0 or ticks * period >= params.delay - 1e-9:
             share = min(1.0, remaining / period)
-            np.multiply(self._force, share, out=out.force)
-            progress.pushed += share * period
-
-    def _waited(self) -> int:
-        """The ticks since the trigger, up to now; negative before the trigger."""
-        progress = self.progress
-        if self.params.trigger == "start":
-            progress.waiting += 1
-            return int(progress.waiting) - 1
-        if any(self.truth.contact_touched.tolist()):
-            progress.stood[()] = True
-            progress.waiting[()] = 0
-            return -1
-        if not progress.stood:
-            return -1
-        progress.waiting += 1
-        return int(progress.waiting)
+            push.force[:] = constants.force * share
+            progress.pushed = progress.pushed + share * period

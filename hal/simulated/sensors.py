@@ -17,9 +17,9 @@ from ...robots.description import RobotDescription
 from ...robots.robot_description import MountedSensorPart
 from ...runtime.language.signals import Signal
 from ..random_streams import Purpose, RandomStreams, sensor_stream, stream
-from ..sensors.built_in import JointSensors, Switches
+from ..sensors.built_in import JointSensors, SwitchSensors
 from ..sensors.imu import Imu
-from ..sensors.noise import DelayLine, FieldErrors, NoiseModel, delay_sample
+from ..sensors.noise import FieldErrors, NoiseModel, delay_sample
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from .simulated_robot import SimulatorParameters
 from .state import SensorMemory, TickRecord
@@ -103,7 +103,7 @@ class SimulatedSensor:
             bias = sensor_stream(params.seed, sensor.name, 2 * k)
             errors = FieldErrors(noise, sensor.sizes[name], bias, streams.of_field(sensor.name, k))
             self._errors.append((part, errors))
-        self._line = DelayLine(samples.reshape(-1, size), count, delay)
+        self._past = samples.reshape(-1, size), count, delay
         self.after_step: list[Call] = [
             *sensor.from_mujoco(model, data, true_values),
             KernelCall(accumulate, now, self._averaged, total, steps),
@@ -126,7 +126,7 @@ class SimulatedSensor:
         for part, errors in self._errors:
             calls += errors.calls(self._true[part], self._erred[part])
         late = np.zeros(len(self._erred))
-        calls.append(KernelCall(delay_sample, self._erred, self._line, late))
+        calls.append(KernelCall(delay_sample, self._erred, *self._past, late))
         for (part, _), (_, view) in zip(self._errors, out, strict=True):
             calls.append(KernelCall(copy_numbers, late[part], view.reshape(-1)))
         return calls
@@ -181,7 +181,7 @@ class SimulatedSensors:
         }
         self.encoder_offset = self._joint_errors["position"].bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
-        self.switch_threshold = Switches.draw_thresholds(
+        self.switch_threshold = SwitchSensors.draw_thresholds(
             params.switch_threshold, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
         )
         """The force that closes every switch [N]."""
@@ -240,7 +240,7 @@ class SimulatedSensors:
     def reading_switches(self, step: Counts, record: TickRecord, closed: Flags) -> list[Call]:
         """Write a sample of the switches, (n_contacts,); without switches none is closed. ``step`` is a
         count without a dimension."""
-        return Switches.calls(
+        return SwitchSensors.calls(
             self._has_switches, bool(self.bounce_steps), step, record.closed, record.bounce_end,
             self._streams[Purpose.BOUNCE], closed,
         )  # fmt: skip

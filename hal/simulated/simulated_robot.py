@@ -143,7 +143,7 @@ class SimulatorParameters(DriveGains):
                 raise ValueError(f"{name} must be two positive numbers in rising order: {value}")
         return self
 
-    def build_scene(self) -> scenes.Scene:
+    def build_scene(self) -> Terrain:
         """The ground these parameters describe."""
         if isinstance(self.scene, scenes.SceneParameters):
             return self.scene.build()
@@ -175,7 +175,7 @@ class SimulatedRobot(Robot, ABC):
     def terrain(cls, params: Parameters) -> Terrain | None:
         """The scene's floor and boxes."""
         assert isinstance(params, SimulatorParameters)
-        return params.build_scene().terrain()
+        return params.build_scene()
 
     @classmethod
     def local_dimensions(

@@ -21,13 +21,12 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
 from .base import BASES, FixedBase
+from .unsupported import uneven_contacts
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 
-UNEVEN = 0.002
-"""The largest difference in height of contact points in the standing pose [m]."""
 _SINGULAR = 1e-12
 _DAMPING = 1e-8
 
@@ -93,24 +92,6 @@ def place_standing(
             "they are in the standing pose; legs of fewer than five joints cannot take up any "
             "attitude: set initial_attitude_error to 0"
         )
-
-
-def uneven_contacts(robot: RobotDescription) -> str:
-    """A text that says which contact points are above the lowest one in the standing pose, so that
-    the robot cannot stand on level ground; empty if all are at one height."""
-    heights = standing_heights(robot)
-    above = heights - heights.min(initial=np.inf)
-    if float(above.max(initial=0.0)) <= UNEVEN:
-        return ""
-    found = [
-        f"{contact.name} by {1e3 * height:.0f} mm"
-        for contact, height in zip(robot.contacts, above.tolist(), strict=True)
-        if height > UNEVEN
-    ]
-    return (
-        f"{robot.name} cannot stand on level ground: in its standing pose these contact points are "
-        f"above the lowest one: {', '.join(found)}"
-    )
 
 
 def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> Array:

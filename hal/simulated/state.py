@@ -15,6 +15,7 @@ from ...mathematics.arrays import (
 )
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal
+from ..drive_control import CommandTargets
 
 
 class PhysicsState(Signal):
@@ -28,7 +29,7 @@ class PhysicsState(Signal):
     random = Field("n_random", dtype="int64", text="the state of the random streams")
 
 
-class DriveState(Signal):
+class DriveState(CommandTargets):
     """The drives' commands: a ring of ``n_queue`` slots for the active one and those to arrive."""
 
     active = Field(dtype="int64", text="slot of the command being executed")
@@ -36,11 +37,6 @@ class DriveState(Signal):
     last_due = Field(dtype="int64", text="arrival of the command sent last; arrivals keep order")
     due = Field("n_queue", dtype="int64", text="physics step at which each arrives")
     mode = Field("n_queue", dtype="int64", text="see CommandMode")
-    torque = Field(("n_queue", "n_joints"), unit="N m", text="feedforward joint torques")
-    position = Field(("n_queue", "n_joints"), unit="rad", text="joint angle targets")
-    velocity = Field(("n_queue", "n_joints"), unit="rad/s", text="joint velocity targets")
-    stiffness = Field(("n_queue", "n_joints"), unit="N m/rad", text="gains on position")
-    damping = Field(("n_queue", "n_joints"), unit="N m s/rad", text="gains on velocity")
 
 
 class TickRecord(Signal):

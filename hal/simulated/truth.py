@@ -17,9 +17,9 @@ from ...mathematics.arrays import (
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.steps import as_record
+from ...runtime.language.steps import signal_call
+from ...runtime.language.terrain import Terrain
 from .base import FixedBase
-from .scenes import Scene
 from .stance import depth_of_contacts
 from .state import TickRecord
 
@@ -51,13 +51,13 @@ class TrueState(NamedTuple):
 
 @kernel
 def height_of_ground(floor: Array1D, boxes: Array2D, x: float, y: float) -> float:
-    """The height [m, world] of the highest surface at a place: as ``Scene.ground_height``."""
-    height = float(floor[0])
+    """The height [m, world] of the highest surface at a place: as ``Terrain.height``."""
+    height = floor[0]
     for box in range(boxes.shape[0]):
         inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
         if boxes[box, 4] > height and inside:
-            height = float(boxes[box, 4])
-    return height
+            height = boxes[box, 4]
+    return float(height)
 
 
 @kernel
@@ -121,11 +121,14 @@ class TruthReport:
         data: MjData,
         base: FixedBase,
         robot: RobotDescription,
-        scene: Scene,
+        scene: Terrain,
         record: TickRecord,
     ) -> None:
         self._base = base
-        boxes = [(*box.x, *box.y, box.top) for box in scene.boxes]
+        boxes = [
+            (low[0], high[0], low[1], high[1], high[2])
+            for low, high in ((block.least, block.most) for block in scene.blocks)
+        ]
         self._instant = TrueState(
             data.qpos[base.positions :],
             data.qvel[base.velocities :],
@@ -138,11 +141,11 @@ class TruthReport:
             np.array([scene.floor]),
             np.array(boxes, dtype=np.float64).reshape(-1, 5),
         )
-        self._peaks = as_record(record)
+        self._record = record
 
     def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
         return (
             self._base.publishing(truth),
-            KernelCall(report_truth, self._instant, self._peaks, as_record(truth)),
+            signal_call(report_truth, self._instant, self._record, truth),
         )

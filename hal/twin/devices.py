@@ -10,13 +10,13 @@ from functools import lru_cache
 import numpy as np
 
 from ...blocks.signals import ImuReading
-from ...blocks.signals.drive_conditions import HEALTHY
+from ...blocks.signals.robot import HEALTHY
 from ...robots.robot_description import MountedSensorPart
 from ..bear.protocol import (
     BROADCAST,
     CONFIG,
     STATUS,
-    Frame,
+    BusFrame,
     FrameReader,
     Instruction,
     Mode,
@@ -132,7 +132,7 @@ class EmulatedActuator:
         if self.driving and not low <= position <= high and self.config["mode"] == Mode.POSITION:
             self.fail(LIMIT)
 
-    def answer(self, frame: Frame) -> bytes | None:
+    def answer(self, frame: BusFrame) -> bytes | None:
         """The data of the answer to an instruction for this actuator; ``None`` if it is silent."""
         data = frame.data
         match frame.code:
@@ -223,7 +223,7 @@ class EmulatedActuator:
             self.status["torque_enable"] = wanted
 
 
-Fault = Callable[[int, bytes], bytes]
+AnswerFault = Callable[[int, bytes], bytes]
 """Takes an answer's device and bytes, and returns the bytes that really travel."""
 
 
@@ -243,7 +243,9 @@ class EmulatedBus:
         fault: what happens to every answer on its way.
     """
 
-    def __init__(self, actuators: Iterable[EmulatedActuator], fault: Fault = unchanged) -> None:
+    def __init__(
+        self, actuators: Iterable[EmulatedActuator], fault: AnswerFault = unchanged
+    ) -> None:
         self.actuators = {actuator.device: actuator for actuator in actuators}
         self.fault = fault
         self._reader = FrameReader()
@@ -257,7 +259,7 @@ class EmulatedBus:
                 actuator.garble()
         return b"".join(self._answer(frame) for frame in frames)
 
-    def _answer(self, frame: Frame) -> bytes:
+    def _answer(self, frame: BusFrame) -> bytes:
         if frame.device == BROADCAST:
             return self._bulk(frame.data) if frame.code == Instruction.BULK else b""
         actuator = self.actuators.get(frame.device)

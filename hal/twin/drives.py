@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.robot_description import RobotDescription
-from ...robots.transmission import Transmission
+from ...robots.transmission import TransmissionMap
+from ...runtime.language.steps import signal_call
 from ..bear.configuration import Hardware
 from ..bear.protocol import Mode
 from ..simulated.drives import MotorLimits, drive_motors
@@ -49,11 +49,11 @@ class EmulatedDrives:
     ) -> None:  # fmt: skip
         n = len(actuators)
         self.actuators = tuple(actuators)
-        self._transmission = Transmission(robot)
+        self._transmission = TransmissionMap(robot)
         limits = MotorLimits(robot, record)
         self._motor_torque = limits.motor_torque
         self._moving_at, self._limited = np.zeros(n), np.zeros(n)
-        self._limit = KernelCall(
+        self._limit = signal_call(
             drive_motors, self._moving_at, self._limited, limits.motors, limits.scratch,
             limits.record,
         )  # fmt: skip

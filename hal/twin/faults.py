@@ -21,7 +21,7 @@ ANSWERS: tuple[Kind, ...] = ("lost", "truncated", "corrupted", "late")
 """The kinds that spoil answers of drives."""
 
 
-class Fault(Parameters):
+class InjectedFault(Parameters):
     """One fault, as a graph says it: ``{kind: dead, start: 0.5 s, target: left_knee_motor}``."""
 
     kind: Kind = parameter(..., text="what goes wrong")
@@ -40,7 +40,7 @@ class Faults:
     """Which faults are there at an instant. What befalls a share only is drawn from the seed, the
     exchange and the place, so that it does not depend on what was drawn before."""
 
-    def __init__(self, faults: Sequence[Fault], seed: int) -> None:
+    def __init__(self, faults: Sequence[InjectedFault], seed: int) -> None:
         self._faults = tuple(faults)
         self._seed = seed
         self.now = -1.0
@@ -49,7 +49,7 @@ class Faults:
     def __bool__(self) -> bool:
         return bool(self._faults)
 
-    def active(self, *kinds: Kind) -> list[Fault]:
+    def active(self, *kinds: Kind) -> list[InjectedFault]:
         """The faults of these kinds that are there now."""
         if not self._faults:
             return []
@@ -59,7 +59,7 @@ class Faults:
             if fault.kind in kinds and fault.start <= self.now < fault.start + fault.duration
         ]
 
-    def of(self, target: str, *kinds: Kind) -> list[Fault]:
+    def of(self, target: str, *kinds: Kind) -> list[InjectedFault]:
         """Those of them that concern ``target``, after the draw of their share."""
         return [
             fault
@@ -72,11 +72,11 @@ class Faults:
         place = int.from_bytes(target.encode()[:6].ljust(6, b"_"), "big")
         return np.random.default_rng([self._seed, self.exchange, place, len(target), purpose])
 
-    def _applies(self, fault: Fault, target: str) -> bool:
+    def _applies(self, fault: InjectedFault, target: str) -> bool:
         return fault.share >= 1.0 or bool(self.draw(target, 0).random() < fault.share)
 
 
-def apply_fault(fault: Fault, answer: bytes, draws: np.random.Generator) -> bytes:
+def apply_fault(fault: InjectedFault, answer: bytes, draws: np.random.Generator) -> bytes:
     """The bytes of a drive's answer that really travel; empty where none do in time."""
     if fault.kind == "truncated":
         return answer[: int(draws.integers(0, len(answer)))]
@@ -92,7 +92,7 @@ def corrupt_byte(data: bytes, draws: np.random.Generator) -> bytes:
     return bytes(hurt)
 
 
-def read_fault(text: str) -> Fault:
+def read_fault(text: str) -> InjectedFault:
     """The fault of a text such as ``dead 0.5 left_knee_motor`` or ``lost 1 * share=0.1``: the kind,
     its start in seconds, its target (``*`` for all), and further settings.
 
@@ -109,7 +109,7 @@ def read_fault(text: str) -> Fault:
             name, value = names.pop(0), word
         settings[name] = "" if value == "*" else value
     try:
-        return Fault.model_validate(settings)
+        return InjectedFault.model_validate(settings)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         what = ".".join(str(part) for part in first["loc"])

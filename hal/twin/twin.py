@@ -15,13 +15,13 @@ from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
 from ..random_streams import Purpose
 from ..sensors.sensor import mounted_sensors
-from ..simulated.drives import Drives
+from ..simulated.drives import SimulatedDrives
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
-from .faults import ANSWERS, Fault, Faults, apply_fault, corrupt_byte
+from .faults import ANSWERS, Faults, InjectedFault, apply_fault, corrupt_byte
 from .snapshot import Attributes
 
 BRAKING = 0.5
@@ -61,7 +61,7 @@ class Twin:
 
     def __init__(
         self, robot: RobotDescription, params: SimulatorParameters, hardware: Hardware, tick: float,
-        physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[Fault, ...] = (),
+        physics: PhysicsState, record: TickRecord, gantry: DriveState, faults: tuple[InjectedFault, ...] = (),
         sensed: SensorMemory | None = None,
     ) -> None:  # fmt: skip
         period = hardware.bus.period
@@ -82,7 +82,7 @@ class Twin:
         self.exchanges = 0
         self.zero = 0
         """The exchange in which the gantry let go."""
-        self._gantry = Drives(robot, self.plant.damping, gantry, record)
+        self._gantry = SimulatedDrives(robot, self.plant.damping, gantry, record)
         self._held = np.zeros(len(robot.joints))
         self._standing = self.plant.simulating(self._gantry, 1)
         self._step = self.plant.simulating(self, 1)
@@ -324,7 +324,7 @@ class Twin:
 
 def standing_twin(
     robot: RobotDescription, params: SimulatorParameters, hardware: Hardware,
-    tick: float = 0.002, faults: tuple[Fault, ...] = (),
+    tick: float = 0.002, faults: tuple[InjectedFault, ...] = (),
 ) -> Twin:  # fmt: skip
     """A twin that stands in its gantry.
 

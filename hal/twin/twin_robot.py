@@ -14,12 +14,11 @@ from ..bear.driven_robot import DrivenRobot, DriveParameters, missing_sensors, r
 from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
-from ..simulated.geared_rotors import unsupported_motor
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
-from ..simulated.stance import uneven_contacts
 from ..simulated.state import DriveState, PhysicsState, TickRecord
-from .faults import Fault
+from ..simulated.unsupported import uneven_contacts, unsupported_motor
+from .faults import InjectedFault
 from .snapshot import Attributes, ObjectSnapshot
 from .twin import Twin
 
@@ -90,7 +89,7 @@ class TwinParameters(SimulatorParameters, DriveParameters):
     hardware: str = parameter(
         "", text="file of the hardware, relative to the graph; none: addresses in order, no offsets"
     )
-    faults: list[Fault] = parameter([], text="what goes wrong, and when")
+    faults: list[InjectedFault] = parameter([], text="what goes wrong, and when")
 
 
 class Registers(Signal):

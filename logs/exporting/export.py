@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 
 from ...hal.sensors.sensor import RosMessage
+from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import RobotDescription
-from ...robots.kinematics import quaternions_of_matrices
 from ...runtime.language.errors import AloftError
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun

@@ -2,13 +2,14 @@
 
 An ``.rrd`` file has a head of twelve bytes and then messages. A message has its kind and its
 length, eight bytes each, and then that many bytes, which are a protobuf message. A message of kind
-zero closes the file.
+zero closes the file: it holds an index for Rerun's tools, with a footer behind it (``index``), or
+nothing.
 
 Every message that aloft writes ends with a seal: one more protobuf field, which Rerun skips. It has
 the number of the message, what the message holds (``Content``), the first and the last tick that it
 speaks of, and the CRC-32 of the whole message. The seal of the first message covers the file's head
-too. So every byte before the closing message is under a checksum, and nothing is given to Rerun or
-Arrow unless its checksum is right: neither of them survives every damaged message.
+too. So every byte before the footer is under a checksum, and nothing is given to Rerun or Arrow
+unless its checksum is right: neither of them survives every damaged message.
 
 A file that another program has written again, such as ``rerun rrd filter``, has no seals; of it
 only the framing can be checked.
@@ -25,6 +26,8 @@ from typing import Any, BinaryIO
 from zlib import crc32
 
 from ...runtime.language.errors import AloftError
+from . import protobuf
+from .index import FOOTER_END, FOOTER_SIZE, footer
 
 FILE_HEAD = 12
 MAGIC = b"RRF2"
@@ -32,6 +35,7 @@ HEAD = Struct("<QQ")
 END = 0
 """The kind of the message that closes a file."""
 CLOSING = HEAD.pack(END, 0)
+"""What closes a file without an index."""
 ARROW = 2
 """The kind of a message that holds an Arrow table."""
 _LAST_KIND = 3
@@ -42,6 +46,8 @@ _SEAL = Struct("<QBqqII")
 _CHECKED = _SEAL.size - 4
 SEAL_SIZE = len(_MARK) + _SEAL.size
 _SEARCHED = 1 << 20
+_CLOSING_SIZES = {len(CLOSING): CLOSING, FOOTER_SIZE: FOOTER_END}
+"""How a closed file may end: the bytes behind the last seal, by their number."""
 
 
 class Content(IntEnum):
@@ -57,6 +63,8 @@ class Content(IntEnum):
     OUTCOME = 5
     UNKNOWN = 6
     """Any of these, in a file without seals."""
+    INDEX = 7
+    """Where all the others are, for Rerun's tools."""
 
 
 @dataclass(frozen=True)
@@ -137,15 +145,20 @@ def sealed(head: bytes, body: bytes, seal: Message, begun: int = 0) -> bytes:
     return whole + crc32(whole, begun).to_bytes(4, "little")
 
 
-def split(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Heads and bodies of the messages of a Rerun file in memory, without the closing one."""
+def closing(place: int, index: bytes, number: int) -> bytes:
+    """What closes, at ``place``, a file of so many messages."""
+    message = sealed(HEAD.pack(END, len(index)), index, Message(0, 0, END, Content.INDEX, number))
+    return message + footer(place + HEAD.size, message[HEAD.size :])
+
+
+def split(data: bytes) -> Iterator[tuple[int, bytes, bytes]]:
+    """Places, heads and bodies of the messages of a Rerun file in memory; the closing one is last."""
     place = FILE_HEAD
-    while place + HEAD.size <= len(data):
+    kind = ARROW
+    while kind != END and place + HEAD.size <= len(data):
         kind, length = HEAD.unpack_from(data, place)
-        if kind == END:
-            return
         body = place + HEAD.size
-        yield data[place:body], data[body : body + length]
+        yield place, data[place:body], data[body : body + length]
         place = body + length
 
 
@@ -180,7 +193,7 @@ class _Scanner:
             if message is None:
                 beyond = self._next_after(place)
                 if beyond is None:
-                    closed = self._closes(place)
+                    closed = self._closes(place, expected)
                     if not closed and self._is_damage(place):
                         damage.append(Damage(place, self._size))
                     break
@@ -214,29 +227,52 @@ class _Scanner:
         known = crc32(self._head) if first else 0
         return _checked(place, head, body, known)
 
-    def _closes(self, place: int) -> bool:
-        """Whether the file is closed at ``place`` and ends there."""
-        self._file.seek(place)
-        if self._sealed:
-            return self._file.read() == CLOSING
-        head = self._file.read(HEAD.size)  # an index follows it
-        return len(head) == HEAD.size and HEAD.unpack(head)[0] == END
-
-    def _is_damage(self, place: int) -> bool:
-        """Whether what is at ``place``, behind which nothing is intact, is no message cut short."""
-        if self._sealed and self._size - place >= SEAL_SIZE + len(CLOSING):
-            # The closing message is sixteen zeros, which stand inside of messages too, as in many
-            # seals. It closes the file only where it follows a seal.
-            self._file.seek(self._size - SEAL_SIZE - len(CLOSING))
-            tail = self._file.read()
-            if tail.startswith(_MARK) and tail.endswith(CLOSING):
-                return True
+    def _closes(self, place: int, number: int) -> bool:
+        """Whether the file is closed at ``place``, behind so many messages, and ends there."""
         self._file.seek(place)
         head = self._file.read(HEAD.size)
         if len(head) < HEAD.size:
             return False
         kind, length = HEAD.unpack(head)
-        return not END < kind <= _LAST_KIND or place + HEAD.size + length <= self._size
+        if kind != END:
+            return False
+        if not self._sealed:
+            return True  # an index follows it
+        if head == CLOSING:
+            return place + len(CLOSING) == self._size
+        if place + HEAD.size + length + FOOTER_SIZE != self._size or length < SEAL_SIZE:
+            return False
+        body, end = self._file.read(length), self._file.read()
+        message = _checked(place, head, body, 0)
+        if message is None or message.number != number >= 0:
+            return False
+        return end == footer(place + HEAD.size, body)
+
+    def _is_damage(self, place: int) -> bool:
+        """Whether what is at ``place``, behind which nothing is intact, is no message cut short."""
+        if self._sealed and any(self._ends_closed(place, size) for size in _CLOSING_SIZES):
+            return True
+        self._file.seek(place)
+        head = self._file.read(HEAD.size)
+        if len(head) < HEAD.size:
+            return False
+        kind, length = HEAD.unpack(head)
+        end = place + HEAD.size + length
+        if kind == END and length:
+            end += FOOTER_SIZE
+        return bool(kind > _LAST_KIND or end <= self._size)
+
+    def _ends_closed(self, place: int, size: int) -> bool:
+        """Whether the last ``size`` bytes, those after a seal behind ``place``, close the file.
+
+        A closing message without an index is sixteen zeros, which stand inside of messages too, as
+        in many seals. It closes the file only where it follows a seal.
+        """
+        if self._size - place < SEAL_SIZE + size:
+            return False
+        self._file.seek(self._size - SEAL_SIZE - size)
+        tail = self._file.read()
+        return tail.startswith(_MARK) and tail.endswith(_CLOSING_SIZES[size])
 
     def _next_after(self, place: int) -> int | None:
         """The place of the next intact message: behind a seal that stands behind ``place``."""
@@ -303,6 +339,15 @@ def renumbered(file: BinaryIO, message: Message, number: int) -> bytes:
     return sealed(head, body, replace(message, number=number), known)
 
 
+def index_of(file: BinaryIO, found: Scan) -> bytes:
+    """The index of a closed file, without its seal; empty if it has none."""
+    file.seek(found.end)
+    head = file.read(HEAD.size)
+    if not (found.sealed and found.closed) or head == CLOSING:
+        return b""
+    return file.read(HEAD.unpack(head)[1] - SEAL_SIZE)
+
+
 def table_of(body: bytes) -> tuple[str, Any]:
     """Entity and Arrow record batch that a message of kind ``ARROW`` holds.
 
@@ -312,10 +357,10 @@ def table_of(body: bytes) -> tuple[str, Any]:
     import pyarrow as pa  # comes with Rerun
 
     try:
-        fields = dict(_fields(body))
-        data: Any = fields[5]
-        if fields.get(2) == 2:
-            data = pa.decompress(data, fields[3], codec="lz4_raw")
+        parts = dict(protobuf.fields(body))
+        data: Any = parts[5]
+        if parts.get(2) == 2:
+            data = pa.decompress(data, parts[3], codec="lz4_raw")
         with pa.ipc.open_stream(data) as reader:
             batch = reader.read_next_batch()
         batch.validate(full=True)
@@ -329,38 +374,6 @@ def table_of(body: bytes) -> tuple[str, Any]:
 def is_static(batch: Any) -> bool:
     """Whether a table has no timelines."""
     return not any((f.metadata or {}).get(b"rerun:kind") == b"index" for f in batch.schema)
-
-
-def _fields(body: bytes) -> Iterator[tuple[int, Any]]:
-    """Number and value of every field of a protobuf message."""
-    place = 0
-    while place < len(body):
-        key, place = _number(body, place)
-        if key & 7 == 0:
-            value, place = _number(body, place)
-            yield key >> 3, value
-        elif key & 7 == 2:
-            size, place = _number(body, place)
-            if size > len(body) - place:
-                raise IndexError("a field is longer than its message")
-            yield key >> 3, body[place : place + size]
-            place += size
-        elif key & 7 in (1, 5):
-            place += 8 if key & 7 == 1 else 4
-        else:
-            raise IndexError("no protobuf")
-
-
-def _number(body: bytes, place: int) -> tuple[int, int]:
-    """A whole number of variable length, and the place behind it."""
-    value = 0
-    for shift in range(0, 64, 7):
-        byte = body[place]
-        place += 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            return value, place
-    raise IndexError("a number is longer than 64 bits")
 
 
 class RecordingError(AloftError):

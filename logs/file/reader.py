@@ -63,31 +63,45 @@ TickRows = tuple[NDArray[np.int64], NDArray[np.uint8]]
 """Ticks (n,) and rows (n, bytes)."""
 
 
+@dataclass(frozen=True)
+class _PackedPiece:
+    """Some ticks without a gap: the message that holds them, and the row of its table."""
+
+    message: Message
+    row: int
+    first: int
+    last: int
+
+
 class PackedRows:
     """The rows of a recording; in memory there is a batch at a time."""
 
     def __init__(self, found: Scan, header: Header) -> None:
         self._found, self._header = found, header
-        messages = found.of(Content.ROWS) if found.sealed else list(self._without_seals())
-        self._messages = sorted(messages, key=lambda message: message.first)
-        self._lasts = [message.last for message in self._messages]
+        pieces = self._sealed() if found.sealed else self._without_seals()
+        self._pieces = sorted(pieces, key=lambda piece: piece.first)
+        self._lasts = [piece.last for piece in self._pieces]
 
-    def _without_seals(self) -> Iterator[Message]:
-        """The messages that hold rows, in a file that another program has written again."""
+    def _sealed(self) -> Iterator[_PackedPiece]:
+        """The pieces of a file with seals, which say what is in each message."""
+        for message in self._found.of(Content.ROWS):
+            yield _PackedPiece(message, 0, message.first, message.last)
+
+    def _without_seals(self) -> Iterator[_PackedPiece]:
+        """The pieces of a file that another program has written again, which may have put several
+        into one message."""
         for message, name, batch in located(self._found, Content.ROWS):
             if name == f"/{ROWS}":
-                first, rows = self._unpacked(message, batch)
-                yield Message(
-                    message.place, message.size, message.kind, Content.ROWS,
-                    first=first, last=first + len(rows) - 1,
-                )  # fmt: skip
+                for row in range(len(batch)):
+                    first, rows = self._unpacked(message, batch, row)
+                    yield _PackedPiece(message, row, first, first + len(rows) - 1)
 
     def _unpacked(
-        self, message: Message, batch: Any, part: tuple[int, int] | None = None
+        self, message: Message, batch: Any, row: int, part: tuple[int, int] | None = None
     ) -> tuple[int, NDArray[np.uint8]]:
-        """First tick and rows (n, bytes) of a message, or of each row the bytes ``part`` only."""
+        """First tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
         try:
-            packed = batch[f"aloft:{PACKED}"][0].values.to_numpy().tobytes()
+            packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
             if part is None and rows.shape[1] != self._header.bus.size:
                 raise ValueError("these rows belong to another layout")
@@ -98,17 +112,17 @@ class PackedRows:
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
         """The recorded ticks in order, (ticks,)."""
-        found = [np.arange(m.first, m.last + 1, dtype=np.int64) for m in self._messages]
+        found = [np.arange(m.first, m.last + 1, dtype=np.int64) for m in self._pieces]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
 
     def pieces(self, first: int, last: int) -> Iterator[TickRows]:
         """The ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
         begin = bisect_left(self._lasts, first)
-        for message in self._messages[begin:]:
-            if message.first >= last:
+        for piece in self._pieces[begin:]:
+            if piece.first >= last:
                 return
-            _, batch = tables_at(self._found, message)
-            start, rows = self._unpacked(message, batch)
+            _, batch = tables_at(self._found, piece.message)
+            start, rows = self._unpacked(piece.message, batch, piece.row)
             ticks = np.arange(start, start + len(rows), dtype=np.int64)
             low, high = bisect_left(ticks, first), bisect_left(ticks, last)
             yield ticks[low:high], rows[low:high]
@@ -128,14 +142,14 @@ class PackedRows:
         size = self._header.bus.size if part is None else part[1] - part[0]
         rows = np.empty((len(ticks), size), np.uint8)
 
-        def unpack_one(message: Message) -> None:
-            _, batch = tables_at(self._found, message)
-            first, some = self._unpacked(message, batch, part)
+        def unpack_one(piece: _PackedPiece) -> None:
+            _, batch = tables_at(self._found, piece.message)
+            first, some = self._unpacked(piece.message, batch, piece.row, part)
             place = bisect_left(ticks, first)
             rows[place : place + len(some)] = some
 
         with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
-            for _ in pool.map(unpack_one, self._messages):
+            for _ in pool.map(unpack_one, self._pieces):
                 pass
         return rows
 

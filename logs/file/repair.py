@@ -1,19 +1,32 @@
 """Repairs a recording in place: what is not intact is taken out, and the file is closed.
 
 Nothing of this needs room on the disk, except the sixteen bytes that close the file. What stands
-behind damage is moved forward, message by message.
+behind damage is moved forward, message by message. A file that had an index has one afterwards; one
+that was cut has none, and Rerun opens it all the same.
 """
 
 from __future__ import annotations
 
 import errno
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import BinaryIO
 
 from ...runtime.language.errors import AloftError
-from .messages import CLOSING, Damage, renumbered, scanned
+from .index import Index
+from .messages import (
+    CLOSING,
+    FILE_HEAD,
+    HEAD,
+    Damage,
+    Scan,
+    closing,
+    index_of,
+    renumbered,
+    scanned,
+)
 
 
 class RepairError(AloftError):
@@ -66,28 +79,42 @@ def repair(path: str | PathLike[str]) -> Repair:
     if found.closed and not found.damage:
         return Repair(path, count, found.size, found.size, closed=True)
     with path.open("r+b", buffering=0) as file:
-        end = found.end
+        end, index = found.end, b""
         if found.damage:
-            end = found.damage[0].begin
-            behind = [message for message in found.messages if message.place >= end]
-            for number, message in enumerate(behind, start=count - len(behind)):
-                data = renumbered(file, message, number)
-                file.seek(end)
-                file.write(data)
-                end += len(data)
+            end, index = _close_gaps(file, found)
         file.truncate(end)
-        size = end + (_close(file, end) if found.sealed else 0)
+        size = end
+        if found.sealed:
+            size += _close(file, end, (closing(end, index, count) if index else CLOSING, CLOSING))
     return Repair(path, count, found.size, size, closed=found.closed, damage=found.damage)
 
 
-def _close(file: BinaryIO, end: int) -> int:
-    """Write the closing message. Returns its size, or zero if the disk has no room for it."""
-    file.seek(end)
-    try:
-        file.write(CLOSING)
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-            raise
-        file.truncate(end)
-        return 0
-    return len(CLOSING)
+def _close_gaps(file: BinaryIO, found: Scan) -> tuple[int, bytes]:
+    """Move what is behind damage forward. Returns the end of the last message, and the file's index,
+    which is empty if there was none."""
+    index, places = Index(0), dict[int, int]()
+    index.add(index_of(file, found), places)
+    end = FILE_HEAD
+    for number, message in enumerate(found.messages):
+        if end >= found.damage[0].begin:
+            data = renumbered(file, message, number)
+            file.seek(end)
+            file.write(data)
+        places[message.place + HEAD.size] = end + HEAD.size
+        end += message.size
+    return end, index.whole()
+
+
+def _close(file: BinaryIO, end: int, endings: Sequence[bytes]) -> int:
+    """Write the first of these endings for which the disk has room. Returns its size, or zero."""
+    for data in endings:
+        file.seek(end)
+        try:
+            file.write(data)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+                raise
+            file.truncate(end)
+        else:
+            return len(data)
+    return 0

@@ -26,7 +26,20 @@ from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Note, parameter_note
 from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
-from ..file.messages import ARROW, CLOSING, FILE_HEAD, HEAD, Content, Message, sealed, split
+from ..file.index import Index
+from ..file.messages import (
+    ARROW,
+    CLOSING,
+    END,
+    FILE_HEAD,
+    HEAD,
+    SEAL_SIZE,
+    Content,
+    Message,
+    closing,
+    sealed,
+    split,
+)
 from ..file.row_codec import pack
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import RECORDED
@@ -72,6 +85,7 @@ class RecordingWriter:
         self.path = self.place.target
         self._size = self._messages = self._drawable = 0
         self._begun = False
+        self._index = Index(SEAL_SIZE)
         self.recorded = 0
         self._undrawn: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
         self._stream = rr.RecordingStream(
@@ -200,13 +214,20 @@ class RecordingWriter:
         if data and not self._begun:
             out += data[:FILE_HEAD]
             known, self._begun = crc32(data[:FILE_HEAD]), True
-        for head, body in split(data):
-            holds = content if HEAD.unpack(head)[0] == ARROW else Content.PICTURE
+        index, places = b"", {}
+        for place, head, body in split(data):
+            kind = HEAD.unpack(head)[0]
+            if kind == END:
+                index = body
+                break
+            places[place + HEAD.size] = self._size + len(out) + HEAD.size
+            holds = content if kind == ARROW else Content.PICTURE
             seal = Message(0, 0, ARROW, holds, messages, first, last)
             out += sealed(head, body, seal, known)
             known = 0
             messages += 1
         self._write(bytes(out))
+        self._index.add(index, places)
         self._messages = messages
 
     def _write(self, data: bytes) -> None:
@@ -233,10 +254,17 @@ class RecordingWriter:
             self.draw()
             self._run.write_rest()
             self._put(Content.PICTURE)
-            self._write(CLOSING)
+            self._write_closing()
         finally:
             warning = self.abandon()
         return warning
+
+    def _write_closing(self) -> None:
+        """Close the file, without an index where there is no room for it: only Rerun's tools use it."""
+        try:
+            self._write(closing(self._size, self._index.whole(), self._messages))
+        except OSError:
+            self._write(CLOSING)
 
     def abandon(self) -> str:
         """Give the file its name as it is, after a failure. Returns a warning or nothing."""

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...robots.description import Link, Look, Mesh, RobotDescription, Shape
+from ...mathematics.rotations import matrices_of_quaternions
+from ...robots.description import Appearance, Link, Mesh, RobotDescription, Shape
 from ...robots.importing.meshes import mesh_triangles, simplified
 from ...robots.importing.urdf_text import find_file
-from ...robots.kinematics import link_poses, matrices_of_quaternions
+from ...robots.kinematics import link_poses
 
 USUAL_REACH = 0.4
 """The reach [m] of the robot that the sizes of marks and lines are given for."""
@@ -159,7 +160,7 @@ def read_meshes(robot: RobotDescription) -> RobotMeshes:
     return result
 
 
-def _joined(link: str, look: Look, most: int, known: dict[Path, Surface]) -> Surface:
+def _joined(link: str, look: Appearance, most: int, known: dict[Path, Surface]) -> Surface:
     """All meshes of a link as one. Raises ``OSError`` or ``ValueError`` with the sentence to tell."""
     corners: list[Array] = []
     triangles: list[NDArray[np.int64]] = []
@@ -191,8 +192,7 @@ def _absent(link: str, mesh: Mesh) -> str:
 
 
 def _rotation(mesh: Mesh) -> Array:
-    matrix: Array = matrices_of_quaternions(np.array([mesh.orientation]))[0]
-    return matrix
+    return matrices_of_quaternions(np.array(mesh.orientation))
 
 
 def drawn_link(

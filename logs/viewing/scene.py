@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...robots.kinematics import quaternions_of_matrices
+from ...mathematics.rotations import quaternions_of_matrices
 from ..file.format import EVENTS, WORLD, Header, RecordedRows, time_columns, timed
 from .contacts import (
     ABOVE_GROUND,

@@ -17,17 +17,17 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
     from_base_outwards,
     link_poses,
-    matrices_of_quaternions,
 )
 from ...robots.welding import welded
 from ..models.symmetry import mirrored_pairs, symmetrised
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from ..task.sequence import edge_of
 from ..task.task import JumpTask
 from .replay import Replay
@@ -173,7 +173,7 @@ MILLIMETRE = 1e-3
 
 
 @dataclass(frozen=True)
-class Found:
+class PlanTestResult:
     """What a test found: it passes where ``value`` is at most ``limit``."""
 
     name: str
@@ -188,7 +188,7 @@ class Found:
 class Evidence:
     """A plan, its replay, and what several tests need of them."""
 
-    plan: JumpPlan
+    plan: PlannedJump
     robot: RobotDescription
     replay: Replay
 

@@ -17,8 +17,8 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics
 from ..task.margins import Margins, joint_bounds
-from ..task.plan import JumpPlan
-from .evidence import DEGREE, MILLIMETRE, Evidence, Found, body_heights, leg_lack, worst
+from ..task.plan import PlannedJump
+from .evidence import DEGREE, MILLIMETRE, Evidence, PlanTestResult, body_heights, leg_lack, worst
 from .replay import held_joints, replay
 
 SHORTEST_IMPACT = 0.004
@@ -26,22 +26,22 @@ SHORTEST_IMPACT = 0.004
 bounds its impulse at touchdown."""
 
 
-def start_and_end(e: Evidence) -> Iterator[Found]:
+def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
     """The plan begins at rest in its stance over the origin and ends at rest."""
     plan, joints = e.plan, [joint.name for joint in e.robot.joints]
     stances = (plan.task.start_joints(e.robot), plan.task.end_joints(e.robot))
     missed = np.abs(plan.position[0, 7:] - [stances[0][name] for name in joints])
-    yield Found("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
+    yield PlanTestResult("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
                 joints[int(missed.argmax())])  # fmt: skip
     middle = np.append(e.replay.soles[0].mean(axis=0), e.replay.heading[0].mean())
-    yield Found("origin", float(np.abs(middle).max()), MILLIMETRE, "m or rad",
+    yield PlanTestResult("origin", float(np.abs(middle).max()), MILLIMETRE, "m or rad",
                 "the first knot's distance from the origin between the soles")  # fmt: skip
     for name, knot in (("rest_at_start", 0), ("rest_at_end", -1)):
         speeds = np.abs(plan.velocity[knot])
-        yield Found(name, speeds.max(), 1e-2, "m/s or rad/s", "the largest velocity")
+        yield PlanTestResult(name, speeds.max(), 1e-2, "m/s or rad/s", "the largest velocity")
 
 
-def states(e: Evidence) -> Iterator[Found]:
+def states(e: Evidence) -> Iterator[PlanTestResult]:
     """Centre of mass, momentum and torque agree with those that Pinocchio computes from states and forces."""
     plan, r = e.plan, e.replay
     for name, planned, exact, limit, unit in (
@@ -49,17 +49,19 @@ def states(e: Evidence) -> Iterator[Found]:
         ("com_velocity", plan.com_velocity, r.com_velocity, 1e-4, "m/s"),
         ("angular_momentum", plan.angular_momentum, r.angular_momentum, 1e-5, "N m s"),
     ):
-        yield Found(name, np.abs(planned - exact).max(), limit, unit, "its error at the knots")
+        yield PlanTestResult(
+            name, np.abs(planned - exact).max(), limit, unit, "its error at the knots"
+        )
     s = r.samples
     missed = np.abs(s.torque[e.middles] - plan.joint_torque[s.knot[e.middles]])
     most = np.maximum(0.2, 0.01 * e.motors.peak_torque)
     k, joint = worst(missed / most)
-    yield Found("joint_torque", missed[k, joint], most[joint], "N m",
+    yield PlanTestResult("joint_torque", missed[k, joint], most[joint], "N m",
                 "its error in the middle of an interval",
                 f"{e.robot.joints[joint].name} {e.moment(int(e.middles[k]))}")  # fmt: skip
 
 
-def interval_defects(e: Evidence) -> Iterator[Found]:
+def interval_defects(e: Evidence) -> Iterator[PlanTestResult]:
     """Exact dynamics from each knot leads to the next."""
     for column, (name, limit, unit) in enumerate(
         (
@@ -71,11 +73,11 @@ def interval_defects(e: Evidence) -> Iterator[Found]:
     ):
         found = e.replay.defect[:, column]
         k = int(found.argmax())
-        yield Found(name, found[k], limit, unit, "the base's error after one interval",
+        yield PlanTestResult(name, found[k], limit, unit, "the base's error after one interval",
                     f"from {e.plan.time[k]:.3f} s")  # fmt: skip
 
 
-def discretisation(e: Evidence) -> Iterator[Found]:
+def discretisation(e: Evidence) -> Iterator[PlanTestResult]:
     """The planner's own equations on the ground, of the formulation that is built on them; in the
     air it conserves momentum, as exact dynamics do."""
     if e.plan.task.formulation != "full":
@@ -93,21 +95,27 @@ def discretisation(e: Evidence) -> Iterator[Found]:
         ),
     ):
         k = int(found.argmax())
-        yield Found(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
+        yield PlanTestResult(name, found[k], limit, unit, text, f"from {e.plan.time[k]:.3f} s")
 
 
-def flight(e: Evidence) -> Iterator[Found]:
+def flight(e: Evidence) -> Iterator[PlanTestResult]:
     """The whole flight by exact dynamics ends where the plan says."""
     plan, r = e.plan, e.replay
     position, rotation = (max(errors) for errors in zip(*r.flight_errors, strict=True))
-    yield Found("flight_position", position, MILLIMETRE, "m", "the base's error at touchdown")
-    yield Found("flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown")
+    yield PlanTestResult(
+        "flight_position", position, MILLIMETRE, "m", "the base's error at touchdown"
+    )
+    yield PlanTestResult(
+        "flight_rotation", rotation, 0.5 * DEGREE, "rad", "the base's error at touchdown"
+    )
     knots = plan.time[np.array(r.flights)]
     missed = np.abs(knots - plan.flights).max() if knots.shape == np.shape(plan.flights) else np.inf
-    yield Found("flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots")
+    yield PlanTestResult(
+        "flight_times", float(missed), 1e-9, "s", "lift-off and touchdown from their knots"
+    )
 
 
-def task_done(e: Evidence) -> Iterator[Found]:
+def task_done(e: Evidence) -> Iterator[PlanTestResult]:
     """Every jump reaches the height, place, heading and rotation that the task asks for."""
     task, r = e.plan.task, e.replay
     hops, places = task.hops(), task.places()
@@ -121,25 +129,29 @@ def task_done(e: Evidence) -> Iterator[Found]:
     ):  # fmt: skip
         errors = [abs(found - wanted) for found, wanted in missed if wanted is not None]
         if errors:
-            yield Found(name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors))))
+            yield PlanTestResult(
+                name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors)))
+            )
     standing = [*_standing_knots(e), -1]
     goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
     missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
     jump, axis = worst(missed_by)
-    yield Found("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
+    yield PlanTestResult("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
                 "xyz"[axis] + _which(e, jump))  # fmt: skip
     pitch, yaw = e.turn
     turned = (r.heading[standing] - r.heading[0]).mean(axis=1)
     # Through a somersault a heading is not defined, so it counts as it is at the end.
     twists = [math.remainder(t - place.heading, math.tau)
               for t, place in zip(turned, places[1:], strict=True)]  # fmt: skip
-    yield Found("twist", float(np.abs(twists).max()), 0.5 * DEGREE, "rad",
+    yield PlanTestResult("twist", float(np.abs(twists).max()), 0.5 * DEGREE, "rad",
                 "the feet's error in heading")  # fmt: skip
     rotation = places[-1].turned
     if any(hop.rotation for hop in hops):
-        yield Found("rotation", abs(pitch - rotation), 5 * DEGREE, "rad", "the body's error")
+        yield PlanTestResult(
+            "rotation", abs(pitch - rotation), 5 * DEGREE, "rad", "the body's error"
+        )
     else:
-        yield Found("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
+        yield PlanTestResult("whole_turn", abs(yaw - places[-1].heading), 20 * DEGREE, "rad",
                     "how far the torso's turn differs from the feet's")  # fmt: skip
 
 
@@ -158,7 +170,7 @@ def _which(e: Evidence, jump: int) -> str:
     return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
 
 
-def contacts(e: Evidence) -> Iterator[Found]:
+def contacts(e: Evidence) -> Iterator[PlanTestResult]:
     """Feet stay where they stand, on the ground, and push only there, within the friction cone."""
     plan, s = e.plan, e.replay.samples
     names = [contact.name for contact in e.robot.contacts]
@@ -171,23 +183,25 @@ def contacts(e: Evidence) -> Iterator[Found]:
             places = e.resting[standing[:, number] & (e.place == place), number]
             if len(places):
                 slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
-    yield Found("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
+    yield PlanTestResult("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
     height = np.where(standing, np.abs(e.point_height), 0.0)
-    yield Found("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
+    yield PlanTestResult("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
                 "how far a loaded point is off the ground")  # fmt: skip
     force = plan.contact_force
     idle = np.where(plan.contact[:, :, None], 0.0, np.abs(force)).max()
-    yield Found("force_without_contact", idle, 1e-6, "N", "the largest force on an unloaded point")
+    yield PlanTestResult(
+        "force_without_contact", idle, 1e-6, "N", "the largest force on an unloaded point"
+    )
     pull, tangent = -force[:, :, 2], np.hypot(force[:, :, 0], force[:, :, 1])
-    yield Found("pull", pull.max(), 1e-3, "N", "how hard a foot pulls at the ground")
+    yield PlanTestResult("pull", pull.max(), 1e-3, "N", "how hard a foot pulls at the ground")
     excess = tangent - plan.task.friction * np.maximum(force[:, :, 2], 0.0)
     k, number = worst(excess)
-    yield Found("friction", excess.max(), 1e-2, "N", "how far a force is outside its cone",
+    yield PlanTestResult("friction", excess.max(), 1e-2, "N", "how far a force is outside its cone",
                 f"{names[number]} at {plan.time[k]:.3f} s")  # fmt: skip
 
 
-def touchdown(e: Evidence) -> Iterator[Found]:
+def touchdown(e: Evidence) -> Iterator[PlanTestResult]:
     """Feet that are to arrive at rest do, and those that may hit the ground are slow enough."""
     plan, r, s = e.plan, e.replay, e.replay.samples
     knots = [touchdown for _, touchdown in r.flights]
@@ -196,12 +210,12 @@ def touchdown(e: Evidence) -> Iterator[Found]:
             return
         found = [_impact(e, k) for k in knots]
         k = int(np.argmax([error for error, _ in found]))
-        yield Found("impact", found[k][0], e.model_error(1e-3, 1e-2), "m/s or rad/s",
+        yield PlanTestResult("impact", found[k][0], e.model_error(1e-3, 1e-2), "m/s or rad/s",
                     "how far the impulse's velocities miss exact dynamics'", _which(e, k))  # fmt: skip
         kept = np.array([impulse for _, impulse in found])
         most = plan.task.landing_effort * e.motors.peak_torque * SHORTEST_IMPACT
         k, motor = worst(kept / most)
-        yield Found("held_joints", kept[k, motor], most[motor], "N m s",
+        yield PlanTestResult("held_joints", kept[k, motor], most[motor], "N m s",
                     "the impulse of a motor whose joint keeps still",
                     e.robot.transmission.motors[motor] + _which(e, k))  # fmt: skip
         yield from _hits(e, knots)
@@ -209,12 +223,12 @@ def touchdown(e: Evidence) -> Iterator[Found]:
     samples = np.searchsorted(s.time, plan.time[knots] - 1e-9)
     speeds = np.linalg.norm(s.point_velocity[samples], axis=2)
     speeds = np.where(plan.contact[knots], speeds, 0.0)
-    yield Found(
+    yield PlanTestResult(
         "touchdown_speed", float(speeds.max()), 0.05, "m/s", "the feet's speed at touchdown"
     )
 
 
-def _hits(e: Evidence, knots: list[int]) -> Iterator[Found]:
+def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
     """How fast points hit the ground, downwards and along or across their foot, where bounded."""
     margins, r, s = e.plan.task.margins, e.replay, e.replay.samples
     if margins is None:
@@ -233,7 +247,7 @@ def _hits(e: Evidence, knots: list[int]) -> Iterator[Found]:
     ):
         if most is not None:
             text = f"how fast a point hits the ground {what}"
-            yield Found(name, float(found), most + 0.05, "m/s", text)
+            yield PlanTestResult(name, float(found), most + 0.05, "m/s", text)
 
 
 def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
@@ -255,7 +269,7 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
     return float(error), np.abs(e.robot.torque_to_motor @ kept)
 
 
-def momentum(e: Evidence) -> Iterator[Found]:
+def momentum(e: Evidence) -> Iterator[PlanTestResult]:
     """The angular momentum at lift-offs and touchdowns is no more than the task allows."""
     task, r = e.plan.task, e.replay
     lasting = np.diff(e.plan.time, append=np.inf) > 0.0
@@ -266,35 +280,37 @@ def momentum(e: Evidence) -> Iterator[Found]:
     ):
         if most is not None:
             found = float(np.abs(r.angular_momentum[knots]).max())
-            yield Found(name, found, most + 1e-3, "N m s", "the angular momentum about an axis")
+            yield PlanTestResult(
+                name, found, most + 1e-3, "N m s", "the angular momentum about an axis"
+            )
 
 
-def machine(e: Evidence) -> Iterator[Found]:
+def machine(e: Evidence) -> Iterator[PlanTestResult]:
     """Joints stay within their limits, motors within what they can do at their speed."""
     robot, s = e.robot, e.replay.samples
     angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)
-    yield Found("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",
+    yield PlanTestResult("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",
                 f"{robot.joints[joint].name} {e.moment(sample)}")  # fmt: skip
     motors = e.motors
     # Each motor is compared with its own limits: as a share where they may differ.
     share = np.abs(e.motor_speed) / motors.no_load_speed
     sample, motor = worst(share / e.effort)
-    yield Found("motor_speed", share[sample, motor] * motors.no_load_speed[motor],
+    yield PlanTestResult("motor_speed", share[sample, motor] * motors.no_load_speed[motor],
                 1.01 * e.effort[sample, 0] * motors.no_load_speed[motor], "rad/s", "the largest motor speed",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
     peak = motors.peak_torque
     over = np.abs(e.motor_torque) - allowed_motor_torque(e, 1.0)
     sample, motor = worst(over / peak)
-    yield Found("motor_torque", over[sample, motor], 0.03 * peak[motor], "N m",
+    yield PlanTestResult("motor_torque", over[sample, motor], 0.03 * peak[motor], "N m",
                 "how far a motor torque passes what its speed allows",
                 f"{robot.transmission.motors[motor]} {e.moment(sample)}")  # fmt: skip
     # The share that is kept for feedback is a matter of whole intervals, not of their ends.
     middle = e.middles
     over = np.abs(e.motor_torque[middle]) - allowed_motor_torque(e, e.effort)[middle]
     sample, motor = worst(over / peak)
-    yield Found("effort", over[sample, motor], 0.01 * peak[motor], "N m",
+    yield PlanTestResult("effort", over[sample, motor], 0.01 * peak[motor], "N m",
                 "how far a motor torque passes the share of it that the task allows",
                 f"{robot.transmission.motors[motor]} {e.moment(int(middle[sample]))}")  # fmt: skip
 
@@ -308,34 +324,34 @@ def allowed_motor_torque(e: Evidence, effort: float | Array) -> Array:
     return np.asarray(effort * motors.peak_torque * np.clip(fall, 0.0, 1.0))
 
 
-def clearances(e: Evidence) -> Iterator[Found]:
+def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
     robot, task = e.robot, e.plan.task
     names = [contact.name for contact in robot.contacts]
     low = -e.point_height
     sample, number = worst(low)
-    yield Found("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
+    yield PlanTestResult("foot_below_ground", low.max(), MILLIMETRE, "m", "how deep a foot is",
                 f"{names[number]} {e.moment(sample)}")  # fmt: skip
     at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
     missing = task.foot_clearance - e.point_height[at].min(axis=0)
-    yield Found("foot_clearance", missing.max(), MILLIMETRE, "m",
+    yield PlanTestResult("foot_clearance", missing.max(), MILLIMETRE, "m",
                 "what the feet lack of the clearance asked for in the middle of the flight",
                 names[int(missing.argmax())])  # fmt: skip
     heights = body_heights(robot, task, e.poses, e.progress)
     if heights:
         link = min(heights, key=lambda name: float(heights[name].min()))
         sample = int(heights[link].argmin())
-        yield Found("body_on_ground", -float(heights[link][sample]), 0.0, "m",
+        yield PlanTestResult("body_on_ground", -float(heights[link][sample]), 0.0, "m",
                     "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
     lacking = leg_lack(robot, e.poses, task.leg_clearance)
     if lacking is None:
         return  # no two legs have shapes that could touch
     sample = int(lacking.argmax())
-    yield Found("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
+    yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
                 "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
 
 
-PLAN_TESTS: tuple[Callable[[Evidence], Iterator[Found]], ...] = (
+PLAN_TESTS: tuple[Callable[[Evidence], Iterator[PlanTestResult]], ...] = (
     start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown,
     momentum, machine, clearances,
 )  # fmt: skip
@@ -350,7 +366,7 @@ LEAST_TIME = 0.02
 """Of the plan's instants, how many must be at a limit for it to be named."""
 
 
-def active_limits(plan: JumpPlan, robot: RobotDescription) -> tuple[str, ...]:
+def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]:
     """The motors whose torque or speed, and the joints whose limits, the plan reaches, by their
     names without the side, in the robot's order; friction comes last."""
     robot = plan.task.equipped(robot)

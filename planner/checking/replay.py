@@ -18,7 +18,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
 from ..models.midpoint import midpoint_residuals
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 
 Row = tuple[float, int, Array, Array]
 """A time [s], its interval, and the state."""
@@ -27,7 +27,7 @@ FLIGHT_STEP = 0.002
 
 
 @dataclass(frozen=True)
-class Samples:
+class ReplaySamples:
     """The motion at many instants: knots and what lies between them, ``n`` in all.
 
     ``knot`` is the interval that an instant belongs to. ``force`` (n, n_contacts, 3) is that of
@@ -59,7 +59,7 @@ class Replay:
         flights: the knots where every flight begins and ends, before any impact.
     """
 
-    samples: Samples
+    samples: ReplaySamples
     defect: Array
     gap: Array
     wrench: Array
@@ -72,7 +72,7 @@ class Replay:
     flights: tuple[tuple[int, int], ...]
 
 
-def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
+def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     """Replay a plan on the robot with the actuator profile that the plan is for.
 
     Raises:
@@ -101,7 +101,7 @@ def replay(plan: JumpPlan, robot: RobotDescription) -> Replay:
     )  # fmt: skip
 
 
-def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
+def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
     """The knots at lift-off and at touchdown of every flight, the latter before any impact.
 
     Raises:
@@ -124,7 +124,7 @@ def flight_knots(plan: JumpPlan) -> tuple[tuple[int, int], ...]:
 
 
 def _fly(
-    plan: JumpPlan, dynamics: ExactDynamics, lift_off: int, touchdown: int
+    plan: PlannedJump, dynamics: ExactDynamics, lift_off: int, touchdown: int
 ) -> tuple[list[Row], tuple[float, float]]:
     """Integrate the flight from the plan's state at lift-off, and compare its end with the planned touchdown."""
     q, v = plan.position[lift_off], plan.velocity[lift_off]
@@ -144,14 +144,16 @@ def _fly(
     return out, missed
 
 
-def held_joints(plan: JumpPlan, k: int) -> NDArray[np.bool_]:
+def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
     """The joints (n_joints) that stand still before and behind the impact at a knot: roll and yaw
     of a mirrored jump, which their motors keep."""
     still = (plan.velocity[k : k + 2, 6:] == 0.0).all(axis=0)
     return np.asarray(still)
 
 
-def _follow_interval(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> tuple[Array, Row | None]:
+def _follow_interval(
+    plan: PlannedJump, dynamics: ExactDynamics, k: int
+) -> tuple[Array, Row | None]:
     """How far exact dynamics from knot ``k`` misses the next knot, see ``Replay``, and the middle of
     the interval where it lasts."""
     q, v, planned_q, planned_v = (
@@ -177,7 +179,7 @@ def _follow_interval(plan: JumpPlan, dynamics: ExactDynamics, k: int) -> tuple[A
     return missed, middle
 
 
-def _sample(plan: JumpPlan, dynamics: ExactDynamics, between: list[Row]) -> Samples:
+def _sample(plan: PlannedJump, dynamics: ExactDynamics, between: list[Row]) -> ReplaySamples:
     """All knots, the middles of stance intervals and the steps of the flights, in time's order."""
     inside: dict[int, list[Row]] = {}
     for row in between:
@@ -199,7 +201,7 @@ def _sample(plan: JumpPlan, dynamics: ExactDynamics, between: list[Row]) -> Samp
             torque.append(dynamics.joint_torque(q, v, acceleration, force, jacobian))
         else:
             torque.append(np.zeros(plan.joint_torque.shape[1]))
-    return Samples(
+    return ReplaySamples(
         np.array([row[0] for row in rows]),
         np.array([row[1] for row in rows]),
         np.array([row[2] for row in rows]),

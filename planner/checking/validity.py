@@ -15,7 +15,7 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
-from ..task.plan import ARRAYS, JumpPlan
+from ..task.plan import ARRAYS, PlannedJump
 from .evidence import Evidence
 from .plan_tests import PLAN_TESTS
 from .replay import replay
@@ -25,7 +25,7 @@ class InvalidPlanError(AloftError):
     """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
     plan with its report, to look at and not to run."""
 
-    def __init__(self, message: str, plan: JumpPlan) -> None:
+    def __init__(self, message: str, plan: PlannedJump) -> None:
         super().__init__(message)
         self.plan = plan
 
@@ -80,7 +80,7 @@ class ValidityReport:
         )
 
 
-def check_plan(plan: JumpPlan, robot: RobotDescription) -> ValidityReport:
+def check_plan(plan: PlannedJump, robot: RobotDescription) -> ValidityReport:
     """Test a plan with the actuator profile it is for; about 0.1 s."""
     robot = plan.task.equipped(robot)
     broken = broken_array(plan, robot)
@@ -103,12 +103,12 @@ def _run_tests(evidence: Evidence) -> Iterator[PlanTest]:
             )  # fmt: skip
 
 
-def checked(plan: JumpPlan, robot: RobotDescription) -> JumpPlan:
+def checked(plan: PlannedJump, robot: RobotDescription) -> PlannedJump:
     """The plan with its validity report."""
     return plan.with_report(check_plan(plan, robot).as_json())
 
 
-def require_valid(plan: JumpPlan, robot: RobotDescription) -> None:
+def require_valid(plan: PlannedJump, robot: RobotDescription) -> None:
     """Let only valid plans through: what every user of a plan calls before a robot moves.
 
     The check is made anew; a report that came with a file is not believed.
@@ -124,7 +124,7 @@ def require_valid(plan: JumpPlan, robot: RobotDescription) -> None:
         )
 
 
-def broken_array(plan: JumpPlan, robot: RobotDescription) -> str:
+def broken_array(plan: PlannedJump, robot: RobotDescription) -> str:
     """What is wrong with the arrays themselves; empty where nothing is."""
     knots, joints = len(plan.time), len(robot.joints)
     shapes: dict[str, tuple[int, ...]] = {

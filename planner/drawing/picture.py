@@ -30,7 +30,7 @@ from ...robots.kinematics import link_poses
 from ..checking.evidence import Evidence, legs
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ WIDTH, POSTURES_HEIGHT, PANEL_HEIGHT = 14.0, 2.9, 2.3
 """The picture's width, and the heights of the row of postures and of a row of panels [inch]."""
 
 
-def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
+def plan_picture(plan: PlannedJump, robot: RobotDescription) -> str:
     """The picture as SVG text."""
     evidence = Evidence(plan, robot, replay(plan, robot))
     panels = plan_panels(evidence)
@@ -67,7 +67,7 @@ def plan_picture(plan: JumpPlan, robot: RobotDescription) -> str:
         return svg_text(figure)
 
 
-def write_picture(path: str | Path, plan: JumpPlan, robot: RobotDescription) -> Path:
+def write_picture(path: str | Path, plan: PlannedJump, robot: RobotDescription) -> Path:
     """Write the picture to an SVG file, whose folder is made if there is none."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,7 +75,7 @@ def write_picture(path: str | Path, plan: JumpPlan, robot: RobotDescription) -> 
     return path
 
 
-def draw_postures(axes: Axes, plan: JumpPlan, robot: RobotDescription) -> None:
+def draw_postures(axes: Axes, plan: PlannedJump, robot: RobotDescription) -> None:
     """Draw the robot from its right side at several instants, side by side, to scale.
 
     Every posture has its centre of mass above its own time. The ground is drawn at the height of
@@ -119,7 +119,7 @@ def draw_postures(axes: Axes, plan: JumpPlan, robot: RobotDescription) -> None:
     axes.set_axis_off()
 
 
-def posture_times(plan: JumpPlan) -> Array:
+def posture_times(plan: PlannedJump) -> Array:
     """Instants [s] that show the whole motion: more of them about the thrust and in the flight."""
     if plan.later_flights:
         return np.linspace(0.0, plan.time[-1], POSTURES)
@@ -157,7 +157,7 @@ def plan_panels(e: Evidence) -> list[Panel]:
     ]
 
 
-def phases_of(plan: JumpPlan) -> list[Shade]:
+def phases_of(plan: PlannedJump) -> list[Shade]:
     """From when to when each phase lasts [s], with its name."""
     changes = np.flatnonzero(np.diff(plan.phase)) + 1
     starts = np.concatenate([[0], changes])
@@ -170,21 +170,21 @@ def phases_of(plan: JumpPlan) -> list[Shade]:
     ]
 
 
-def com_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+def com_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
     """The path of the centre of mass, from where it stands at first."""
     path = 100.0 * (plan.com - plan.com[0])
     lines = [Line(name, plan.time, path[:, k]) for k, name in enumerate(("forward", "left", "up"))]
     return "centre of mass, from standing [cm]", lines
 
 
-def velocity_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+def velocity_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
     """The velocity of the centre of mass."""
     names = ("forward", "left", "up")
     lines = [Line(name, plan.time, plan.com_velocity[:, k]) for k, name in enumerate(names)]
     return "velocity of the centre of mass [m/s]", lines
 
 
-def momentum_lines(plan: JumpPlan) -> tuple[str, list[Line]]:
+def momentum_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
     """The angular momentum about the centre of mass."""
     names = ("roll", "pitch", "yaw")
     lines = [Line(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
@@ -254,7 +254,7 @@ def speed_lines(e: Evidence) -> tuple[str, list[Line]]:
     return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
 
 
-def _interval_ends(plan: JumpPlan) -> tuple[Array, NDArray[np.int64]]:
+def _interval_ends(plan: PlannedJump) -> tuple[Array, NDArray[np.int64]]:
     """The times of both ends of every interval that has a length, and the interval's number.
 
     Lines of what is constant over each interval have these points.

@@ -1,4 +1,4 @@
-"""A planned jump as a table over time, and how a reference is read from it."""
+"""A planned jump as a table over time, and how a reference is read from it: ``read_table``."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.signals import JumpReference, Phase
-from ...mathematics.arrays import Array, Array0D, Array1D, Array2D, Flags0D, Flags1D, Flags2D
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Flags2D
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise
 from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics
 
-_THRUST, _FLIGHT, _LANDING = int(Phase.THRUST), int(Phase.FLIGHT), int(Phase.LANDING)
-
+COLUMNS = (
+    "com", "com_velocity", "com_acceleration", "orientation", "angular_velocity", "angular_momentum",
+    "angular_momentum_rate", "foot_position", "foot_velocity", "foot_yaw", "foot_pitch",
+    "joint_position", "joint_velocity", "joint_acceleration", "joint_torque",
+)  # fmt: skip
+"""The fields of ``JumpReference`` that a table has columns of, in the order of ``write_columns``."""
 _COLUMN = "column "
 _MARKS = ("squat_time", "thrust_time", "lift_off_time", "touchdown_time", "recover_time")
 _FED_FORWARD = (
@@ -79,14 +82,15 @@ class JumpTable:
         )  # fmt: skip
 
 
-class Rows(NamedTuple):
-    """The columns of a table side by side, in the order of ``Fields``.
+class TableRows(NamedTuple):
+    """The columns of a table side by side, in the order of ``COLUMNS``.
 
     ``time`` (n,) [s]; ``rows`` (n, width); ``sums`` (n, width), the integrals of what is ``fed`` (width,)
     forward; ``marks`` (2,) [s], when the squat and when the recovery begins; ``jumps`` (n_jumps, 3) [s],
     when thrust, flight and landing begin, and ``touchdowns`` (n_jumps,) the last of these again;
     ``toes_first`` (n_jumps,), whether only some of the points carry load then;
-    ``contact`` (n, n_contacts), or no row where all points carry load but in flight.
+    ``contact`` (n, n_contacts), or no row where all points carry load but in flight; and room for the
+    ``values`` (width,) of an instant.
     """
 
     time: Array1D
@@ -98,89 +102,50 @@ class Rows(NamedTuple):
     touchdowns: Array1D
     toes_first: Flags1D
     contact: Flags2D
+    values: Array1D
 
 
-class Fields(NamedTuple):
-    """The fields of ``JumpReference`` that are columns of a table, each flat."""
-
-    com: Array1D
-    com_velocity: Array1D
-    com_acceleration: Array1D
-    orientation: Array1D
-    angular_velocity: Array1D
-    angular_momentum: Array1D
-    angular_momentum_rate: Array1D
-    foot_position: Array1D
-    foot_velocity: Array1D
-    foot_yaw: Array1D
-    foot_pitch: Array1D
-    joint_position: Array1D
-    joint_velocity: Array1D
-    joint_acceleration: Array1D
-    joint_torque: Array1D
-
-
-class Marks(NamedTuple):
-    """The other fields of ``JumpReference``."""
-
-    time: Array0D
-    phase: NDArray[np.int64]
-    lift_off_time: Array0D
-    touchdown_time: Array0D
-    contact: Flags1D
-    toes_first: Flags0D
-
-
-class JumpTableReader:
-    """Writes the reference of any instant of a table to ``reference``, without allocating.
-
-    Attributes:
-        instant: the time, the lead and the hold of ``read`` [s], (3,).
-        call: reads the reference at ``instant``, for blocks whose own kernels write it.
-    """
-
-    def __init__(self, table: JumpTable, reference: JumpReference) -> None:
-        n = len(table.time)
-        columns = [table.columns[name].reshape(n, -1) for name in Fields._fields]
-        fed = np.concatenate([
-            np.full(rows.shape[1], name in _FED_FORWARD)
-            for name, rows in zip(Fields._fields, columns, strict=True)
-        ])  # fmt: skip
-        rows = np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float64)
-        first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
-        jumps = np.array([first, *table.later_jumps], dtype=np.float64)
-        contact = np.zeros((0, 1), np.bool_) if table.contact is None else table.contact
-        self.instant = np.zeros(3)
-        self.call = KernelCall(
-            read_table,
-            Rows(
-                np.ascontiguousarray(table.time, dtype=np.float64), rows,
-                integral(table.time, rows), fed, np.array([table.squat_time, table.recover_time]),
-                jumps, jumps[:, 2].copy(), lands_in_part(table.time, contact, jumps[:, 2]),
-                np.ascontiguousarray(contact),
-            ),
-            self.instant, np.zeros(rows.shape[1]),
-            Fields(*(getattr(reference, name).reshape(-1) for name in Fields._fields)),
-            Marks(*(getattr(reference, name) for name in Marks._fields)),
-        )  # fmt: skip
-
-    def read(self, time: float, lead: float = 0.0, hold: float = 0.0) -> None:
-        """The reference at ``time``; before the table its first row, after it its last.
-
-        Lift-off and touchdown times are those of the next flight, and from its middle on those of
-        the one behind it: whoever lands, early or late, knows by them that it goes on.
-
-        What a controller feeds forward, the acceleration, the rate of angular momentum and the
-        torques, is that of ``lead`` seconds later; with ``hold`` its mean over so many seconds
-        from then on, because a command holds until the next one. So a thrust that ends between two
-        commands ends with the right momentum.
-        """
-        self.instant[0], self.instant[1], self.instant[2] = time, lead, hold
-        self.call.run()
+def table_rows(table: JumpTable) -> TableRows:
+    """A table as ``read_table`` takes it."""
+    n = len(table.time)
+    columns = [table.columns[name].reshape(n, -1) for name in COLUMNS]
+    fed = np.concatenate([
+        np.full(rows.shape[1], name in _FED_FORWARD)
+        for name, rows in zip(COLUMNS, columns, strict=True)
+    ])  # fmt: skip
+    rows = np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float64)
+    first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
+    jumps = np.array([first, *table.later_jumps], dtype=np.float64)
+    contact = np.zeros((0, 1), np.bool_) if table.contact is None else table.contact
+    return TableRows(
+        np.ascontiguousarray(table.time, dtype=np.float64), rows, integral(table.time, rows), fed,
+        np.array([table.squat_time, table.recover_time]), jumps, jumps[:, 2].copy(),
+        lands_in_part(table.time, contact, jumps[:, 2]), np.ascontiguousarray(contact),
+        np.zeros(rows.shape[1]),
+    )  # fmt: skip
 
 
 @kernel
-def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
+def read_table(
+    table: TableRows, time: float, lead: float, hold: float, reference: JumpReference
+) -> None:
+    """Write the reference at ``time`` [s]; before the table its first row, after it its last.
+
+    Lift-off and touchdown times are those of the next flight, and from its middle on those of
+    the one behind it: whoever lands, early or late, knows by them that it goes on.
+
+    What a controller feeds forward, the acceleration, the rate of angular momentum and the
+    torques, is that of ``lead`` seconds later; with ``hold`` its mean over so many seconds
+    from then on, because a command holds until the next one. So a thrust that ends between two
+    commands ends with the right momentum.
+    """
+    interpolate_rows(table, time, lead, hold, table.values)
+    write_columns(table.values, reference)
+    write_marks(table, time, reference)
+
+
+@kernel
+def sum_to(table: TableRows, time: float, sign: float, out: Array1D) -> None:
     """Add ``sign`` times the integral of what is fed forward, from the first row to ``time``.
 
     Between its rows a column is linear.
@@ -202,8 +167,8 @@ def sum_to(table: Rows, time: float, sign: float, out: Array1D) -> None:
 
 
 @kernel
-def interpolate_rows(table: Rows, time: float, lead: float, hold: float, out: Array1D) -> None:
-    """All columns at ``time``, and what is fed forward as ``JumpTableReader.read`` says."""
+def interpolate_rows(table: TableRows, time: float, lead: float, hold: float, out: Array1D) -> None:
+    """All columns at ``time``, and what is fed forward as ``read_table`` says."""
     rows = table.rows
     here, part = locate(table.time, time)
     there, later = locate(table.time, time + lead)
@@ -230,63 +195,55 @@ def take(values: Array1D, first: int, out: Array1D) -> int:
 
 
 @kernel
-def write_fields(values: Array1D, fields: Fields) -> None:
-    """Write the columns to the fields of the reference."""
-    first = take(values, 0, fields.com)
-    first = take(values, first, fields.com_velocity)
-    first = take(values, first, fields.com_acceleration)
-    first = take(values, first, fields.orientation)
-    first = take(values, first, fields.angular_velocity)
-    first = take(values, first, fields.angular_momentum)
-    first = take(values, first, fields.angular_momentum_rate)
-    first = take(values, first, fields.foot_position)
-    first = take(values, first, fields.foot_velocity)
-    first = take(values, first, fields.foot_yaw)
-    first = take(values, first, fields.foot_pitch)
-    first = take(values, first, fields.joint_position)
-    first = take(values, first, fields.joint_velocity)
-    first = take(values, first, fields.joint_acceleration)
-    take(values, first, fields.joint_torque)
-    normalise(fields.orientation, fields.orientation)
+def take_rows(values: Array1D, first: int, out: Array2D) -> int:
+    """Fill the rows of ``out`` as ``take`` does."""
+    for row in range(out.shape[0]):
+        first = take(values, first, out[row])
+    return first
 
 
 @kernel
-def write_marks(table: Rows, time: float, marks: Marks) -> None:
+def write_columns(values: Array1D, reference: JumpReference) -> None:
+    """Write the values of all ``COLUMNS`` to the fields of the reference."""
+    first = take(values, 0, reference.com)
+    first = take(values, first, reference.com_velocity)
+    first = take(values, first, reference.com_acceleration)
+    first = take(values, first, reference.orientation)
+    first = take(values, first, reference.angular_velocity)
+    first = take(values, first, reference.angular_momentum)
+    first = take(values, first, reference.angular_momentum_rate)
+    first = take_rows(values, first, reference.foot_position)
+    first = take_rows(values, first, reference.foot_velocity)
+    first = take(values, first, reference.foot_yaw)
+    first = take(values, first, reference.foot_pitch)
+    first = take(values, first, reference.joint_position)
+    first = take(values, first, reference.joint_velocity)
+    first = take(values, first, reference.joint_acceleration)
+    take(values, first, reference.joint_torque)
+    normalise(reference.orientation, reference.orientation)
+
+
+@kernel
+def write_marks(table: TableRows, time: float, reference: JumpReference) -> None:
     """Write the phase, the times of the flight, and which points carry load."""
     jump = present_jump(time, table.touchdowns)
     thrust, lift_off = table.jumps[jump, 0], table.jumps[jump, 1]
     touchdown = table.jumps[jump, 2]
     squat, recover = table.marks[0], table.marks[1]
     phase = planned_phase(time, squat, thrust, lift_off, touchdown, recover)
-    if jump > 0 and phase < _THRUST:  # between two jumps it has landed, and does not squat
-        phase = _LANDING
-    marks.time[()] = time
-    marks.phase[()] = phase
+    if jump > 0 and phase < Phase.THRUST:  # between two jumps it has landed, and does not squat
+        phase = Phase.LANDING
+    reference.time = time
+    reference.phase = phase
     if jump + 1 < table.jumps.shape[0] and time >= 0.5 * (lift_off + touchdown):
         lift_off, touchdown = table.jumps[jump + 1, 1], table.jumps[jump + 1, 2]
-    marks.lift_off_time[()] = lift_off
-    marks.touchdown_time[()] = touchdown
-    marks.toes_first[()] = table.toes_first[jump]
+    reference.lift_off_time = lift_off
+    reference.touchdown_time = touchdown
+    reference.toes_first = table.toes_first[jump]
     row, _ = locate(table.time, time)
-    for point in range(marks.contact.shape[0]):
+    for point in range(reference.contact.shape[0]):
         planned = table.contact.shape[0] == 0 or bool(table.contact[row, point])
-        marks.contact[point] = phase != _FLIGHT and planned
-
-
-@kernel
-def read_table(
-    table: Rows, instant: Array1D, values: Array1D, fields: Fields, marks: Marks
-) -> None:
-    """The reference at an instant.
-
-    Args:
-        instant: the time, the lead and the hold of ``JumpTableReader.read`` [s], (3,).
-        values: scratch, (width,).
-    """
-    time = instant[0]
-    interpolate_rows(table, time, instant[1], instant[2], values)
-    write_fields(values, fields)
-    write_marks(table, time, marks)
+        reference.contact[point] = phase != Phase.FLIGHT and planned
 
 
 def lands_in_part(times: Array, contact: NDArray[np.bool_], touchdowns: Array) -> NDArray[np.bool_]:
@@ -320,7 +277,7 @@ def locate(times: Array1D, time: float) -> tuple[int, float]:
             low = middle
         else:
             high = middle
-    return low, (time - float(times[low])) / (float(times[high]) - float(times[low]))
+    return low, (time - times[low]) / (times[high] - times[low])
 
 
 @kernel
@@ -375,10 +332,10 @@ class FlightRotation(NamedTuple):
     again [s], the greatest rate [rad/s], and the direction, 1 forwards and -1 backwards.
     """
 
-    time: Array
-    rate: Array
-    left: Array
-    marks: Array
+    time: Array1D
+    rate: Array1D
+    left: Array1D
+    marks: Array1D
 
 
 def flight_rotation(table: JumpTable, robot: RobotDescription) -> FlightRotation | None:

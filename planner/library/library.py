@@ -14,8 +14,8 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..task.files import PlanError
-from ..task.plan import JumpPlan, PlanFileError, read_plan, task_of_header, write_plan
-from ..task.task import JumpTask, TaskError
+from ..task.plan import PlanFileError, PlannedJump, read_plan, task_of_header, write_plan
+from ..task.task import JumpTask, JumpTaskError
 
 
 def shipped_folder() -> Path:
@@ -57,7 +57,7 @@ SCALES = {
 ALIKE = 2.0
 """How far apart two tasks may be for the plan of one to say something about the other."""
 
-Solver = Callable[[JumpTask, RobotDescription, JumpPlan | None], JumpPlan]
+Solver = Callable[[JumpTask, RobotDescription, PlannedJump | None], PlannedJump]
 """Makes a plan of a task, starting from another plan where one is given."""
 
 
@@ -151,14 +151,14 @@ class PlanLibrary:
                 return found[0]
         return None
 
-    def attempt(self, task: JumpTask, solve: Solver | None = None) -> JumpPlan:
+    def attempt(self, task: JumpTask, solve: Solver | None = None) -> PlannedJump:
         """A plan of a task, valid or not, with its report, which is made anew.
 
         As ``plan``, but one that fails the validity check is kept too, in a folder of its own
         where ``plan`` and everybody else never look: it must be asked for in this way.
 
         Raises:
-            TaskError, PlanFileError, PlanError: as ``plan``.
+            JumpTaskError, PlanFileError, PlanError: as ``plan``.
         """
         from ..checking.validity import InvalidPlanError, checked  # a graph is checked without it
 
@@ -177,7 +177,7 @@ class PlanLibrary:
         files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
         return frozenset(path.stem.rpartition("-")[2] for path in files)
 
-    def find(self, task: JumpTask) -> JumpPlan | None:
+    def find(self, task: JumpTask) -> PlannedJump | None:
         """The plan of that very task, or ``None``.
 
         Raises:
@@ -193,7 +193,7 @@ class PlanLibrary:
                 f"{error}; put the file back, or remove it to have the task planned anew"
             ) from error
 
-    def nearest(self, task: JumpTask) -> tuple[JumpPlan, float] | None:
+    def nearest(self, task: JumpTask) -> tuple[PlannedJump, float] | None:
         """The valid plan of the nearest task that can be started from, and how far it is."""
         # The files hold whole tasks, so plain data is compared: to make a task of each takes longer
         # than to plan one.
@@ -216,7 +216,7 @@ class PlanLibrary:
             return None
         return plan, next(d for d, name in found if plan.task.hash(self.robot) in name)
 
-    def _first_valid(self, names: Iterable[str]) -> JumpPlan | None:
+    def _first_valid(self, names: Iterable[str]) -> PlannedJump | None:
         """The first of these files that holds a valid plan of the task that it is named after."""
         for name in names:
             try:
@@ -227,7 +227,7 @@ class PlanLibrary:
                 return plan
         return None
 
-    def farthest(self, task: JumpTask, parameter: str, modest: float) -> JumpPlan | None:
+    def farthest(self, task: JumpTask, parameter: str, modest: float) -> PlannedJump | None:
         """Of the valid plans of tasks like this one but for ``parameter``, which lies between
         ``modest`` and what the task says, the one that goes farthest; other parameters may be
         ``ALIKE`` apart."""
@@ -257,7 +257,7 @@ class PlanLibrary:
         for path, header in self.headers():
             try:
                 yield path, task_of_header(header)
-            except (KeyError, TypeError, TaskError):
+            except (KeyError, TypeError, JumpTaskError):
                 continue
 
     def headers(self) -> Iterator[tuple[Path, dict[str, Any]]]:
@@ -284,7 +284,7 @@ class PlanLibrary:
             path.unlink(missing_ok=True)
         return others
 
-    def add(self, plan: JumpPlan) -> Path:
+    def add(self, plan: PlannedJump) -> Path:
         """Keep a plan, which replaces any of the same task in this folder."""
         path = self.folder / kept_name(plan.task, self.robot)
         write_plan(path, plan, names_of(self.robot))
@@ -295,14 +295,14 @@ class PlanLibrary:
 
     def plan(
         self, task: JumpTask, solve: Solver | None = None, *, anew: bool = False
-    ) -> tuple[JumpPlan, bool]:
+    ) -> tuple[PlannedJump, bool]:
         """A valid plan of a task, and whether it was kept already.
 
         The exact plan where it is kept; else solved, from the nearest plan if there is one and
         from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
 
         Raises:
-            TaskError: what is asked for contradicts itself or the robot.
+            JumpTaskError: what is asked for contradicts itself or the robot.
             PlanFileError: the kept plan's file is damaged.
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
@@ -351,18 +351,18 @@ def _robot_of(path: Path) -> str | None:
 def solve_and_check(
     task: JumpTask,
     robot: RobotDescription,
-    warm_start: JumpPlan | None = None,
+    warm_start: PlannedJump | None = None,
     solve: Solver | None = None,
     *,
     refine: bool = True,
-) -> JumpPlan:
+) -> PlannedJump:
     """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
 
     With ``refine`` a plan that fails the check because its intervals are too long is solved again on
     finer ones.
 
     Raises:
-        TaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
+        JumpTaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
     from ..checking.validity import checked, require_valid
     from ..solving.solve import ROUNDS, curable
@@ -391,7 +391,9 @@ def solve_and_check(
     return plan
 
 
-def solve_task(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+def solve_task(
+    task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+) -> PlannedJump:
     """The planner."""
     from ..solving.solve import solve_jump
 

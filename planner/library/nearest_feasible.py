@@ -16,8 +16,8 @@ from ...robots.description import RobotDescription
 from ..checking.plan_tests import active_limits
 from ..checking.validity import InvalidPlanError
 from ..solving.solver_process import cpu_time
-from ..task.files import PlanError, TaskError
-from ..task.plan import JumpPlan
+from ..task.files import JumpTaskError, PlanError
+from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .library import SCALES, PlanLibrary, Solver, solve_and_check
 
@@ -38,7 +38,7 @@ SHARES = 20
 
 
 @dataclass(frozen=True)
-class Axis:
+class SearchedParameter:
     """A parameter that may be changed: a modest value, the steps of the search, and how people
     write it: ``shown`` per SI unit, in ``unit``."""
 
@@ -54,16 +54,16 @@ class Axis:
 
 DEGREE = math.pi / 180.0
 AXES = {
-    "rise": Axis(0.08, 0.005, 100.0, "cm"),
-    "take_off_speed": Axis(1.2, 0.05, 1.0, "m/s"),
-    "distance_x": Axis(0.0, 0.01, 100.0, "cm"),
-    "distance_y": Axis(0.0, 0.01, 100.0, "cm"),
-    "twist": Axis(0.0, 2.0 * DEGREE, 1.0 / DEGREE, "deg"),
-    "landing_height": Axis(0.0, 0.005, 100.0, "cm"),
-    "foot_clearance": Axis(0.02, 0.0025, 1000.0, "mm"),
-    "leg_clearance": Axis(0.01, 0.0025, 1000.0, "mm"),
-    "friction": Axis(0.7, 0.025, 1.0, ""),
-    "effort": Axis(1.0, 0.025, 1.0, ""),
+    "rise": SearchedParameter(0.08, 0.005, 100.0, "cm"),
+    "take_off_speed": SearchedParameter(1.2, 0.05, 1.0, "m/s"),
+    "distance_x": SearchedParameter(0.0, 0.01, 100.0, "cm"),
+    "distance_y": SearchedParameter(0.0, 0.01, 100.0, "cm"),
+    "twist": SearchedParameter(0.0, 2.0 * DEGREE, 1.0 / DEGREE, "deg"),
+    "landing_height": SearchedParameter(0.0, 0.005, 100.0, "cm"),
+    "foot_clearance": SearchedParameter(0.02, 0.0025, 1000.0, "mm"),
+    "leg_clearance": SearchedParameter(0.01, 0.0025, 1000.0, "mm"),
+    "friction": SearchedParameter(0.7, 0.025, 1.0, ""),
+    "effort": SearchedParameter(1.0, 0.025, 1.0, ""),
 }
 """The parameters that may be changed."""
 
@@ -102,7 +102,7 @@ class NearestFeasible:
     beyond: float
     solves: int
     cpu_s: float
-    plan: JumpPlan
+    plan: PlannedJump
     binds: tuple[str, ...] = ()
     others: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
@@ -140,7 +140,7 @@ def nearest_feasible(
     ``family`` is the constraint family that could not be met; it decides what is tried first.
     ``progress`` is told what is being tried, and plans of ``library`` say where to begin.
     """
-    search = _Search(task, robot, solve, seconds, progress, library)
+    search = _FeasibleSearch(task, robot, solve, seconds, progress, library)
     tried = candidates(task, family)
     ways = continuation_path(task)
     for parameter in tried[:SINGLE] if ways else tried:
@@ -215,7 +215,9 @@ def _quick(solve: Solver | None, near: bool) -> Solver:
     """The planner, which gives up soon. From a near plan, too, it tries from nothing by itself."""
     from ..solving.solve import solve_jump
 
-    def make(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+    def make(
+        task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+    ) -> PlannedJump:
         if solve is not None:
             return solve(task, robot, warm_start)
         if near and warm_start is None:
@@ -225,7 +227,7 @@ def _quick(solve: Solver | None, near: bool) -> Solver:
     return make
 
 
-class _Search:
+class _FeasibleSearch:
     """The solves so far, and the bound on them."""
 
     def __init__(
@@ -279,7 +281,7 @@ class _Search:
             {name: ends[name] for name in others},
         )  # fmt: skip
 
-    def _kept(self, way: list[dict[str, float]]) -> tuple[int, JumpPlan | None]:
+    def _kept(self, way: list[dict[str, float]]) -> tuple[int, PlannedJump | None]:
         """The point of a way that a kept plan of a similar task goes up to, or where that has no plan
         one at three quarters of it, and a plan there, which is the kept one or starts from it; else
         ``None``. With little time left, three quarters come first."""
@@ -304,7 +306,7 @@ class _Search:
                 return begin, plan
         return 0, None
 
-    def _try(self, values: Mapping[str, float], start: JumpPlan | None) -> JumpPlan | None:
+    def _try(self, values: Mapping[str, float], start: PlannedJump | None) -> PlannedJump | None:
         """A valid plan with those values, or ``None``."""
         self._progress(", ".join(f"{name}: {AXES[name].text(x)}" for name, x in values.items()))
         self._solves += 1
@@ -312,5 +314,5 @@ class _Search:
         make = _quick(self._solve, start is not None)
         try:
             return solve_and_check(task, self._robot, start, make, refine=False)
-        except (PlanError, InvalidPlanError, TaskError):
+        except (PlanError, InvalidPlanError, JumpTaskError):
             return None

@@ -24,7 +24,7 @@ from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
 from ..task.files import write_whole
-from ..task.plan import ARRAYS, JumpPlan
+from ..task.plan import ARRAYS, PlannedJump
 from .jump_table import JumpTable
 from .reference_table import reference_table
 
@@ -89,7 +89,7 @@ _valid = ResultCache[None]()
 _tables = ResultCache[JumpTable]()
 
 
-def content(plan: JumpPlan, robot: RobotDescription) -> bytes:
+def content(plan: PlannedJump, robot: RobotDescription) -> bytes:
     """A digest of all numbers of a plan, of its task, and of the robot."""
     digest = hashlib.blake2b(digest_size=16)
     for name in ARRAYS:
@@ -101,7 +101,7 @@ def content(plan: JumpPlan, robot: RobotDescription) -> bytes:
     return digest.digest()
 
 
-def require_valid_once(plan: JumpPlan, robot: RobotDescription) -> None:
+def require_valid_once(plan: PlannedJump, robot: RobotDescription) -> None:
     """As ``require_valid``, but only the first time for the same plan, robot and check, in any process.
 
     Raises:
@@ -111,7 +111,9 @@ def require_valid_once(plan: JumpPlan, robot: RobotDescription) -> None:
     _valid.get(key, lambda: unless_passed(key, lambda: require_valid(plan, robot)))
 
 
-def reference_table_once(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
+def reference_table_once(
+    plan: PlannedJump, robot: RobotDescription, stand_time: float
+) -> JumpTable:
     """As ``reference_table``, which is made once. It is not to be written to."""
     key = content(plan, robot), stand_time
 

@@ -26,7 +26,7 @@ from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion
 from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 
 State = tuple[float, int, Array, Array, Array]
@@ -38,7 +38,7 @@ STEP = 0.002
 """Longest time between two rows [s]."""
 
 
-def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) -> JumpTable:
+def reference_table(plan: PlannedJump, robot: RobotDescription, stand_time: float) -> JumpTable:
     """The plan as a table that begins with standing still for ``stand_time`` [s]."""
     dynamics = ExactDynamics(plan.task.equipped(robot))
     forces = _MiddleValues(plan, plan.contact_force)
@@ -86,7 +86,7 @@ def reference_table(plan: JumpPlan, robot: RobotDescription, stand_time: float) 
     )
 
 
-def _later_jumps(plan: JumpPlan, stand_time: float) -> Iterator[tuple[float, float, float]]:
+def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, float, float]]:
     """When thrust, flight and landing of the jumps behind the first begin."""
     for before, (lift_off, touchdown) in zip(
         plan.touchdown_times, plan.later_flights, strict=False
@@ -97,14 +97,14 @@ def _later_jumps(plan: JumpPlan, stand_time: float) -> Iterator[tuple[float, flo
         yield stand_time + begin, stand_time + lift_off, stand_time + touchdown
 
 
-def _contacts(plan: JumpPlan, intervals: list[int]) -> NDArray[np.bool_] | None:
+def _contacts(plan: PlannedJump, intervals: list[int]) -> NDArray[np.bool_] | None:
     """By row which points carry load, where it is not always all of them or none."""
     if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
         return None
     return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
 
 
-def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
+def _states(plan: PlannedJump, dynamics: ExactDynamics) -> Iterator[State]:
     """The motion, knots and what lies between them; two rows at an impact."""
     angles = euler_angles(plan.position[:, 3:7])
     last = len(plan.time) - 1
@@ -123,7 +123,7 @@ def _states(plan: JumpPlan, dynamics: ExactDynamics) -> Iterator[State]:
 
 
 def _base_motion(
-    plan: JumpPlan, dynamics: ExactDynamics, angles: Array, k: int, h: float
+    plan: PlannedJump, dynamics: ExactDynamics, angles: Array, k: int, h: float
 ) -> JointMotion:
     """The cubic of base position and Euler angles between two knots."""
     ends = []
@@ -155,7 +155,7 @@ class _MiddleValues:
     """What holds in the middle of the intervals, at any time: linear from one middle to the next,
     never across lift-off or touchdown."""
 
-    def __init__(self, plan: JumpPlan, values: Array) -> None:
+    def __init__(self, plan: PlannedJump, values: Array) -> None:
         self._time, self._values = plan.time, values
         lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
         ends = [knot for flight in flight_knots(plan) for knot in flight]

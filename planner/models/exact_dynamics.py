@@ -39,8 +39,9 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
+from ...mathematics.rotations import matrices_of_quaternions, skew, to_matrix
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet, matrices_of_quaternions
+from ...robots.kinematics import ball_feet
 from ...robots.pinocchio_model import build_pinocchio_model
 
 Vector = tuple[float, float, float]
@@ -213,7 +214,7 @@ def push(
     fx, fy, fz = force.tolist()
     mx, my, mz = moment.tolist()
     levers = side.lever.reshape(-1, 9).tolist()
-    wrench, rate = np.empty(6), np.empty(13)
+    wrench, rate, rotation = np.empty(6), np.empty(13), np.empty((3, 3))
 
     def rates(i: int, place: Array, speed: Array) -> Array:
         """The derivative of base position, quaternion and twist, (13,)."""
@@ -223,9 +224,8 @@ def push(
         x, y, z, w = x * size, y * size, z * size, w * size
         unit[3:7] = x, y, z, w
         # The base's axes in the world are the columns of this rotation.
-        a, b, c = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
-        d, e, f = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
-        g, h, j = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
+        to_matrix(unit[3:7], rotation)
+        (a, b, c), (d, e, f), (g, h, j) = rotation.tolist()
         # Of lever times rotation the sum over the contacts of r x R'F is the antisymmetric part.
         xx, xy, xz, yx, yy, yz, zx, zy, zz = levers[i]
         wrench[:] = (
@@ -336,8 +336,8 @@ class ExactDynamics:
         for ball in self.balls:
             # The material at the lowest point moves with the frame's origin and turns about it.
             frame = self.data.oMf[self.contact_frames[ball.point]]
-            x, y, z = points[ball.point] - frame.translation
-            lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            lever = np.empty((3, 3))
+            skew(points[ball.point] - frame.translation, lever)
             found[ball.point] = rows[ball.point][:3] - lever @ rows[ball.point][3:]
         return points, np.vstack(found)
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
-from ...robots.kinematics import matrices_of_quaternions
-from ..task.plan import JumpPlan
+from ...mathematics.rotations import matrices_of_quaternions, multiply
+from ..task.plan import PlannedJump
 from .exact_dynamics import ExactDynamics
 
 
@@ -23,6 +23,18 @@ def euler_angles(quaternions: Array) -> Array:
     about_y = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
     about_z = np.unwrap(np.arctan2(matrix[:, 1, 0], matrix[:, 1, 1]))
     return np.column_stack([about_x, about_y, about_z])
+
+
+def pose_of(q: Array) -> Array:
+    """Base position, quaternion x, y, z, w and joints of base position, pitch, roll, yaw and joints.
+
+    A product of half angles: it changes sign only where a full turn does.
+    """
+    half, quaternion = np.zeros((3, 4)), np.empty(4)
+    half[[0, 1, 2], [1, 0, 2]], half[:, 3] = np.sin(q[3:6] / 2), np.cos(q[3:6] / 2)
+    multiply(half[0], half[1], quaternion)
+    multiply(quaternion, half[2], quaternion)
+    return np.concatenate([q[:3], quaternion, q[6:]])
 
 
 def euler_rates(angles: Array, angular_velocity: Array) -> Array:
@@ -68,7 +80,7 @@ def cross(a: Array, b: Array) -> Array:
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
-def midpoint_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> tuple[Array, Array]:
+def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
     """What is left over in every interval, zero at impacts.
 
     Returns the gap, how far the coordinates miss those of a constant acceleration [m or rad],

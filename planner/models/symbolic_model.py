@@ -411,7 +411,7 @@ class Centroidal(NamedTuple):
     angular: Expression
 
 
-class _Carried(NamedTuple):
+class _SubtreeMomentum(NamedTuple):
     """What a link and all that hangs on it have, in the link's frame: mass, mass times the centre's
     place, linear momentum and angular momentum about the link's origin."""
 
@@ -457,7 +457,7 @@ def centroidal_momentum(
         linear: Any = ca.mtimes(turn, outer.linear)
         moment: Any = ca.mtimes(turn, outer.moment) + outer.mass * origin
         angular: Any = ca.mtimes(turn, outer.angular) + ca.cross(origin, linear)
-        held[joint.parent] = _Carried(
+        held[joint.parent] = _SubtreeMomentum(
             inner.mass + times * outer.mass,
             inner.moment + times * moment,
             inner.linear + times * linear,
@@ -473,11 +473,11 @@ def centroidal_momentum(
     )
 
 
-def _own(model: SymbolicModel, name: str, spin: Expression, speed: Expression) -> _Carried:
+def _own(model: SymbolicModel, name: str, spin: Expression, speed: Expression) -> _SubtreeMomentum:
     import casadi as ca
 
     link = model.robot.link(name)
     centre = ca.DM(list(link.com))
     linear = link.mass * (speed + ca.cross(spin, centre))
     angular = ca.mtimes(ca.DM(inertia_tensor(link)), spin) + ca.cross(centre, linear)
-    return _Carried(link.mass, link.mass * centre, linear, angular)
+    return _SubtreeMomentum(link.mass, link.mass * centre, linear, angular)

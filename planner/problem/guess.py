@@ -8,14 +8,14 @@ import numpy as np
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from .layout import Stretch
-from .problem import Problem
+from .layout import ProblemPhase
+from .problem import FullProblem
 
 USUAL_TIMES = {Phase.SQUAT: 0.4, Phase.THRUST: 0.2, Phase.LANDING: 0.15}
 """s; where the time of a phase is free."""
 
 
-def flight_guess(problem: Problem, number: int) -> tuple[float, float]:
+def flight_guess(problem: FullProblem, number: int) -> tuple[float, float]:
     """How long a flight lasts [s] and the vertical speed it begins with [m/s], roughly."""
     hop = problem.task.hops()[number]
     fall = hop.landing_height or 0.0
@@ -31,7 +31,7 @@ def flight_guess(problem: Problem, number: int) -> tuple[float, float]:
     return float(duration), float(fall / duration + 0.5 * GRAVITY * duration)
 
 
-def ballistic_guess(problem: Problem) -> Array:
+def ballistic_guess(problem: FullProblem) -> Array:
     """Every variable of the problem: the robot stands, flies as its centre of mass would, and
     stands again; the weight is shared equally by the contact points."""
     coordinates, assembly = problem.coordinates, problem.assembly
@@ -68,7 +68,7 @@ def ballistic_guess(problem: Problem) -> Array:
     return np.clip(guess, problem.lower, problem.upper)
 
 
-def _mean_length(problem: Problem, stretch: Stretch) -> float:
+def _mean_length(problem: FullProblem, stretch: ProblemPhase) -> float:
     """The mean length of a stretch's intervals [s]."""
     if stretch.flies:
         return flight_guess(problem, stretch.place)[0] / stretch.count
@@ -77,7 +77,7 @@ def _mean_length(problem: Problem, stretch: Stretch) -> float:
     return min(max(usual, low), high)
 
 
-def _guess_lengths(problem: Problem, guess: Array, k: int, mean: float) -> None:
+def _guess_lengths(problem: FullProblem, guess: Array, k: int, mean: float) -> None:
     """The mean interval lengths among a knot's variables: its own, and that it chooses."""
     assembly, knot = problem.assembly, problem.assembly.knots[k]
     if problem.stretch_at(k).timed:
@@ -87,7 +87,7 @@ def _guess_lengths(problem: Problem, guess: Array, k: int, mean: float) -> None:
         guess[assembly.control_start[k] + knot.hold] = _mean_length(problem, following)
 
 
-def displaced_guess(problem: Problem, straight: Problem, values: Array) -> Array:
+def displaced_guess(problem: FullProblem, straight: FullProblem, values: Array) -> Array:
     """Every variable of a problem, from the solution of the same jumps without their sideways
     displacements and twists: the whole robot is moved and turned in proportion to the flight."""
     coordinates, assembly = problem.coordinates, problem.assembly

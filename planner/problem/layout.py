@@ -20,7 +20,7 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ..task.sequence import PHASES
-from ..task.task import JumpTask, TaskError
+from ..task.task import JumpTask, JumpTaskError
 
 GROWTH = {Phase.SQUAT: 0.5, Phase.THRUST: 0.4, Phase.LANDING: 5.0}
 """The last interval's length by the first's."""
@@ -50,7 +50,7 @@ SHORTEST_STANCE, LONGEST_STANCE = 0.03, 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class ProblemPhase:
     """A phase of the problem.
 
     Attributes:
@@ -105,28 +105,30 @@ class Stretch:
         return low / self.count, high / self.count
 
 
-def layout(task: JumpTask, robot: RobotDescription) -> tuple[Stretch, ...]:
+def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
     """The stretches of a task in the order of time.
 
     Raises:
-        TaskError: a phase on the ground names no contact point.
+        JumpTaskError: a phase on the ground names no contact point.
     """
     names = [contact.name for contact in robot.contacts]
-    spans, found, knot, place = task.spans(), list[Stretch](), 0, 0
+    spans, found, knot, place = task.spans(), list[ProblemPhase](), 0, 0
     for number, span in enumerate(spans):
         phase, on_ground = PHASES[span.phase], span.on_ground(names)
         flies = phase is Phase.FLIGHT
         if not flies and not on_ground:
-            raise TaskError(
+            raise JumpTaskError(
                 f"phases.{number}.contacts: no contact point of {robot.name} is named like "
                 f"{span.contacts!r}; there is {', '.join(names)}, or all"
             )
         if task.impact and found and found[-1].flies:
-            found.append(Stretch(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True))
+            found.append(
+                ProblemPhase(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True)
+            )
             knot += 1
         last = all(later.phase != "flight" for later in spans[number:])
         count = span.knots or 1
         lengths = spacing(phase, count, last=last)
-        found.append(Stretch(phase, knot, count, span.time, lengths, place, on_ground))
+        found.append(ProblemPhase(phase, knot, count, span.time, lengths, place, on_ground))
         knot, place = knot + count, place + flies
     return tuple(found)

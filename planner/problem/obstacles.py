@@ -19,7 +19,7 @@ from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop
-from .layout import Stretch
+from .layout import ProblemPhase
 
 Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
@@ -107,7 +107,7 @@ class ObstacleRows:
         self.feet = len(self._of_kind["foot"])
         self.count = len(kinds)
 
-    def rows(self, hop: Hop, edge: float | None, stretch: Stretch, first: bool) -> Indices:
+    def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
         """The rows of a jump's knot; ``first`` says that it is the flight's first."""
         turns = bool(hop.rotation)
         landed = not stretch.flies and stretch.place > 0 and bool(hop.landing_height)

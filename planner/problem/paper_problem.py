@@ -39,12 +39,12 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models import simple_models as centroidal
-from ..models.quaternions import pose_of
+from ..models.midpoint import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask
 from .assembly import Knot
-from .program import BoundsBuilder, Grid, Program, ballistic_flight, uniform_grid
+from .program import BoundsBuilder, Grid, SimpleProblem, ballistic_flight, uniform_grid
 from .stage_functions import StageFunction, derived
 
 NAME = "paper"
@@ -191,7 +191,7 @@ class PaperProblemBuilder:
         self.last = len(self.grid.phases)
         self.q_start, self.q_end = pose_of(start.coordinates), pose_of(end.coordinates)
 
-    def build(self) -> Program:
+    def build(self) -> SimpleProblem:
         """The problem with its bounds, parameters and guess."""
         sizes = parameter_sizes(self.model)
         self.fill = BoundsBuilder(self._knots(), self.pieces, sizes)

@@ -22,7 +22,7 @@ from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
 from ..task.task import JumpTask
 from .assembly import Assembly
-from .layout import Stretch
+from .layout import ProblemPhase
 from .obstacles import step_parameters
 from .stage_functions import StageFunction, body_points, parameter_sizes
 from .structure import Structure
@@ -39,7 +39,7 @@ def rows_of_each(family: str, low: Array, high: Array) -> list[Rows]:
 
 
 @dataclass(frozen=True)
-class Problem:
+class FullProblem:
     """A problem ready to be solved.
 
     Attributes:
@@ -66,7 +66,7 @@ class Problem:
     row_upper: Array
     parameters: Array
     families: list[str]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[ProblemPhase, ...]
     steps: Array
     exact: SymbolicModel
 
@@ -100,7 +100,7 @@ class Problem:
         """The knots of the first flight."""
         return self.flights[0]
 
-    def stretch_at(self, k: int) -> Stretch:
+    def stretch_at(self, k: int) -> ProblemPhase:
         """The stretch of the interval that begins with a knot; the last one at the end."""
         return next((s for s in self.stretches if k < s.stop), self.stretches[-1])
 
@@ -140,7 +140,7 @@ class ProblemBuilder:
         self.pieces, self.free_base = pieces, coordinates.free_base
         self._nominal: dict[int, Array] = {}
 
-    def build(self) -> Problem:
+    def build(self) -> FullProblem:
         """The problem with its bounds and parameters."""
         self.assembly = Assembly(self.structure.knots, self.pieces)
         size, rows = self.assembly.variables, self.assembly.constraints
@@ -148,7 +148,7 @@ class ProblemBuilder:
         self.row_lower, self.row_upper = np.zeros(rows), np.zeros(rows)
         self.families = ["integration"] * rows
         self.parameters = np.zeros(self.assembly.parameters)
-        self.problem = Problem(
+        self.problem = FullProblem(
             self.task, self.model, self.coordinates, self.assembly, self.stances,
             self.lower, self.upper, self.row_lower, self.row_upper, self.parameters,
             self.families, self.stretches, self.steps, self.exact,
@@ -204,7 +204,7 @@ class ProblemBuilder:
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
 
-    def _least_load(self, stretch: Stretch) -> float:
+    def _least_load(self, stretch: ProblemPhase) -> float:
         """The least upward force of every contact point on the ground [N]."""
         if not self.margins.load or stretch.impact or stretch.phase == Phase.LANDING:
             return 0.0

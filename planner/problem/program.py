@@ -121,7 +121,7 @@ def joint_torques(
 
 
 @dataclass(frozen=True)
-class Program:
+class SimpleProblem:
     """A problem ready to be solved: what ``solver.solve`` reads, on a fixed grid.
 
     Attributes:
@@ -208,9 +208,9 @@ class BoundsBuilder:
             self.families[row] = family
 
     def done(self, task: JumpTask, model: SymbolicModel, grid: Grid, start: Stance, end: Stance
-             ) -> Program:  # fmt: skip
+             ) -> SimpleProblem:  # fmt: skip
         """The program."""
-        return Program(
+        return SimpleProblem(
             task, model, self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
             self.parameters, self.families, np.clip(self.guess, self.lower, self.upper), grid,
             start, end,

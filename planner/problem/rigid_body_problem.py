@@ -38,7 +38,7 @@ from ..models.symbolic_model import (
 )
 from ..task.task import JumpTask
 from .assembly import Knot
-from .program import BoundsBuilder, Program, ballistic_flight, uniform_grid
+from .program import BoundsBuilder, SimpleProblem, ballistic_flight, uniform_grid
 from .stage_functions import StageFunction, derived
 
 NAME = "srbm"
@@ -148,7 +148,7 @@ class RigidBodyProblemBuilder:
         self.forces = 3 * len(model.robot.contacts)
         self.ankles = {id(stance): ankles(model, stance) for stance in (start, end)}
 
-    def build(self) -> Program:
+    def build(self) -> SimpleProblem:
         """The problem with its bounds, parameters and guess."""
         self.fill = BoundsBuilder(self._knots(), self.pieces, parameter_sizes(self.model))
         for k in range(self.last + 1):

@@ -23,10 +23,10 @@ from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
-from ..task.sequence import Hop, Place, edge_of
+from ..task.sequence import Hop, StanceLocation, edge_of
 from ..task.task import JumpTask
 from .assembly import Knot
-from .layout import Stretch, layout
+from .layout import ProblemPhase, layout
 from .obstacles import ObstacleRows
 from .stage_functions import StageFunction
 
@@ -202,7 +202,7 @@ class Structure:
         fixed = tuple(i for i, _, _ in self.given[end])
         return [*knots, Knot(2 * n, 0, fixed=fixed)]
 
-    def _give(self, k: int, knot: Knot, stretch: Stretch, timed: Stretch | None) -> None:
+    def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:
         """What is given at a knot: the start, forces on points without contact, a next time."""
         n, given = self.n, []
         if k == 0:
@@ -219,14 +219,14 @@ class Structure:
             self.given[k] = given
             knot.fixed = tuple(i for i, _, _ in given)
 
-    def idle(self, stretch: Stretch) -> list[int]:
+    def idle(self, stretch: ProblemPhase) -> list[int]:
         """The contact variables' points that are not on the ground in a stance."""
         if stretch.flies:
             return []
         on = reduced_contacts(self.coordinates, stretch.contacts)
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
-    def _interval_rows(self, stretch: Stretch) -> NDArray[np.int64]:
+    def _interval_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
         """The rows of an interval that are kept: no friction where there is no contact, and
         pressure only where a share is asked for and the whole foot is down."""
         total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
@@ -241,7 +241,7 @@ class Structure:
             idle += range(total - pressure, total)
         return np.setdiff1d(rows, idle) if idle else rows
 
-    def _contact_rows(self, before: Stretch, stretch: Stretch) -> NDArray[np.int64]:
+    def _contact_rows(self, before: ProblemPhase, stretch: ProblemPhase) -> NDArray[np.int64]:
         """Which rows hold the feet at the knot between two intervals."""
         held, now = (
             set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
@@ -278,7 +278,7 @@ class Structure:
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
 
-    def hop_at(self, k: int) -> tuple[Hop, Place, float | None]:
+    def hop_at(self, k: int) -> tuple[Hop, StanceLocation, float | None]:
         """The jump under way at a knot, or the last one; where it began, and its step's edge."""
         number = min(self.of_knot[k].place, len(self.hops) - 1)
         hop, place = self.hops[number], self.places[number]
@@ -290,7 +290,7 @@ class Structure:
         return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
 
     def _moment_rows(
-        self, before: Stretch | None, stretch: Stretch, k: int
+        self, before: ProblemPhase | None, stretch: ProblemPhase, k: int
     ) -> NDArray[np.int64] | None:
         """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
         (angular momentum); ``None`` at any other knot."""
@@ -308,7 +308,7 @@ class Structure:
         return np.array(kept, dtype=np.int64)
 
     @staticmethod
-    def is_touchdown(before: Stretch | None, stretch: Stretch) -> bool:
+    def is_touchdown(before: ProblemPhase | None, stretch: ProblemPhase) -> bool:
         """Whether a knot between two intervals is the first on the ground, behind any impact."""
         landed = before is not None and (before.flies or before.impact)
         return landed and not stretch.flies and not stretch.impact

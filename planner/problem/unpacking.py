@@ -11,11 +11,17 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..models.midpoint import angular_motion, cross, euler_angles, euler_rates, rotation
-from ..models.quaternions import pose_of
+from ..models.midpoint import (
+    angular_motion,
+    cross,
+    euler_angles,
+    euler_rates,
+    pose_of,
+    rotation,
+)
 from ..models.symbolic_model import SymbolicModel
-from ..task.plan import JumpPlan
-from .problem import Problem
+from ..task.plan import PlannedJump
+from .problem import FullProblem
 
 Phases = Sequence[int]
 
@@ -75,7 +81,7 @@ ORDER = [1, 0, 2]
 """The planner's pitch, roll, yaw from angles about x, y, z, and back."""
 
 
-def knot_times(problem: Problem, values: Array) -> Array:
+def knot_times(problem: FullProblem, values: Array) -> Array:
     """The time of every knot [s]."""
     n, assembly = problem.coordinates.size, problem.assembly
     steps = problem.steps.copy()
@@ -85,7 +91,7 @@ def knot_times(problem: Problem, values: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def unpack(problem: Problem, values: Array) -> dict[str, Any]:
+def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     """The arrays of a plan, and its lift-off and touchdown times."""
     assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
@@ -139,7 +145,7 @@ def unpack(problem: Problem, values: Array) -> dict[str, Any]:
 
 
 def _middles_in_flight(
-    problem: Problem, values: Array, steps: Array,
+    problem: FullProblem, values: Array, steps: Array,
     q: Array, v: Array, middle: Array, moving: Array,
 ) -> None:  # fmt: skip
     """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
@@ -156,14 +162,14 @@ def _middles_in_flight(
             middle[k, base] += 0.125 * steps[k] * (v[k, base] - v[k + 1, base])
 
 
-def can_start(problem: Problem, plan: JumpPlan) -> bool:
+def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
     """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
     impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
     alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
     return _same_grid(problem, plan) or (alike and not impacts)
 
 
-def _same_grid(problem: Problem, plan: JumpPlan) -> bool:
+def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
     """Whether all intervals stand for the same; only then can there be impacts."""
     intervals = len(plan.time) == problem.knots
     impacts = {s.first for s in problem.stretches if s.impact}
@@ -174,7 +180,7 @@ def _same_grid(problem: Problem, plan: JumpPlan) -> bool:
     )
 
 
-def pack(problem: Problem, plan: JumpPlan, guess: Array) -> Array:
+def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
     """Variables near a plan of a task like this one; ``guess`` elsewhere.
 
     The plan may have other numbers of knots: it is followed phase by phase, and must go through

@@ -25,7 +25,7 @@ from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..problem.stage_functions import PIECES, StageFunction, make_piece
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from ..task.task import Knots
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
@@ -251,7 +251,7 @@ class SolveOptions:
         quick: whether to give up soon: what is not found in a few iterations is not looked for.
     """
 
-    warm_start: JumpPlan | None = None
+    warm_start: PlannedJump | None = None
     progress: Progress | None = None
     compiled: bool = True
     solver: str = ""

@@ -15,9 +15,9 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
-from ..problem.program import Program, joint_torques
+from ..problem.program import SimpleProblem, joint_torques
 from ..task.files import PlanError
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .solver import Solution
 
@@ -38,7 +38,7 @@ ADVICE = {
 }
 
 
-def statistics_of(problem: Program, solution: Solution) -> dict[str, Any]:
+def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
     """How a problem on a fixed grid was solved, for the plan; the whole time comes to it later."""
     return {
         "solver": solution.solver,
@@ -77,7 +77,7 @@ def versions() -> dict[str, str]:
 
 
 def motion_arrays(
-    problem: Program, steps: Array, position: Array, velocity: Array, force: Array
+    problem: SimpleProblem, steps: Array, position: Array, velocity: Array, force: Array
 ) -> dict[str, Any]:
     """The motion at the knots, with accelerations by differences and torques by exact dynamics.
 
@@ -105,7 +105,7 @@ def motion_arrays(
     }
 
 
-def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -> JumpPlan:
+def for_all_joints(plan: PlannedJump, part: WeldedRobot, robot: RobotDescription) -> PlannedJump:
     """A plan of the welded robot as one of the whole robot.
 
     Held joints keep their angle. Their torques are what exact dynamics needs to keep them there.
@@ -127,7 +127,7 @@ def for_all_joints(plan: JumpPlan, part: WeldedRobot, robot: RobotDescription) -
     )
 
 
-def for_moving_joints(plan: JumpPlan, part: WeldedRobot) -> JumpPlan:
+def for_moving_joints(plan: PlannedJump, part: WeldedRobot) -> PlannedJump:
     """A plan of the whole robot as one of the welded robot, to start a solver from."""
     if not part.held:
         return plan

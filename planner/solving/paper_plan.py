@@ -8,13 +8,13 @@ import numpy as np
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ...robots.kinematics import matrices_of_quaternions
 from ..models.robot_model import model_of, stances_of
 from ..problem import paper_problem as stages
 from ..problem.paper_problem import PaperProblemBuilder
-from ..problem.program import Program
-from ..task.plan import JumpPlan
+from ..problem.program import SimpleProblem
+from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions
 from .outcome import failure, motion_arrays, statistics_of, versions
@@ -31,7 +31,7 @@ def paper_problem(
     *,
     compiled: bool = True,
     progress: Progress | None = None,
-) -> Program:
+) -> SimpleProblem:
     """The paper's problem of a task.
 
     Raises:
@@ -46,7 +46,7 @@ def paper_problem(
     return PaperProblemBuilder(task, model, pieces, stances[0], stances[-1]).build()
 
 
-def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
+def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
     """The plan of a task as the paper would make it; see ``solve_jump``.
 
     A ``warm_start`` is not used. IPOPT is tried first: the equations have index three, as the
@@ -66,10 +66,10 @@ def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) 
     statistics = statistics_of(problem, solution)
     arrays = unpack(problem, solution.values, robot)
     statistics["cpu_s"] = cpu_time() - started
-    return JumpPlan(task=task, statistics=statistics, versions=versions(), **arrays)
+    return PlannedJump(task=task, statistics=statistics, versions=versions(), **arrays)
 
 
-def unpack(problem: Program, values: Array, robot: RobotDescription) -> dict[str, Any]:
+def unpack(problem: SimpleProblem, values: Array, robot: RobotDescription) -> dict[str, Any]:
     """The arrays of a plan. Centre of mass and momentum are the paper's variables r, rdot and h;
     the torques follow from exact inverse dynamics and nothing limits them."""
     model, grid = problem.model, problem.grid

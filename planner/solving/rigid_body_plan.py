@@ -17,18 +17,18 @@ import numpy as np
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ...robots.kinematics import matrices_of_quaternions
-from ..models.quaternions import pose_of
+from ..models.midpoint import pose_of
 from ..models.robot_model import Stance, model_of, stances_of
 from ..models.simple_models import BLEND, RigidBody, composite_inertia
 from ..models.symbolic_model import SymbolicModel
 from ..problem import rigid_body_problem as stages
-from ..problem.program import Program
+from ..problem.program import SimpleProblem
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..problem.unpacking import twist
 from ..task.files import PlanError
-from ..task.plan import JumpPlan
+from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions
 from .outcome import failure, motion_arrays, statistics_of, versions
@@ -186,7 +186,7 @@ def rigid_body_problem(
     *,
     compiled: bool = True,
     progress: Progress | None = None,
-) -> tuple[Program, RigidBody]:
+) -> tuple[SimpleProblem, RigidBody]:
     """The single rigid body's problem of a task, and the body.
 
     Raises:
@@ -203,7 +203,7 @@ def rigid_body_problem(
     return builder.build(), body
 
 
-def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
+def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
     """The plan of a task for a single rigid body; see ``solve_jump``. A ``warm_start`` is not used.
 
     Raises:
@@ -221,11 +221,11 @@ def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOpti
     statistics = statistics_of(problem, solution)
     arrays = unpack(problem, body, solution.values, robot)
     statistics["cpu_s"] = cpu_time() - started
-    return JumpPlan(task=task, statistics=statistics, versions=versions(), **arrays)
+    return PlannedJump(task=task, statistics=statistics, versions=versions(), **arrays)
 
 
 def unpack(
-    problem: Program, body: RigidBody, values: Array, robot: RobotDescription
+    problem: SimpleProblem, body: RigidBody, values: Array, robot: RobotDescription
 ) -> dict[str, Any]:
     """The arrays of a plan. The angular momentum is the rigid body's, R I w; the robot's own, which
     its legs change, follows from positions and velocities. Torques are by exact inverse dynamics."""

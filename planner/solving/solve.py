@@ -25,13 +25,13 @@ from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance, model_of, stances_of, symmetric_model_of
 from ..models.symbolic_model import SymbolicModel
 from ..problem.guess import USUAL_TIMES, ballistic_guess, displaced_guess
-from ..problem.layout import Stretch, layout
-from ..problem.problem import Problem, ProblemBuilder
+from ..problem.layout import ProblemPhase, layout
+from ..problem.problem import FullProblem, ProblemBuilder
 from ..problem.stage_functions import PIECES, make_coordinates
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
-from ..task.files import PlanError, TaskError
-from ..task.plan import ARRAYS, JumpPlan
+from ..task.files import JumpTaskError, PlanError
+from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, Knots
@@ -50,7 +50,7 @@ COLD_LIMIT, WARM_LIMIT = 250, 100
 """Iterations."""
 
 
-def eased(problem: Problem, ease: float) -> Problem:
+def eased(problem: FullProblem, ease: float) -> FullProblem:
     """The problem with motor limits ``ease`` times as high."""
     motors = np.array([family.startswith("motor") for family in problem.families])
     scale = np.where(motors, ease, 1.0)
@@ -59,7 +59,7 @@ def eased(problem: Problem, ease: float) -> Problem:
     )
 
 
-def tighten(problem: Problem, values: Array, ease: float) -> Solution | None:
+def tighten(problem: FullProblem, values: Array, ease: float) -> Solution | None:
     """A solution of the problem, from one of the problem eased so much; ``None`` if none is
     reached."""
     step, found = FIRST_STEP, None
@@ -77,7 +77,7 @@ def tighten(problem: Problem, values: Array, ease: float) -> Solution | None:
     return replace(found, iterations=iterations, cpu=cpu)
 
 
-def from_eased(problem: Problem, guess: Array) -> Solution | None:
+def from_eased(problem: FullProblem, guess: Array) -> Solution | None:
     """A solution of the problem from a rough guess, by way of eased ones."""
     for ease in EASES:
         first = solve(eased(problem, ease), guess, solver="fatrop", limit=COLD_LIMIT)
@@ -88,7 +88,7 @@ def from_eased(problem: Problem, guess: Array) -> Solution | None:
     return None
 
 
-def with_impacts(plan: JumpPlan) -> JumpPlan:
+def with_impacts(plan: PlannedJump) -> PlannedJump:
     """A plan whose feet arrive at rest with an impact of no impulse after every flight."""
     flying = np.append(plan.phase[:-1] == 3, False)
     touchdowns = np.flatnonzero(flying[:-1] & ~flying[1:]) + 1
@@ -117,7 +117,7 @@ CURABLE_EXCESS = 8.0
 """A figure further than this many times its limit is no error of the grid."""
 
 
-def curable(plan: JumpPlan) -> bool:
+def curable(plan: PlannedJump) -> bool:
     """Whether a plan with its report failed by what finer intervals may cure."""
     failed = [test for test in plan.report.get("tests", []) if not test["passed"]]
     return bool(failed) and all(
@@ -126,7 +126,7 @@ def curable(plan: JumpPlan) -> bool:
     )
 
 
-def finer_knots(plan: JumpPlan) -> Knots:
+def finer_knots(plan: PlannedJump) -> Knots:
     """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
     with the most counts."""
     count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
@@ -151,7 +151,7 @@ def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
     return task.model_copy(update=changed)
 
 
-def asks_for_finer(task: JumpTask, plan: JumpPlan | None) -> bool:
+def asks_for_finer(task: JumpTask, plan: PlannedJump | None) -> bool:
     """Whether a plan to start from is a failed one of that very task."""
     return (
         plan is not None
@@ -168,7 +168,7 @@ QUICK_NEAR = 40
 LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
-Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], JumpPlan]
+Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], PlannedJump]
 """Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
 out the robot's held joints."""
 
@@ -177,13 +177,13 @@ def solve_jump(
     task: JumpTask,
     robot: RobotDescription,
     *,
-    warm_start: JumpPlan | None = None,
+    warm_start: PlannedJump | None = None,
     progress: Progress | None = None,
     compiled: bool = True,
     solver: str = "",
     knots: Knots | None = None,
     quick: bool = False,
-) -> JumpPlan:
+) -> PlannedJump:
     """The plan of a task, in the formulation that it names; ``SolveOptions`` explains the rest.
 
     Joints that the robot's description holds keep still. The result does not depend on the number
@@ -191,13 +191,13 @@ def solve_jump(
 
     Raises:
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
-        TaskError: the task names joints that the robot has not.
+        JumpTaskError: the task names joints that the robot has not.
     """
     try:
         robot = task.equipped(robot)
         chosen = [choice.as_json() for choice in choices(task, robot)]
         task = task.resolved(robot)
-    except TaskError as error:
+    except JumpTaskError as error:
         raise PlanError(str(error), family="motor torque") from error
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
@@ -208,7 +208,7 @@ def solve_jump(
     return for_all_joints(plan, part, robot)
 
 
-def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> JumpPlan:
+def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
     """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = cpu_time()
     warm_start, solver = options.warm_start, options.solver
@@ -267,7 +267,7 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         "constraints": problem.assembly.constraints,
         "compiled": not problem.assembly.interpreted,
     }
-    return JumpPlan(
+    return PlannedJump(
         task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
     )
 
@@ -287,13 +287,13 @@ def make_problem(
     compiled: bool = True,
     progress: Progress | None = None,
     coordinates: str = "",
-) -> Problem:
+) -> FullProblem:
     """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
 
     Elsewhere times on the ground that are free are those of the same jumps straight ahead and
     without impacts: with all coordinates and such times fatrop does not come to an end.
 
-    Raises ``PlanError`` and ``TaskError`` as ``solve_jump`` does.
+    Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
@@ -330,7 +330,7 @@ def _mirrors(task: JumpTask) -> tuple[str, ...]:
 
 def _choose(
     model: SymbolicModel, names: tuple[str, ...], stances: tuple[Stance, ...],
-    stretches: tuple[Stretch, ...],
+    stretches: tuple[ProblemPhase, ...],
 ) -> Coordinates | None:  # fmt: skip
     """The first of these coordinates that the stances and the contacts allow."""
     every = np.array([stance.coordinates for stance in stances])
@@ -380,25 +380,25 @@ def straight_ahead(task: JumpTask) -> JumpTask:
     return task.model_copy(update={**ahead, "jumps": jumps})
 
 
-def _barrier(problem: Problem) -> float:
+def _barrier(problem: FullProblem) -> float:
     """The barrier's parameter for starts from another plan. With all coordinates such a plan is further
     from the solution, and a higher barrier takes a fifth fewer iterations."""
     return 1e-3 if problem.coordinates.name == "full" else NEAR
 
 
-def _last(problem: Problem) -> int:
+def _last(problem: FullProblem) -> int:
     """Iterations that the last attempt may take. Longer ones leave no time to look for a task that can be planned."""
     hops = problem.task.hops()
     alone = len(hops) == 1 and not hops[0].rotation
     return LAST if alone and problem.coordinates.name == "full" else LIMIT
 
 
-def _leaves_plane(problem: Problem, plan: JumpPlan) -> bool:
+def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
     """Whether a problem has all coordinates, and a plan of it would start from one that has not."""
     return problem.coordinates.name == "full" and plan.statistics.get("coordinates") != "full"
 
 
-def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
+def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
     """A guess from the same jump straight ahead, where there is one and it can be solved."""
     if problem.coordinates.name != "full":
         return None
@@ -410,7 +410,7 @@ def _displaced(problem: Problem, robot: RobotDescription) -> Array | None:
     return displaced_guess(problem, straight, solution.values) if solution.solved else None
 
 
-def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solution | None:
+def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Solution | None:
     """A somersault by way of stronger motors; one with impacts also by way of one without."""
     found = from_eased(problem, guess)
     if found is not None or not problem.task.impact:
@@ -421,7 +421,7 @@ def _turning(problem: Problem, robot: RobotDescription, guess: Array) -> Solutio
         first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
         if not first.solved:
             continue
-        plan = with_impacts(JumpPlan(task=task, **unpack(gentle, first.values)))
+        plan = with_impacts(PlannedJump(task=task, **unpack(gentle, first.values)))
         found = tighten(problem, pack(problem, plan, guess), ease)
         if found is not None:
             return found

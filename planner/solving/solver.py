@@ -32,7 +32,7 @@ KEPT = 12
 """Solvers kept for problems of the same structure."""
 
 
-class Problem(Protocol):
+class NonlinearProgram(Protocol):
     """What is solved: of every formulation the structure, bounds and parameters."""
 
     @property
@@ -87,7 +87,7 @@ class Solution:
 
 
 def solve(
-    problem: Problem,
+    problem: NonlinearProgram,
     guess: Array,
     *,
     warm: bool = False,
@@ -124,7 +124,9 @@ def solve(
     return best
 
 
-def _run(problem: Problem, guess: Array, name: str, barrier: float, limit: int) -> Solution:
+def _run(
+    problem: NonlinearProgram, guess: Array, name: str, barrier: float, limit: int
+) -> Solution:
     started = cpu_time()
     function, evaluate, constraint = _solver(problem.assembly, name, barrier, limit)
 
@@ -152,12 +154,12 @@ def _run(problem: Problem, guess: Array, name: str, barrier: float, limit: int) 
     )  # fmt: skip
 
 
-def patience(problem: Problem, limit: int) -> int:
+def patience(problem: NonlinearProgram, limit: int) -> int:
     """How long a solver may take for so many iterations [s of processor time]."""
     return max(2, math.ceil(PATIENCE * limit * sum(problem.assembly.nx)))
 
 
-def violation_of(problem: Problem, values: Array, constraint: Any) -> tuple[float, str]:
+def violation_of(problem: NonlinearProgram, values: Array, constraint: Any) -> tuple[float, str]:
     """The largest violation of a constraint or bound, and the family it belongs to."""
     if not np.isfinite(values).all():
         return np.inf, "dynamics"

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...files.document import read_value
+from ...files.nodes import ListNode, MapNode, Node, plain
+from ...files.problems import Position, Problems
 from ...runtime.language.errors import AloftError
-from ...runtime.language.stages import Position
-from ...runtime.loading.problems import Problems
-from ...runtime.loading.reading.document import read_value
-from ...runtime.loading.reading.nodes import ListNode, MapNode, Node, plain
 
 
-class TaskError(AloftError, ValueError):
+class JumpTaskError(AloftError, ValueError):
     """A task cannot be read, or asks for what contradicts itself; the message has every reason."""
 
 
@@ -74,19 +73,19 @@ def read_placed(path: Path, example: str) -> PlacedFile:
     """Read a file that is a mapping.
 
     Raises:
-        TaskError: it cannot be read, is no YAML, or is no mapping; every reason with its place.
+        JumpTaskError: it cannot be read, is no YAML, or is no mapping; every reason with its place.
     """
     shown, problems = str(path), Problems()
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise TaskError(f"cannot read {path}: {error.strerror or error}") from error
+        raise JumpTaskError(f"cannot read {path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise TaskError(f"{path} is not UTF-8 text (byte {error.start})") from error
+        raise JumpTaskError(f"{path} is not UTF-8 text (byte {error.start})") from error
     tree = read_value(text, shown, problems)
     report = problems.report(shown)
     if not report.ok:
-        raise TaskError(
+        raise JumpTaskError(
             "\n".join(
                 f"{p.where}: {p.message}{f'; {p.fix}' if p.fix else ''}" for p in report.problems
             )
@@ -94,7 +93,7 @@ def read_placed(path: Path, example: str) -> PlacedFile:
     if not isinstance(tree, MapNode):
         found = "nothing" if tree is None else repr(plain(tree))
         where = tree.where if tree else Position(shown, 1, 1)
-        raise TaskError(f"{where}: expected keys such as {example!r}, found {found}")
+        raise JumpTaskError(f"{where}: expected keys such as {example!r}, found {found}")
     return PlacedFile(shown, plain(tree), tree)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import contact_centres, link_poses_in_base
-from .files import TaskError
-from .sequence import SHORTEST_JUMP_OVER_AN_EDGE, Hop, Place, edge_of
+from .files import JumpTaskError
+from .sequence import SHORTEST_JUMP_OVER_AN_EDGE, Hop, StanceLocation, edge_of
 from .task import JumpTask
 
 GAP_DEPTH = 0.1
@@ -60,7 +60,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
     edge ends them. A ``gap`` is 0.1 m deeper than the lowest ground, and its middle is that place.
 
     Raises:
-        TaskError: a jump lands higher or lower or behind a gap where it stood, or two jumps of a row need different
+        JumpTaskError: a jump lands higher or lower or behind a gap where it stood, or two jumps of a row need different
             ground at the same place.
     """
     places, ground = task.places(), None
@@ -73,7 +73,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
         if ground is None:
             ground = _Edges(axis)
         if ground.axis != axis:
-            raise TaskError(
+            raise JumpTaskError(
                 f"{task.name}: landing_height: one jump has its step ahead and another aside; "
                 "describe the ground yourself: robot.scene"
             )
@@ -87,7 +87,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
     return _scene(ground, places)
 
 
-def _edge(task: JumpTask, hop: Hop, start: Place) -> tuple[int, float, bool]:
+def _edge(task: JumpTask, hop: Hop, start: StanceLocation) -> tuple[int, float, bool]:
     """Where the ground changes under a jump: the axis, the place along it, and whether the robot
     goes towards its positive end."""
     at = edge_of(hop, start)
@@ -100,11 +100,11 @@ def _edge(task: JumpTask, hop: Hop, start: Place) -> tuple[int, float, bool]:
     if abs(aside) >= SHORTEST_JUMP_OVER_AN_EDGE:
         return 1, start.y + 0.5 * aside, aside > 0.0
     if hop.gap:
-        raise TaskError(
+        raise JumpTaskError(
             f"{task.name}: gap: it jumps {abs(ahead):g} m ahead, and cannot pass a gap of {hop.gap:g} m; "
             "give a longer distance_x, or describe the ground yourself: robot.scene"
         )
-    raise TaskError(
+    raise JumpTaskError(
         f"{task.name}: landing_height: it lands {hop.landing_height:g} m higher or lower where it "
         "stood, and no such ground can be built; give a distance_x, or describe it yourself: "
         "robot.scene"
@@ -117,14 +117,14 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
         for x, y in _soles(robot, place):
             found = ground.height((x, y)[ground.axis])
             if abs(found - place.z) > 1e-9:
-                raise TaskError(
+                raise JumpTaskError(
                     f"{task.name}: landing_height: at place {number} a foot at ({x:.3f}, {y:.3f}) m "
                     f"needs ground at {place.z:g} m, and the steps of the task put it at {found:g} "
                     "m; move step_edge, narrow the gap, jump farther, or describe the ground yourself: robot.scene"
                 )
 
 
-def _soles(robot: RobotDescription, place: Place) -> list[tuple[float, float]]:
+def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, float]]:
     """Where the contact points are on the ground, as the robot stands at a place."""
     poses = link_poses_in_base(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
@@ -144,7 +144,7 @@ def _soles(robot: RobotDescription, place: Place) -> list[tuple[float, float]]:
     ]
 
 
-def _scene(ground: _Edges, places: tuple[Place, ...]) -> dict[str, Any]:
+def _scene(ground: _Edges, places: tuple[StanceLocation, ...]) -> dict[str, Any]:
     """The ground as data: what is higher than the lowest part is a box on the floor."""
     floor = min(_round(z) for _, _, z in ground.stretches)
     along = [(p.x, p.y)[ground.axis] for p in places]

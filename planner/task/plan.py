@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
 from .files import write_whole
-from .task import JumpTask, TaskError, make_task
+from .task import JumpTask, JumpTaskError, make_task
 
 FILE_FORMAT = "aloft jump plan 1"
 
@@ -33,7 +33,7 @@ class PlanFileError(AloftError, ValueError):
 
 
 @dataclass(frozen=True)
-class JumpPlan:
+class PlannedJump:
     """A planned jump over N knots.
 
     The world's origin is the ground midway between the soles at the start, x forward; joints, feet
@@ -127,7 +127,7 @@ class JumpPlan:
         """The last knot at or before ``time``, but for rounding."""
         return max(0, int(np.searchsorted(self.time, time + 1e-9, side="right")) - 1)
 
-    def with_report(self, report: Mapping[str, Any]) -> JumpPlan:
+    def with_report(self, report: Mapping[str, Any]) -> PlannedJump:
         """The same plan with that validity report."""
         return replace(self, report=dict(report))
 
@@ -147,10 +147,10 @@ ARRAYS = {
 }
 """The arrays of a plan with their units, as they stand in the file."""
 
-_SCALARS = tuple(f.name for f in fields(JumpPlan) if f.name not in (*ARRAYS, "task"))
+_SCALARS = tuple(f.name for f in fields(PlannedJump) if f.name not in (*ARRAYS, "task"))
 
 
-def plan_bytes(plan: JumpPlan, names: Mapping[str, list[str]] | None = None) -> bytes:
+def plan_bytes(plan: PlannedJump, names: Mapping[str, list[str]] | None = None) -> bytes:
     """The plan's file.
 
     The same task gives the same bytes, also from another process: no time of day, no processor
@@ -181,7 +181,7 @@ def _plain(value: Any) -> Any:
 
 
 def write_plan(
-    path: str | Path, plan: JumpPlan, names: Mapping[str, list[str]] | None = None
+    path: str | Path, plan: PlannedJump, names: Mapping[str, list[str]] | None = None
 ) -> Path:
     """Write the plan's file as a whole or not at all, replacing what is there.
 
@@ -195,12 +195,12 @@ def task_of_header(header: Mapping[str, Any], where: str = "task") -> JumpTask:
     """The task of a plan's file, which says all of it: in files from before there were recipes too.
 
     Raises:
-        KeyError, TypeError, TaskError: the header has no such task.
+        KeyError, TypeError, JumpTaskError: the header has no such task.
     """
     return make_task({"recipe": "paper", **header["task"]}, where=where)
 
 
-def read_plan(path: str | Path) -> JumpPlan:
+def read_plan(path: str | Path) -> PlannedJump:
     """The plan in a file.
 
     Raises:
@@ -226,6 +226,6 @@ def read_plan(path: str | Path) -> JumpPlan:
         task = task_of_header(header, where=f"{path}: task")
         values = {name: header[name] for name in _SCALARS if name != "later_flights"}
         times = [(float(start), float(end)) for start, end in header.get("later_flights", [])]
-        return JumpPlan(task=task, **arrays, **values, later_flights=tuple(times))
-    except (KeyError, ValueError, TypeError, AttributeError, TaskError) as error:
+        return PlannedJump(task=task, **arrays, **values, later_flights=tuple(times))
+    except (KeyError, ValueError, TypeError, AttributeError, JumpTaskError) as error:
         raise PlanFileError(f"{path} is no plan file: {error}") from error

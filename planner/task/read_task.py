@@ -15,9 +15,9 @@ import numpy as np
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription, find_robot
 from ...robots.kinematics import link_poses
-from .files import TaskError, read_placed
+from .files import JumpTaskError, read_placed
 from .margins import unknown_joints
-from .sequence import Hop, Place, edge_of
+from .sequence import Hop, StanceLocation, edge_of
 from .task import JumpTask, make_task
 
 
@@ -25,7 +25,7 @@ def read_task(path: str | Path) -> JumpTask:
     """The task in a YAML file; its name is the file's where it has none.
 
     Raises:
-        TaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
+        JumpTaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
             itself or the robot; one line for each, with ``file:line:column``.
     """
     path = Path(path)
@@ -34,10 +34,10 @@ def read_task(path: str | Path) -> JumpTask:
     try:
         robot = find_robot(task.robot, path.parent)
     except (LookupError, ValueError) as error:
-        raise TaskError(f"{source.place(['robot'])}: robot: {error.args[0]}") from error
+        raise JumpTaskError(f"{source.place(['robot'])}: robot: {error.args[0]}") from error
     wrong = contradictions(task, robot)
     if wrong:
-        raise TaskError(
+        raise JumpTaskError(
             "\n".join(f"{source.place(key.split('.'))}: {key}: {text}" for key, text in wrong)
         )
     return task
@@ -52,7 +52,7 @@ def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
     ``weights`` and ``knots``.
 
     Raises:
-        TaskError: the file cannot be read as a task, or a change is wrong, or they contradict each
+        JumpTaskError: the file cannot be read as a task, or a change is wrong, or they contradict each
             other; lines about a change begin with ``task: key:``.
     """
     read_task(path)  # what is wrong in the file itself is said with its line
@@ -63,7 +63,7 @@ def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
     task = make_task({**_merged(values, changes), "name": changes.get("name", "")})
     wrong = contradictions(task, find_robot(task.robot, path.parent))
     if wrong:
-        raise TaskError("\n".join(f"task: {key}: {text}" for key, text in wrong))
+        raise JumpTaskError("\n".join(f"task: {key}: {text}" for key, text in wrong))
     return spoken_name(task)
 
 
@@ -125,15 +125,15 @@ def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
     """Refuse a task that contradicts itself or its robot.
 
     Raises:
-        TaskError: one line for every contradiction.
+        JumpTaskError: one line for every contradiction.
     """
     found = contradictions(task, robot)
     if found:
-        raise TaskError("\n".join(f"{task.name}: {key}: {text}" for key, text in found))
+        raise JumpTaskError("\n".join(f"{task.name}: {key}: {text}" for key, text in found))
 
 
 def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    from ...runtime.loading.problems import nearest
+    from ...files.problems import nearest
 
     if task.profile and task.profile not in robot.profiles:
         there = ", ".join(robot.profiles)
@@ -160,7 +160,7 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
             )
 
 
-def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, Place, Place]]:
+def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, StanceLocation, StanceLocation]]:
     """Every jump that is written down, with its path in the task and where it begins and ends."""
     places = task.places()
     for number, hop in enumerate(task.hops()[: len(task.jumps or "1")]):

@@ -34,7 +34,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
 from .scaling import knee_limits, least_distance_to_limits, rounded, size_of, toe_name_token
-from .sequence import Hop, Span
+from .sequence import Hop, PhaseSpec
 
 EFFORT, MOST_EFFORT = 0.85, 0.92
 EASY, HARD = 1.0, 1.5
@@ -79,7 +79,7 @@ STEP_LEAN = 0.85
 """rad, in front of a step, whatever its distance."""
 
 
-class Asked(Protocol):
+class RecipeInputs(Protocol):
     """The attributes of a ``JumpTask`` that the recipe reads."""
 
     recipe: Any
@@ -119,21 +119,21 @@ class Choice:
         return {"parameter": self.parameter, "value": value, "why": self.why}
 
 
-def applies(task: Asked) -> bool:
+def applies(task: RecipeInputs) -> bool:
     """Whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in
     which nothing turns over."""
     turns = any(hop.rotation for hop in task.hops())
     return task.recipe == "robust" and task.formulation == "full" and not turns
 
 
-def choices(task: Asked, robot: RobotDescription) -> tuple[Choice, ...]:
+def choices(task: RecipeInputs, robot: RobotDescription) -> tuple[Choice, ...]:
     """Everything that the recipe chooses for a task of a robot; empty if the task sets all parameters."""
     if not applies(task) or not robot.contacts:
         return ()
     return (*_plain(task, robot), *_weights(task, robot), *_margins(task, robot))
 
 
-def chosen_fields(task: Asked, found: tuple[Choice, ...]) -> dict[str, Any]:
+def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, Any]:
     """The task's fields with those choices."""
     fields: dict[str, Any] = {}
     for choice in found:
@@ -146,7 +146,7 @@ def chosen_fields(task: Asked, found: tuple[Choice, ...]) -> dict[str, Any]:
     return fields
 
 
-def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     """Impact, effort and phases."""
     said, slow = task.model_fields_set, size_of(robot).slow
     if "impact" not in said:
@@ -177,51 +177,53 @@ def _plain(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         late = min(rounded(TOES * slow), 0.5 * whole)
         half = 0.5 * (contact or 0.0)
         spans = [
-            Span(phase="squat", time=_squat_time(task, robot)),
+            PhaseSpec(phase="squat", time=_squat_time(task, robot)),
             *_thrust(whole, late, toes),
         ]
         for _ in task.hops()[1:]:
             between = _thrust(half, min(late, 0.5 * half), toes)
-            spans += [Span(phase="flight"), Span(phase="landing", time=half), *between]
-        landing: tuple[Span, ...] = (Span(phase="landing", time=_time(task, "landing_time", slow)),)
+            spans += [PhaseSpec(phase="flight"), PhaseSpec(phase="landing", time=half), *between]
+        landing: tuple[PhaseSpec, ...] = (
+            PhaseSpec(phase="landing", time=_time(task, "landing_time", slow)),
+        )
         why = f"the heels rise {1000 * late:.0f} ms before the {toes}s leave the ground: the foot lengthens the leg"
         soft = rounded(TOES_LAND * slow)
         if toes_speed(task, robot) is not None and (landing[0].time or 1.0) > 2.0 * soft:
             landing = _landing(landing[0].time, soft, toes)
             why += f"; they come down {1000 * soft:.0f} ms after them, because flat feet would be too fast"
-        yield Choice("phases", (*spans, Span(phase="flight"), *landing), why)
+        yield Choice("phases", (*spans, PhaseSpec(phase="flight"), *landing), why)
 
 
-def _thrust(whole: float, late: float, toes: str) -> tuple[Span, Span]:
+def _thrust(whole: float, late: float, toes: str) -> tuple[PhaseSpec, PhaseSpec]:
     """A thrust [s], first on all contacts and at last on the toes."""
     return (
-        Span(phase="thrust", time=round(whole - late, 6)),
-        Span(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
+        PhaseSpec(phase="thrust", time=round(whole - late, 6)),
+        PhaseSpec(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
     )
 
 
-def _landing(whole: float | None, early: float, toes: str) -> tuple[Span, ...]:
+def _landing(whole: float | None, early: float, toes: str) -> tuple[PhaseSpec, ...]:
     """A landing [s], first on the toes."""
     rest = None if whole is None else round(whole - early, 6)
     return (
-        Span(phase="landing", time=early, contacts=toes, knots=TOE_LANDING_KNOTS),
-        Span(phase="landing", time=rest),
+        PhaseSpec(phase="landing", time=early, contacts=toes, knots=TOE_LANDING_KNOTS),
+        PhaseSpec(phase="landing", time=rest),
     )
 
 
-def _contact_time(task: Asked, slow: float) -> float | None:
+def _contact_time(task: RecipeInputs, slow: float) -> float | None:
     """The time on the ground between two jumps [s]: what the task says, or what gives room for balance."""
     said = "contact_time" in task.model_fields_set
     return task.contact_time if said else rounded(CONTACT * slow)
 
 
-def _time(task: Asked, name: str, slow: float) -> float | None:
+def _time(task: RecipeInputs, name: str, slow: float) -> float | None:
     """A phase's time [s]: what the task says, or its usual one for a robot of that size."""
     value: float | None = getattr(task, name)
     return value if name in task.model_fields_set or value is None else rounded(value * slow)
 
 
-def _squat_time(task: Asked, robot: RobotDescription) -> float | None:
+def _squat_time(task: RecipeInputs, robot: RobotDescription) -> float | None:
     """The squat's time [s]: what the task says, or the longer, the deeper it is."""
     if "squat_time" in task.model_fields_set or task.squat_time is None:
         return task.squat_time
@@ -229,7 +231,7 @@ def _squat_time(task: Asked, robot: RobotDescription) -> float | None:
     return rounded(round(time, 2) * size_of(robot).slow)
 
 
-def _weights(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+def _weights(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     said = task.weights.model_fields_set if "weights" in task.model_fields_set else set()
     light = size_of(robot).light
     reasons = {
@@ -243,7 +245,7 @@ def _weights(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
             yield Choice(f"weights.{name}", scaled, reasons[name])
 
 
-def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
+def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     if "margins" in task.model_fields_set and task.margins is None:
         return
     said = set() if task.margins is None else task.margins.model_fields_set
@@ -277,7 +279,7 @@ def _margins(task: Asked, robot: RobotDescription) -> Iterator[Choice]:
         yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
 
 
-def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
+def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
     """How slowly the feet come down, where the motors can stop the robot all the same."""
     size = size_of(robot)
     hops = task.hops()
@@ -305,7 +307,7 @@ def _slow_feet(task: Asked, robot: RobotDescription, said: set[str]) -> Iterator
         yield Choice("margins.touchdown_slide", slide, why)
 
 
-def toes_speed(task: Asked, robot: RobotDescription) -> float | None:
+def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
     """How fast the toes may be [m/s] where they should touch down before the heels; ``None``: nowhere.
 
     They should in a single jump straight ahead and down from so high up that flat feet are fast, by a
@@ -321,7 +323,7 @@ def toes_speed(task: Asked, robot: RobotDescription) -> float | None:
     return next((rounded(speed * size.slow) for most, speed in TOES_SPEEDS if fall <= most), None)
 
 
-def deep(task: Asked, robot: RobotDescription) -> float:
+def deep(task: RecipeInputs, robot: RobotDescription) -> float:
     """How deep the squat must be, 0 to 1: for a high jump in place, or one far back.
 
     Such a squat is a fall that the legs must stop, and on soft ground the feet lose the ground as
@@ -345,7 +347,7 @@ def _share(value: float, between: tuple[float, float]) -> float:
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
-def demand(task: Asked, robot: RobotDescription) -> float:
+def demand(task: RecipeInputs, robot: RobotDescription) -> float:
     """How much a jump asks for: its kinetic energy at lift-off by m g times the height of the
     centre of mass, half of it. Speed aside counts three times, as legs push aside with their hips
     only; a turn as the speed of what is a fifth of that height away. 1.2 is 20 cm straight up for

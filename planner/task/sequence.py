@@ -88,7 +88,7 @@ class Hop(FreeTimes):
     )
 
 
-class Span(FreeTimes):
+class PhaseSpec(FreeTimes):
     """A phase of the sequence of contacts, in the order of time."""
 
     phase: Literal["squat", "thrust", "flight", "landing"] = parameter(text="the kind of phase")
@@ -111,7 +111,7 @@ class Span(FreeTimes):
                      or self.contacts in name)  # fmt: skip
 
 
-def check_spans(spans: Sequence[Span], flights: int) -> str:
+def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
     """What is wrong with a sequence of phases for so many jumps; empty where nothing is."""
     if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
         return (
@@ -127,7 +127,7 @@ def check_spans(spans: Sequence[Span], flights: int) -> str:
 
 
 @dataclass(frozen=True)
-class Place:
+class StanceLocation:
     """Where the robot stands between jumps: the soles' middle [m], their heading and how far the
     body has turned in pitch [rad]."""
 
@@ -138,13 +138,13 @@ class Place:
     turned: float
 
 
-def places_of(hops: Sequence[Hop]) -> tuple[Place, ...]:
+def places_of(hops: Sequence[Hop]) -> tuple[StanceLocation, ...]:
     """Where the robot stands before the first jump and after each of them."""
-    found = [Place(0.0, 0.0, 0.0, 0.0, 0.0)]
+    found = [StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0)]
     for hop in hops:
         last = found[-1]
         found.append(
-            Place(
+            StanceLocation(
                 last.x + (hop.distance_x or 0.0),
                 last.y + (hop.distance_y or 0.0),
                 last.z + (hop.landing_height or 0.0),
@@ -155,7 +155,7 @@ def places_of(hops: Sequence[Hop]) -> tuple[Place, ...]:
     return tuple(found)
 
 
-def edge_of(hop: Hop, start: Place) -> float | None:
+def edge_of(hop: Hop, start: StanceLocation) -> float | None:
     """The x [m, world] at which the ground changes height under a jump that begins there; ``None``
     if the ground is level, or if the robot lands where it stood, so that there can be no edge and
     the ground is taken to move in flight."""

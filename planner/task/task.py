@@ -17,13 +17,13 @@ from pydantic import ValidationError, model_validator
 
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
-from .files import PlacedFile, TaskError
+from .files import JumpTaskError, PlacedFile
 from .margins import Margins
 from .recipe import choices, chosen_fields
 from .scaling import scaled_defaults
-from .sequence import FreeTimes, Hop, Place, RoughGround, Span, check_spans, places_of
+from .sequence import FreeTimes, Hop, PhaseSpec, RoughGround, StanceLocation, check_spans, places_of
 
-__all__ = ["JumpTask", "Knots", "TaskError", "Weights", "make_task"]
+__all__ = ["JumpTask", "JumpTaskError", "Knots", "Weights", "make_task"]
 
 
 PLAN_FORMAT = 1
@@ -67,7 +67,7 @@ class JumpTask(FreeTimes):
     they say nothing. With both the whole list is repeated.
 
     Raises pydantic's ``ValidationError`` for values out of range and for contradictions;
-    ``read_task`` turns it into a ``TaskError``.
+    ``read_task`` turns it into a ``JumpTaskError``.
     """
 
     name: str = parameter(text="what the jump is called")
@@ -139,7 +139,7 @@ class JumpTask(FreeTimes):
     repeat: int | None = parameter(
         None, ge=1, le=100, text="how often the jumps are repeated in a row"
     )
-    phases: tuple[Span, ...] | None = parameter(
+    phases: tuple[PhaseSpec, ...] | None = parameter(
         None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
     )
     touchdown_lean: float | None = parameter(
@@ -230,23 +230,23 @@ class JumpTask(FreeTimes):
         row = tuple(found) * (self.repeat or 1)
         return row if self.rough is None else self.rough.under(row)
 
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[StanceLocation, ...]:
         """Where the robot stands at the start, between its jumps, and at the end."""
         return places_of(self.hops())
 
-    def spans(self) -> tuple[Span, ...]:
+    def spans(self) -> tuple[PhaseSpec, ...]:
         """The sequence of contacts, with all times that are given and numbers of knots."""
         hops, knots = self.hops(), self.knots
         if self.phases is None:
             half = None if self.contact_time is None else 0.5 * self.contact_time
-            between = (Span(phase="landing", time=half), Span(phase="thrust", time=half))
+            between = (PhaseSpec(phase="landing", time=half), PhaseSpec(phase="thrust", time=half))
             found = [
-                Span(phase="squat", time=self.squat_time),
-                Span(phase="thrust", time=self.thrust_time),
+                PhaseSpec(phase="squat", time=self.squat_time),
+                PhaseSpec(phase="thrust", time=self.thrust_time),
             ]
             for _ in hops[:-1]:
-                found += [Span(phase="flight"), *between]
-            found += [Span(phase="flight"), Span(phase="landing", time=self.landing_time)]
+                found += [PhaseSpec(phase="flight"), *between]
+            found += [PhaseSpec(phase="flight"), PhaseSpec(phase="landing", time=self.landing_time)]
         else:
             found = list(self.phases)
         flights = iter(hop.flight_time for hop in hops)
@@ -259,23 +259,23 @@ class JumpTask(FreeTimes):
         return tuple(filled)
 
     def start_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the start. Raises ``TaskError`` for an unknown joint."""
+        """Joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.initial, "initial")
 
     def end_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the end. Raises ``TaskError`` for an unknown joint."""
+        """Joint angles [rad] by name at the end. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.final, "final")
 
     def equipped(self, robot: RobotDescription) -> RobotDescription:
         """The robot with the task's actuator profile in use.
 
         Raises:
-            TaskError: the robot has no such profile; the message names those that it has.
+            JumpTaskError: the robot has no such profile; the message names those that it has.
         """
         try:
             return robot.with_profile(self.profile) if self.profile else robot
         except LookupError as error:
-            raise TaskError(f"profile: {error.args[0]}") from error
+            raise JumpTaskError(f"profile: {error.args[0]}") from error
 
     def resolved(self, robot: RobotDescription) -> JumpTask:
         """The task with all that it leaves unsaid: what the ``recipe`` chooses for task and robot,
@@ -319,7 +319,7 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
     known = [joint.name for joint in robot.joints]
     unknown = [name for name in given if name not in known]
     if unknown:
-        raise TaskError(
+        raise JumpTaskError(
             f"{which}: {robot.name} has no joint {', '.join(unknown)}; there is {', '.join(known)}"
         )
     standing = dict(zip(known, robot.standing_position.tolist(), strict=True))
@@ -335,7 +335,7 @@ def make_task(
     with the line and column instead.
 
     Raises:
-        TaskError: one line for every value that is wrong, with its key, what was found and what
+        JumpTaskError: one line for every value that is wrong, with its key, what was found and what
             is expected.
     """
     try:
@@ -349,7 +349,7 @@ def make_task(
             elif source is not None:
                 place = source.place(problem["loc"], key=problem["type"] == "extra_forbidden")
             lines.append(f"{place}: {line}")
-        raise TaskError("\n".join(lines)) from error
+        raise JumpTaskError("\n".join(lines)) from error
 
 
 def _explain(problem: Any) -> str:
@@ -358,7 +358,7 @@ def _explain(problem: Any) -> str:
     message = str(problem["msg"]).removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":
         nested: dict[str, type[Parameters]] = {
-            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": Span,
+            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": PhaseSpec,
             "rough": RoughGround,
         }  # fmt: skip
         owner = nested.get(str(problem["loc"][0]), JumpTask)

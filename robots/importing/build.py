@@ -26,7 +26,7 @@ SHARE = 1e-3
 
 
 @dataclass(frozen=True)
-class Frame:
+class BodyFrame:
     """The pose of a body of the file: its ``link``, and rotation and position [m] in its frame."""
 
     link: str
@@ -49,7 +49,7 @@ class BuiltLink:
 
 
 @dataclass(frozen=True)
-class Built:
+class LinkTree:
     """The tree of a description: plain data for ``base``, ``base_joint``, ``links``, ``joints``,
     the file's joints by name, and where every body of the file went."""
 
@@ -58,7 +58,7 @@ class Built:
     links: list[dict[str, Any]]
     joints: list[dict[str, Any]]
     raw_joints: Mapping[str, RawJoint]
-    frames: Mapping[str, Frame]
+    frames: Mapping[str, BodyFrame]
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
@@ -66,7 +66,7 @@ def tidy(values: Any, digits: int = 11) -> list[float]:
     return [float(value) for value in np.round(np.asarray(values, dtype=float), digits) + 0.0]
 
 
-def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> Built:
+def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> LinkTree:
     """The tree of links and joints.
 
     Args:
@@ -85,7 +85,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
     )
     turn, place = start.rotation, start.position
     links = {start.name: BuiltLink(start.name, np.zeros(3), [start.inertial], [*start.capsules])}
-    frames = {start.name: Frame(start.name, np.eye(3), np.zeros(3))}
+    frames = {start.name: BodyFrame(start.name, np.eye(3), np.zeros(3))}
     joints: list[dict[str, Any]] = []
     raw: dict[str, RawJoint] = {}
     for body in model.bodies.values():
@@ -115,11 +115,11 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
             carrier = link
         pieces = max(len(moving) - 1, 0)
         inertial = body.inertial.scaled(1.0 - SHARE * pieces) if pieces else body.inertial
-        frame = Frame(carrier.name, rotation, position - carrier.origin)
+        frame = BodyFrame(carrier.name, rotation, position - carrier.origin)
         frames[body.name] = frame
         carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
         carrier.capsules += [each.moved(frame.rotation, frame.position) for each in body.capsules]
-    return Built(
+    return LinkTree(
         start.name, found_joint, [_link_data(link) for link in links.values()], joints, raw, frames
     )
 

@@ -26,7 +26,7 @@ from ..robot_description import Joint, Link, RobotDescription
 from ..validation import RobotFault
 from ..validation.faults import listing, nearest
 from ..validation.find_faults import shown
-from .build import Built, Frame, build, tidy
+from .build import BodyFrame, LinkTree, build, tidy
 from .looks import link_looks
 from .raw_model import RawJoint, RawModel
 from .read_model import read_model
@@ -111,7 +111,7 @@ class Overlay:
             for name, profile in given.items()
         }
 
-    def frame(self, path: tuple[str | int, ...], name: Any, built: Built) -> Frame | None:
+    def frame(self, path: tuple[str | int, ...], name: Any, built: LinkTree) -> BodyFrame | None:
         """The body of the file with that name; ``None``, and a fault, if there is none."""
         if isinstance(name, str) and name in built.frames:
             return built.frames[name]
@@ -119,7 +119,7 @@ class Overlay:
                  shown(name), nearest(str(name), built.frames))  # fmt: skip
         return None
 
-    def feet(self, built: Built) -> tuple[list[Any], list[Any]]:
+    def feet(self, built: LinkTree) -> tuple[list[Any], list[Any]]:
         """Feet and contact points as in a full description, from both ways to write them."""
         feet, contacts = [], []
         given = self.data.get("feet") or []
@@ -137,7 +137,7 @@ class Overlay:
         return feet, [*contacts, *own] if isinstance(own, list) else own
 
     def _foot(
-        self, path: tuple[str | int, ...], foot: Mapping[str, Any], built: Built
+        self, path: tuple[str | int, ...], foot: Mapping[str, Any], built: LinkTree
     ) -> tuple[dict[str, Any], list[dict[str, Any]]] | None:
         """A foot given in the frame ``at`` of the file: a ball, or the points of a sole."""
         legal = ("name", "at", "ball", "points", "radius")
@@ -187,7 +187,7 @@ class Overlay:
         self.add(path, f"a point cannot be {shown(value)}", "[x, y, z] in m", shown(value))
         return None
 
-    def points(self, built: Built) -> dict[str, Any]:
+    def points(self, built: LinkTree) -> dict[str, Any]:
         """Named points, each on a link of the description or in the frame of a body of the file."""
         found: dict[str, Any] = {}
         links = [link["name"] for link in built.links]
@@ -308,7 +308,7 @@ class Imported:
     faults: list[RobotFault]
     notes: list[str]
     model: RawModel
-    built: Built
+    built: LinkTree
 
 
 def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:

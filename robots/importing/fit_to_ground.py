@@ -148,14 +148,14 @@ def find_standing_pose(
     unknown = [name for name in start or {} if name not in names]
     if unknown:
         raise ValueError(f"{robot.name} has no joint {', '.join(unknown)}")
-    search = _Search(robot, dict(start or {}), height)
+    search = _GroundFit(robot, dict(start or {}), height)
     angles = search.run()
     level, flatness, balance = search.failure(angles)
     rounded = {name: round(float(a), 9) + 0.0 for name, a in zip(names, angles, strict=True)}
     return StandingPose(rounded, level, flatness, balance)
 
 
-class _Search:
+class _GroundFit:
     """The residuals of a pose and the iteration that brings them to zero."""
 
     def __init__(self, robot: RobotDescription, start: Mapping[str, float], height: float) -> None:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..kinematics import quaternions_of_matrices, rotations_about
+from ...mathematics.rotations import from_euler, matrices_of_quaternions, quaternions_of_matrices
 from . import capsules as fit
 from .urdf_text import SCHEME, XmlFile, find_file
 
@@ -82,11 +82,9 @@ def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
     if element is None:
         return np.eye(3), np.zeros(3)
     angles = _numbers(element.get("rpy"), zero)
-    about_x, about_y, about_z = (
-        rotations_about((float(k == 0), float(k == 1), float(k == 2)), angles[k : k + 1])[0]
-        for k in range(3)
-    )
-    return about_z @ about_y @ about_x, _numbers(element.get("xyz"), zero)
+    quaternion = np.empty(4)
+    from_euler(angles, quaternion)
+    return matrices_of_quaternions(quaternion), _numbers(element.get("xyz"), zero)
 
 
 def _numbers(text: str | None, usual: Sequence[float]) -> Array:

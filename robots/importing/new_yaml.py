@@ -17,7 +17,7 @@ import numpy as np
 from ..robot_description import RobotDescription
 from ..validation import RobotError, find_faults
 from ..validation.faults import number, vector
-from .build import Built, Frame
+from .build import BodyFrame, LinkTree
 from .description_data import Imported, import_robot
 from .fit_to_ground import fit_to_ground
 from .raw_model import RawModel
@@ -57,7 +57,7 @@ RADIUS = 0.02
 """The radius of a foot whose shape the file does not give [m]."""
 
 
-def guess_feet(model: RawModel, built: Built) -> list[dict[str, Any]]:
+def guess_feet(model: RawModel, built: LinkTree) -> list[dict[str, Any]]:
     """The feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``."""
     heights = {link: _lowest(model, built, link) for link in _limb_ends(built)}
     lowest = min(heights.values(), default=0.0)
@@ -67,14 +67,14 @@ def guess_feet(model: RawModel, built: Built) -> list[dict[str, Any]]:
     return [_foot(model, built, link) for link in ends]
 
 
-def _limb_ends(built: Built) -> list[str]:
+def _limb_ends(built: LinkTree) -> list[str]:
     """Links at the end of a chain of two joints or more."""
     parent = {joint["child"]: joint["parent"] for joint in built.joints}
     ends = [link for link in parent if link not in parent.values()]
     return [link for link in ends if parent[link] != built.base]
 
 
-def _origins(built: Built) -> dict[str, Any]:
+def _origins(built: LinkTree) -> dict[str, Any]:
     """Where every link is at the zero of all joints [m, base frame]."""
     places = {built.base: np.zeros(3)}
     for joint in built.joints:
@@ -82,11 +82,11 @@ def _origins(built: Built) -> dict[str, Any]:
     return places
 
 
-def _bodies(built: Built, link: str) -> dict[str, Frame]:
+def _bodies(built: LinkTree, link: str) -> dict[str, BodyFrame]:
     return {name: frame for name, frame in built.frames.items() if frame.link == link}
 
 
-def _lowest(model: RawModel, built: Built, link: str) -> float:
+def _lowest(model: RawModel, built: LinkTree, link: str) -> float:
     """The lowest height of a link, with all that is fixed to it, at the zero of all joints [m]."""
     height = _origins(built)[link][2]
     found = [height]
@@ -97,7 +97,7 @@ def _lowest(model: RawModel, built: Built, link: str) -> float:
     return float(min(found))
 
 
-def _foot(model: RawModel, built: Built, link: str) -> dict[str, Any]:
+def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
     bodies = _bodies(built, link)
     bottom = _lowest(model, built, link) - _origins(built)[link][2]
     balls = []

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..robot_description import Joint, Link, Look
+from ..robot_description import Appearance, Joint, Link
 from .faults import Draft, Path, listing, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
@@ -275,7 +275,7 @@ def check_looks(draft: Draft) -> None:
     for name, value in draft.entries("looks"):
         if name not in links:
             draft.unknown(("looks", name), "the link of a look", name, "link", links)
-        look = read(Look, value)
+        look = read(Appearance, value)
         for k, mesh in enumerate(look.meshes if look is not None else ()):
             numbers = (*mesh.position, *mesh.orientation, *mesh.scale)
             path = ("looks", name, "meshes", k)

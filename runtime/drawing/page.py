@@ -20,10 +20,10 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
+from ...files.nodes import text_of
 from ..language.reference import PortReference, block_reference
 from ..language.stages import BlockSpec, CheckedGraph
 from ..loading.picture import BlockRow, table
-from ..loading.reading.nodes import text_of
 from .diagram import diagram, subgraphs
 from .layout import draw
 from .render import svg

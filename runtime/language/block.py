@@ -216,7 +216,7 @@ class Block:
             DeclarationError: the class defines neither ``step`` nor ``emit`` and ``update``, or
                 methods of both kinds.
         """
-        step, emit, update = (hasattr(cls, name) for name in ("step", "emit", "update"))
+        step, emit, update = hasattr(cls, "step"), hasattr(cls, "emit"), hasattr(cls, "update")
         if step and not emit and not update:
             return False
         if emit and update and not step:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
+from ...files.validation import unit_of
 from ...mathematics.compiling.kinds import ArrayKind, Kind
 from .errors import UnitError
 from .units import parse_quantity
@@ -59,12 +60,6 @@ def is_live(info: FieldInfo) -> bool:
     """Whether a parameter was declared as one that may change while the graph runs."""
     extra = info.json_schema_extra
     return isinstance(extra, dict) and bool(extra.get("live", False))
-
-
-def unit_of(info: FieldInfo) -> str:
-    """The unit a parameter was declared with, as text."""
-    extra = info.json_schema_extra
-    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
 
 def _convert(value: Any, unit: str) -> Any:

@@ -39,7 +39,9 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
     def _refuse_lists(cls, data: Any) -> Any:
         if isinstance(data, Sequence) and not isinstance(data, str):
             raise PydanticCustomError(
-                BY_POSITION, "values are given by joint name, not by position"
+                BY_POSITION,
+                "values are given by joint name, not by position",
+                {"expected": "a number for all joints, or numbers by joint name or pattern"},
             )
         return data
 

@@ -14,8 +14,9 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from ...files.validation import unit_of
 from .block import Block, Input, Output, Port
-from .parameters import is_live, unit_of
+from .parameters import is_live
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import inspect
 import re
 import sys
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -135,6 +135,7 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
     return (folder, Path()) if folder is not None else (Path(),)
 
 
+@cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
     """The module of aloft that has the class: first the one that convention gives, then any."""
     stem = snake_case(class_name)

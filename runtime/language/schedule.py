@@ -126,7 +126,7 @@ def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
     blocks which comes first in the file.
     """
     nodes = tuple(blocks)
-    edges = _edges(nodes)
+    edges = _without_ends(_edges(nodes))
     leaving: list[list[_Edge]] = [[] for _ in nodes]
     for edge in edges:
         leaving[edge.source].append(edge)
@@ -144,6 +144,34 @@ def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
         ports = [port for e in (*ring[first:], *ring[:first]) for port in (e.output, e.input)]
         loops.append(Loop(tuple(ports)))
     return tuple(loops)
+
+
+def _without_ends(edges: Sequence[_Edge]) -> list[_Edge]:
+    """The edges without those that lead to no ring, or that no ring leads to."""
+    return _without_sinks(_without_sinks(edges, reverse=False), reverse=True)
+
+
+def _without_sinks(edges: Sequence[_Edge], *, reverse: bool) -> list[_Edge]:
+    """The edges without those into blocks that nothing leaves, until there are none of these.
+
+    With ``reverse`` all edges point the other way.
+    """
+    arriving: dict[int, list[_Edge]] = {}
+    leaving: dict[int, int] = {}
+    for edge in edges:
+        source, target = (edge.target, edge.source) if reverse else (edge.source, edge.target)
+        arriving.setdefault(target, []).append(edge)
+        leaving[source] = leaving.get(source, 0) + 1
+    sinks = deque(block for block in arriving if block not in leaving)
+    removed: dict[_Edge, None] = {}
+    while sinks:
+        for edge in arriving.get(sinks.popleft(), ()):
+            removed[edge] = None
+            source = edge.target if reverse else edge.source
+            leaving[source] -= 1
+            if not leaving[source]:
+                sinks.append(source)
+    return [edge for edge in edges if edge not in removed]
 
 
 def _shortest_path(

@@ -14,25 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from ...files.problems import Position
 from ...robots.description import RobotDescription
 from .block import Block
 from .parameters import Parameters
 from .quantities import Quantity
-
-
-@dataclass(frozen=True, order=True)
-class Position:
-    """A place in a file; lines and columns count from one. Printed as ``file:line:col``.
-
-    Line zero stands for the file as a whole, or for an override.
-    """
-
-    file: str
-    line: int
-    column: int
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
 
 
 class HasSource:

@@ -20,3 +20,12 @@ class Terrain:
 
     floor: float = 0.0
     blocks: tuple[Ground, ...] = ()
+
+    def height(self, x: float, y: float) -> float:
+        """The height [m, world] of the highest surface at that place."""
+        height = self.floor
+        for block in self.blocks:
+            (x0, y0, _), (x1, y1, top) = block.least, block.most
+            if top > height and x0 <= x <= x1 and y0 <= y <= y1:
+                height = top
+        return height

@@ -25,9 +25,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ...files.problems import LoadError
 from ..language.errors import AloftError
 from ..loading.checking.parameters import adjust, entries
-from ..loading.problems import LoadError
 from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult

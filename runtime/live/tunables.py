@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from ...files.nodes import MapNode, text_of
+from ...files.validation import unit_of
 from ..language.errors import AloftError
-from ..language.parameters import unit_of
 from ..language.stages import CheckedGraph
 from ..loading import LoadError, flatten, load_text
-from ..loading.reading.nodes import MapNode, text_of
 
 LONGEST_LIST = 12
 """Numbers of a list that have a slider each; a longer one is changed as a text."""

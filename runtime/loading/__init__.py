@@ -5,8 +5,8 @@ Its stages have a folder each: ``reading`` (one file as it is written, with the 
 (``stages.CheckedGraph``). Here is what all of them share, and what users call.
 """
 
+from ...files.problems import Code, LoadError, Problem, Report
 from .load import check, flatten, load, load_text
-from .problems import Code, LoadError, Problem, Report
 from .schema import graph_schema, schema_text
 
 __all__ = [

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ...files.problems import LoadError, Problems, Report
 from ..language.stages import CheckedGraph
 from .checking.check_graph import check_graph
 from .flattening.flat import FlatGraph
 from .flattening.flatten import flatten_file, flatten_text
-from .problems import LoadError, Problems, Report
 from .reading.files import graph_path
 from .reading.overrides import Overrides
 

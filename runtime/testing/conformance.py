@@ -31,6 +31,7 @@ from pydantic import BaseModel, RootModel, ValidationError
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...mathematics.compiling.kernel_registry import arguments_of
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import find_robot
 from ...robots.robot_description import RobotDescription
 from ..language.block import Block, Clock, Context
@@ -434,13 +435,7 @@ def random_quaternion(shape: tuple[int, ...], rng: np.random.Generator) -> NDArr
 
 def random_rotation(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float64]:
     """Rotation matrices of moderate angles, (*shape, 3, 3)."""
-    x, y, z, w = np.moveaxis(random_quaternion(shape, rng), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return matrices_of_quaternions(random_quaternion(shape, rng))
 
 
 def random_inputs(

@@ -23,8 +23,8 @@ import numpy as np
 
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.task.files import Key, PlacedFile, read_placed, remove_abandoned, write_whole
-from ...planner.task.plan import JumpPlan, PlanFileError
-from ...planner.task.task import JumpTask, TaskError, make_task
+from ...planner.task.plan import PlanFileError, PlannedJump
+from ...planner.task.task import JumpTask, JumpTaskError, make_task
 from ...robots.description import RobotDescription, find_robot
 from ...runtime.language.errors import AloftError
 from .jobs import job_results
@@ -48,7 +48,7 @@ def read_grid(path: str | Path) -> list[JumpTask]:
     """The tasks of a grid file, the last parameter changing fastest.
 
     Raises:
-        TaskError: the file cannot be read, or one of its tasks is wrong.
+        JumpTaskError: the file cannot be read, or one of its tasks is wrong.
     """
     path = Path(path)
     source = read_placed(path, "grid: {rise: [10 cm, 15 cm]}")
@@ -56,15 +56,15 @@ def read_grid(path: str | Path) -> list[JumpTask]:
     for key in data:
         if key not in ("name", "task", "grid"):
             place = source.place([key], key=True)
-            raise TaskError(f"{place}: {key}: expected only name, task and grid")
+            raise JumpTaskError(f"{place}: {key}: expected only name, task and grid")
     if not isinstance(axes, Mapping) or not axes:
-        raise TaskError(
+        raise JumpTaskError(
             f"{source.place(['grid'])}: expected the keys name, task and grid, e.g. "
             "'grid: {rise: [10 cm, 15 cm]}'"
         )
     common = data.get("task") or {}
     if not isinstance(common, Mapping):
-        raise TaskError(f"{source.place(['task'])}: task: expected a mapping, found {common!r}")
+        raise JumpTaskError(f"{source.place(['task'])}: task: expected a mapping, found {common!r}")
     values = [_values(source, key, given) for key, given in axes.items()]
     tasks = []
     for numbers in itertools.product(*(range(len(column)) for column in values)):
@@ -101,7 +101,7 @@ def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
         if isinstance(given["count"], int) and 2 <= given["count"] <= MOST:
             # Rounded, so that the hash of a task does not hang on the last bit of a step.
             return [round(float(x), 9) for x in np.linspace(start, end, given["count"])]
-    raise TaskError(
+    raise JumpTaskError(
         f"{source.place(['grid', key])}: grid.{key}: expected a list of values or "
         f"{{from: .., to: .., count: ..}} with a count of 2 to {MOST}, found {given!r}"
     )
@@ -114,7 +114,7 @@ def _number(source: PlacedFile, key: str, given: Mapping[str, Any], which: str) 
     task = make_task({"name": "grid", **others, key: given[which]}, where=where)
     value = getattr(task, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TaskError(f"{where}: {key}: no number, so give a list of values")
+        raise JumpTaskError(f"{where}: {key}: no number, so give a list of values")
     return float(value)
 
 
@@ -157,7 +157,7 @@ def fill(
                 yield _keep(library, task, *result.value)
 
 
-def _found(library: PlanLibrary, task: JumpTask) -> JumpPlan | None:
+def _found(library: PlanLibrary, task: JumpTask) -> PlannedJump | None:
     """The plan that is kept of a task. One whose file is damaged counts as none: this run makes it
     anew."""
     try:
@@ -166,7 +166,7 @@ def _found(library: PlanLibrary, task: JumpTask) -> JumpPlan | None:
         return None
 
 
-def _keep(library: PlanLibrary, task: JumpTask, plan: JumpPlan | None, reason: str) -> GridRow:
+def _keep(library: PlanLibrary, task: JumpTask, plan: PlannedJump | None, reason: str) -> GridRow:
     """Keep the plan of a task, or the reason why there is none."""
     mark = failure_mark(library, task)
     if plan is None:
@@ -191,7 +191,7 @@ def read_failure(mark: Path) -> str | None:
         return None
 
 
-def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[JumpPlan | None, str]:
+def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[PlannedJump | None, str]:
     """Plan one task in a worker. Returns the plan, or nothing and the reason."""
     try:
         return solve_and_check(*job), ""
@@ -200,8 +200,8 @@ def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[JumpPlan | None, s
 
 
 def robot_of(tasks: Sequence[JumpTask]) -> RobotDescription:
-    """The robot of all tasks. Raises ``TaskError`` where they name several."""
+    """The robot of all tasks. Raises ``JumpTaskError`` where they name several."""
     names = sorted({task.robot for task in tasks})
     if len(names) != 1:
-        raise TaskError(f"a grid is for one robot, found {', '.join(names)}")
+        raise JumpTaskError(f"a grid is for one robot, found {', '.join(names)}")
     return find_robot(names[0])

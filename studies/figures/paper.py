@@ -21,8 +21,8 @@ from .strip import Moment, Motion, NoRendererError, View, draw_strip, moments_of
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-    from ...hal.simulated.scenes import Scene
     from ...robots.description import RobotDescription
+    from ...runtime.language.terrain import Terrain
     from ..expansion import Cell
     from ..summary import Row
     from .trace import Trace
@@ -182,11 +182,11 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
     return draw_strip(title, notes, motion, moments, robot, scene, view), numbers
 
 
-def scene_of(cell: Cell) -> Scene:
+def scene_of(cell: Cell) -> Terrain:
     """The ground that a cell's simulated robot jumps on."""
     checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin).checked
     params: Any = next(spec.params for spec in checked.blocks if spec.path == "robot")
-    scene: Scene = params.build_scene()
+    scene: Terrain = params.build_scene()
     return scene
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...hal.simulated.mujoco_model import mujoco_spec
-from ...hal.simulated.scenes import Scene
 from ...mathematics.arrays import Array
 from ...plotting import FAINT, image, new_figure, style
 from ...runtime.language.errors import AloftError
+from ...runtime.language.terrain import Terrain
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -62,7 +62,7 @@ class Offscreen:
         NoRendererError: the libraries for it are missing; the text says which to install.
     """
 
-    def __init__(self, robot: RobotDescription, scene: Scene, width: int, height: int) -> None:
+    def __init__(self, robot: RobotDescription, scene: Terrain, width: int, height: int) -> None:
         import mujoco
 
         self._gl = _context(width, height)
@@ -125,7 +125,7 @@ def _context(width: int, height: int) -> Any:
     return context
 
 
-def _painted(robot: RobotDescription, scene: Scene, width: int, height: int) -> Any:
+def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -> Any:
     """The simulator's own model with a floor pattern, colours, lights and bones between joints."""
     import mujoco
 
@@ -204,7 +204,7 @@ def draw_strip(
     motion: Motion,
     moments: Sequence[Moment],
     robot: RobotDescription,
-    scene: Scene,
+    scene: Terrain,
     view: View,
     columns: int = 4,
 ) -> Image:

@@ -18,7 +18,7 @@ from aloft.benchmarks.agreement import (
     show_state,
 )
 from aloft.mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
-from aloft.mathematics.whole_body_solution import SOLVED, Solution
+from aloft.mathematics.whole_body_solution import SOLVED, WholeBodySolution
 
 pytestmark = pytest.mark.filterwarnings("ignore:Converted matrix")
 
@@ -77,7 +77,9 @@ def test_round_cones_are_stateless_and_plain_python_has_the_same_bytes(
     assert [solve(state) for state in reversed(chosen)] == first[::-1]
     assert sum(len(answer) > 8 for answer in first) > 6
     n, contacts = len(block.command.acceleration), len(block.command.force)
-    plain = Solution(np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64))
+    plain = WholeBodySolution(
+        np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
+    )
     for state, expected in zip(chosen[:6], first, strict=False):
         show_state(block, state)
         memory = cone_solution_memory(n, contacts)

@@ -15,7 +15,7 @@ from aloft.planner.library import nearest_feasible
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.nearest_feasible import Axis
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import find_robot
@@ -72,7 +72,7 @@ def test_where_there_is_no_plan_the_nearest_task_is_found_and_kept(
 
     kept = PlanLibrary(find_robot("bruce"), Path("nowhere")).find(read_task(TASKS / "in_situ.yaml"))
 
-    def stand_in(task: JumpTask, *_: object, **__: object) -> JumpPlan:
+    def stand_in(task: JumpTask, *_: object, **__: object) -> PlannedJump:
         if abs((task.rise or 0.0) - 0.15) > 2e-3:
             raise PlanError("no plan: apex is missed", family="apex", violation=0.1)
         assert kept is not None

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from aloft.files.problems import listing
 from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.fit import fix_without_robot
 from aloft.runtime.loading import Code, LoadError, Report, check, load
-from aloft.runtime.loading.problems import listing
 
 FOLDER = Path(__file__).parent / "wrong"
 GRAPHS = sorted(path.stem for path in FOLDER.glob("*.yaml"))

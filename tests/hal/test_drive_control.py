@@ -11,7 +11,7 @@ from aloft.blocks.signals import JointCommand
 from aloft.hal.drive_control import DriveGoals
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
-from aloft.robots.transmission import Transmission, motor_gains
+from aloft.robots.transmission import TransmissionMap, motor_gains
 
 ROBOT = find_robot("bruce")
 FLIGHT = np.array([40.0, 60.0, 60.0, 60.0, 15.0] * 2), np.array([1.0, 1.5, 1.5, 1.2, 0.3] * 2)
@@ -33,7 +33,7 @@ def command(rng: np.random.Generator, stiffness: Array, damping: Array) -> Joint
 
 def joint_torque(made: DriveGoals, position: Array, velocity: Array) -> Array:
     """What the drives give the joints with these goals, where the joints really are."""
-    transmission = Transmission(ROBOT)
+    transmission = TransmissionMap(ROBOT)
     motor_position, motor_velocity, out = np.zeros(10), np.zeros(10), np.zeros(10)
     transmission.motor_motion(position, motor_position)
     transmission.motor_motion(velocity, motor_velocity)
@@ -48,7 +48,7 @@ def joint_torque(made: DriveGoals, position: Array, velocity: Array) -> Array:
 
 def motors(joints: Array) -> Array:
     out = np.zeros(10)
-    Transmission(ROBOT).motor_motion(joints, out)
+    TransmissionMap(ROBOT).motor_motion(joints, out)
     return out
 
 
@@ -77,7 +77,7 @@ def test_with_the_drives_own_gains_the_whole_feedback_runs_in_them() -> None:
     made.follow(wish, motors(position), np.zeros(10), position, np.zeros(10))
     np.testing.assert_allclose(made.position, motors(wish.position), atol=1e-12)
     out = np.zeros(10)
-    Transmission(ROBOT).motor_torque(wish.torque, out)
+    TransmissionMap(ROBOT).motor_torque(wish.torque, out)
     np.testing.assert_allclose(made.torque, out, atol=1e-10)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from aloft.blocks.signals import DrivePhase
-from aloft.blocks.signals.drive_conditions import HEALTHY
+from aloft.blocks.signals.robot import HEALTHY
 from aloft.hal.robot import Robot
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.runtime.language.parameters import Parameters

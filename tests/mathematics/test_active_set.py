@@ -7,7 +7,7 @@ import quadprog
 from aloft.mathematics.active_set import (
     INFEASIBLE,
     NOT_CONVEX,
-    Program,
+    QuadraticProgram,
     active_set_memory,
     polish,
     solve_program,
@@ -18,7 +18,7 @@ from aloft.mathematics.kernel import kernel
 
 
 @kernel
-def solve_into(sizes: np.ndarray, program: Program, memory: tuple, x: np.ndarray) -> None:
+def solve_into(sizes: np.ndarray, program: QuadraticProgram, memory: tuple, x: np.ndarray) -> None:
     """Solves for the sizes n and m in an array, into which it writes its result."""
     sizes[2] = solve_program(int(sizes[0]), int(sizes[1]), program, memory, x)
 
@@ -50,7 +50,7 @@ def contact_program(random):
 @pytest.fixture(scope="module")
 def solver():
     """The method as machine code, on memory that is used again and again."""
-    program = Program(np.zeros((12, 12)), np.zeros(12), np.zeros((44, 12)), np.zeros(44))
+    program = QuadraticProgram(np.zeros((12, 12)), np.zeros(12), np.zeros((44, 12)), np.zeros(44))
     sizes, x = np.zeros(3, np.int64), np.zeros(12)
     call = KernelCall(solve_into, sizes, program, active_set_memory(12, 44), x)
     assert compile_calls([call]) == ""
@@ -110,7 +110,7 @@ def test_the_answer_does_not_depend_on_what_was_solved_before(solver):
 def plain(hessian, gradient, matrix, bound):
     n, m = len(gradient), len(bound)
     memory, x = active_set_memory(n, m), np.zeros(n)
-    program = Program(hessian, gradient, matrix, bound)
+    program = QuadraticProgram(hessian, gradient, matrix, bound)
     return solve_program(n, m, program, memory, x), x, memory
 
 

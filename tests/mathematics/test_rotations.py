@@ -151,6 +151,19 @@ def test_yaw_and_tilt_of_a_turn_then_a_lean(heading):
     assert rotations.tilt(q) == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
+@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (-0.2, 0.5)])
+def test_pitch_is_the_angle_of_the_x_axis_about_the_bodys_y_axis(pitch, other):
+    roll, yaw = other
+    about_y = np.array([0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2)])
+    assert rotations.pitch_angle(about_y) == pytest.approx(pitch, abs=1e-12)
+    lean = np.empty(4)
+    from_euler(np.array([roll, 0.0, yaw]), lean)
+    R = matrix(product(about_y, lean))
+    expected = math.atan2(-R[2, 0], R[0, 0])
+    assert rotations.pitch_angle(product(about_y, lean)) == pytest.approx(expected, abs=1e-12)
+
+
 def test_tilt_keeps_its_digits_near_upright():
     q = np.empty(4)
     rotations.exponential(np.array([1e-9, 0.0, 0.0]), q)

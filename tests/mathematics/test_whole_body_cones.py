@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aloft.mathematics.active_set import (
-    Program,
+    QuadraticProgram,
     active_set_memory,
     polish,
     recompute_multipliers,
@@ -38,7 +38,7 @@ def project(forces, friction):
     """The same for all forces at once, by planes and Newton steps; returns also the number of steps."""
     count, n = len(forces), 3 * len(forces)
     first = 6 * count  # no rows of pyramids
-    program = Program(
+    program = QuadraticProgram(
         np.eye(n),
         -forces.ravel(),
         np.zeros((first + PLANES * count, n)),
@@ -93,7 +93,7 @@ def test_no_more_planes_than_there_is_room_for():
 
 def test_a_force_at_the_apex_has_no_direction():
     cones = cone_memory(1)
-    program = Program(np.eye(3), np.zeros(3), np.zeros((14, 3)), np.zeros(14))
+    program = QuadraticProgram(np.eye(3), np.zeros(3), np.zeros((14, 3)), np.zeros(14))
     nothing = np.array([1e-9, 0.0, -1e-15])
     assert cut(1, 6, 0.5, 1e-2, cones, program, active_set_memory(3, 14), nothing) == 0
     assert turned(1, 0.5, cones, nothing) == 0.0

@@ -47,6 +47,10 @@ def test_base_rows_and_joint_torque_are_the_equation_of_motion(active):
     assert torque == pytest.approx(whole[6:])
 
 
+def limits_of(n):
+    return qp.TorqueLimits(np.eye(n), np.eye(n), *(np.zeros(n) for _ in range(6)))
+
+
 def test_torque_rows_bound_the_transmitted_torque():
     points = np.array([0, 2], dtype=np.int64)
     transmission = RANDOM.normal(size=(JOINTS, JOINTS))
@@ -56,7 +60,8 @@ def test_torque_rows_bound_the_transmitted_torque():
         np.zeros((JOINTS, N + 6)), np.zeros((JOINTS, N + 6)), np.zeros(JOINTS)
     )
     rows = qp.Constraints(matrix, bound)
-    qp.torque_limits(TERMS, points, transmission, qp.Bounds(lower, upper), scratch, rows)
+    motors = limits_of(JOINTS)._replace(to_torque=transmission, lower=lower, upper=upper)
+    qp.torque_limits(TERMS, points, motors, scratch, rows)
     x, force, torque = RANDOM.normal(size=N + 6), np.zeros((4, 3)), np.zeros(JOINTS)
     force[[0, 2]] = x[N:].reshape(2, 3)
     qp.joint_torque(TERMS, x[:N], force, np.zeros(JOINTS), torque)
@@ -68,7 +73,7 @@ def test_torque_rows_bound_the_transmitted_torque():
 @given(st.lists(st.floats(-100, 100), min_size=6, max_size=6))
 def test_pyramid_rows_hold_exactly_inside_the_pyramid(values):
     matrix, bound, force = np.zeros((12, 8)), np.zeros(12), np.array(values)
-    qp.friction_pyramids(2, 2, qp.FrictionCone(0.5, 1.0, 80.0), qp.Constraints(matrix, bound))
+    qp.friction_pyramids(2, 2, 0.5, 1.0, 80.0, qp.Constraints(matrix, bound))
     x = np.concatenate([[9.0, 9.0], force])
     inside = all(
         max(abs(fx), abs(fy)) <= 0.5 * fz and 1.0 <= fz <= 80.0
@@ -90,20 +95,19 @@ def test_pyramid_rows_hold_exactly_inside_the_pyramid(values):
     ],
 )
 def test_motor_limits(speed, lower, upper):
-    bounds = qp.Bounds(np.zeros(2), np.zeros(2))
-    curves = qp.TorqueSpeedCurves(
-        np.array([10.0, 1.0]), np.array([18.0, 5.0]), np.array([30.0, 6.0])
-    )
-    qp.motor_limits(np.array([speed, 0.0]), curves, bounds)
-    assert (bounds.lower[0], bounds.upper[0]) == pytest.approx((lower, upper))
-    assert (bounds.lower[1], bounds.upper[1]) == (-1.0, 1.0)  # every motor has its own curve
+    motors = limits_of(2)
+    motors.peak[:], motors.corner[:], motors.no_load[:] = [10.0, 1.0], [18.0, 5.0], [30.0, 6.0]
+    motors.speed[0] = speed
+    qp.motor_limits(motors)
+    assert (motors.lower[0], motors.upper[0]) == pytest.approx((lower, upper))
+    assert (motors.lower[1], motors.upper[1]) == (-1.0, 1.0)  # every motor has its own curve
 
 
 def test_a_motor_without_a_speed_limit_gives_its_peak_below_it():
-    bounds = qp.Bounds(np.zeros(1), np.zeros(1))
-    curves = qp.TorqueSpeedCurves(np.array([10.0]), np.array([60.0]), np.array([60.0]))
-    qp.motor_limits(np.array([20.0]), curves, bounds)
-    assert (bounds.lower[0], bounds.upper[0]) == (-10.0, 10.0)
+    motors = limits_of(1)
+    motors.peak[0], motors.corner[0], motors.no_load[0], motors.speed[0] = 10.0, 60.0, 60.0, 20.0
+    qp.motor_limits(motors)
+    assert (motors.lower[0], motors.upper[0]) == (-10.0, 10.0)
 
 
 def test_weight_is_shared_by_the_points_in_stance():

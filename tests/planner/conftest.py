@@ -6,11 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.squat_jump import SquatJumpTask, plan_squat_jump
-from aloft.blocks.jumping.squat_jump_reference import SquatJumpReference
+from aloft.blocks.jumping.squat_jump import SquatJumpParameters, plan_squat_jump
 from aloft.blocks.signals import Phase
 from aloft.planner.models.exact_dynamics import ExactDynamics, joint_motion
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
@@ -21,15 +20,11 @@ EVERY = 5
 """Knots every so many rows of the table, 10 ms."""
 
 
-def squat_jump_plan() -> JumpPlan:
+def squat_jump_plan() -> PlannedJump:
     """The squat jump as a plan. Its feet hit the ground with the speed of the fall."""
     robot = find_robot("bruce")
     dynamics = ExactDynamics(robot)
-    names = set(SquatJumpTask.__dataclass_fields__)
-    defaults = {k: v for k, v in SquatJumpReference.Params().model_dump().items() if k in names}
-    jump = SquatJumpTask(
-        **defaults | {"rise": RISE, "touchdown_pitch": 0.0, "stand_time": 0.1, "pause_time": 0.05}
-    )
+    jump = SquatJumpParameters(rise=RISE, touchdown_pitch=0.0, stand_time=0.1, pause_time=0.05)
     table = plan_squat_jump(build_pinocchio_model(robot), robot, jump)
     breaks = np.flatnonzero(np.diff(table.time) < 1e-9).tolist()
     ends = [0, *[k + 1 for k in breaks], len(table.time)]
@@ -65,7 +60,7 @@ def squat_jump_plan() -> JumpPlan:
         phase[time > start - 1e-9] = value
     contact = np.repeat((phase != Phase.FLIGHT)[:, None], 4, axis=1)
     states = [dynamics.centroidal(q, v) for q, v in zip(position, velocity, strict=True)]
-    plan = JumpPlan(
+    plan = PlannedJump(
         task=make_task({"name": "by_hand", "formulation": "srbm", "rise": RISE, "impact": True}),
         time=time,
         position=position,
@@ -84,7 +79,7 @@ def squat_jump_plan() -> JumpPlan:
     return with_forces(plan, dynamics)
 
 
-def with_forces(plan: JumpPlan, dynamics: ExactDynamics) -> JumpPlan:
+def with_forces(plan: PlannedJump, dynamics: ExactDynamics) -> PlannedJump:
     """The plan with the smallest forces that change its momentum as it does."""
     force, torque = plan.contact_force.copy(), plan.joint_torque.copy()
     gravity = np.array([0.0, 0.0, -9.81])
@@ -117,5 +112,5 @@ def with_forces(plan: JumpPlan, dynamics: ExactDynamics) -> JumpPlan:
 
 
 @pytest.fixture(scope="session")
-def by_hand() -> JumpPlan:
+def by_hand() -> PlannedJump:
     return squat_jump_plan()

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from aloft.planner.problem.problem import Problem
+from aloft.planner.problem.problem import FullProblem
 
 
-def smallest_singular_value(problem: Problem, at: NDArray[np.float64]) -> float:
+def smallest_singular_value(problem: FullProblem, at: NDArray[np.float64]) -> float:
     """Of the Jacobian of all equations there, each divided by its length; zero: they depend."""
     functions = problem.assembly.functions()
     jacobian = np.array(functions["nlp_jac_g"](at, problem.parameters)[1])

@@ -10,11 +10,11 @@ from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.models.coordinates import full_coordinates
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.quaternions import pose_of
+from aloft.planner.models.midpoint import pose_of
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.problem.structure import ContactRows
 from aloft.planner.solving.solve import solve_jump
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import RobotDescription
 
@@ -28,7 +28,7 @@ BIPED = legged_robot(
 
 
 @lru_cache(maxsize=2)
-def planned(robot_name: str) -> JumpPlan:
+def planned(robot_name: str) -> PlannedJump:
     robot = {"quadruped": QUADRUPED, "biped": BIPED}[robot_name]
     asked = {
         "recipe": "paper",

@@ -16,7 +16,7 @@ from aloft.planner.drawing.picture import phases_of, plan_picture
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump, with_ground_times, with_times
-from aloft.planner.task.plan import JumpPlan, read_plan, write_plan
+from aloft.planner.task.plan import PlannedJump, read_plan, write_plan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
@@ -39,11 +39,11 @@ TOES = [
 
 
 @cache
-def steps() -> JumpPlan:
+def steps() -> PlannedJump:
     return solve_jump(make_task({"recipe": "paper", "name": "steps", **STEPS}), ROBOT)
 
 
-def failed(plan: JumpPlan) -> set[str]:
+def failed(plan: PlannedJump) -> set[str]:
     return {test.name for test in check_plan(plan, ROBOT).failed}
 
 

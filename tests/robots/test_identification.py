@@ -19,7 +19,7 @@ from aloft.robots.identification import (
     MARGIN,
     SOFT_SPEED,
     IdentificationError,
-    Motion,
+    MeasuredRun,
     _Assembly,
     _clustered,
     _solve,
@@ -29,14 +29,14 @@ from aloft.robots.identification import (
 from aloft.robots.pinocchio_model import build_pinocchio_model
 
 
-def motion(ticks: int = 300, stands: int = 100) -> Motion:
+def motion(ticks: int = 300, stands: int = 100) -> MeasuredRun:
     velocity = np.zeros((ticks, 10))
     velocity[stands:] = 2.0
     closed = np.ones((ticks, 4), dtype=np.bool_)
     closed[200:, 1] = False
     force = np.tile([0.1, -0.05, 9.81 + 0.08], (ticks, 1))
     force[stands:] += 5.0
-    return Motion(
+    return MeasuredRun(
         0.002, np.zeros((ticks, 10)), velocity, np.zeros((ticks, 10)), np.full((ticks, 3), 0.01),
         force, np.tile([0.0, 0.0, 1.0], (ticks, 1)), closed,
     )  # fmt: skip
@@ -64,9 +64,9 @@ ROBOT = find_robot("bruce")
 N = len(ROBOT.joints)
 
 
-def random_motion(ticks: int) -> Motion:
+def random_motion(ticks: int) -> MeasuredRun:
     rng = np.random.default_rng(0)
-    return Motion(
+    return MeasuredRun(
         0.002, ROBOT.standing_position + rng.uniform(-0.1, 0.1, (ticks, N)),
         rng.uniform(-2.0, 2.0, (ticks, N)), rng.uniform(-5.0, 5.0, (ticks, N)),
         rng.uniform(-1.0, 1.0, (ticks, 3)), rng.uniform(-10.0, 10.0, (ticks, 3)),
@@ -157,7 +157,7 @@ def test_the_error_of_a_mean_is_that_of_its_clusters() -> None:
     assert half[0, 0] == pytest.approx(found[0, 0] / 4.0)
 
 
-def moving(ticks: int, mass: float, offset: Array, coulomb: float) -> Motion:
+def moving(ticks: int, mass: float, offset: Array, coulomb: float) -> MeasuredRun:
     """A robot in the air whose joints swing, with the torques and forces that its dynamics need."""
     import pinocchio as pin
 
@@ -198,7 +198,7 @@ def moving(ticks: int, mass: float, offset: Array, coulomb: float) -> Motion:
         torque[k] += coulomb * np.tanh(v[6:] / SOFT_SPEED) + 0.1 * v[6:]
     closed = np.zeros((ticks, 4), dtype=np.bool_)
     up = np.tile([0.0, 0.0, 1.0], (ticks, 1))
-    return Motion(0.002, position, velocity, torque, turning, force, up, closed)
+    return MeasuredRun(0.002, position, velocity, torque, turning, force, up, closed)
 
 
 def test_friction_that_was_put_in_is_found_again() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aloft.mathematics.rotations import axis_rotations, matrices_of_quaternions
 from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.robots.kinematics import (
@@ -15,8 +16,6 @@ from aloft.robots.kinematics import (
     from_base_outwards,
     link_poses,
     link_poses_in_base,
-    matrices_of_quaternions,
-    rotations_about,
     standing_heights,
 )
 from aloft.robots.pinocchio_model import build_pinocchio_model
@@ -73,7 +72,7 @@ def test_the_base_carries_everything_with_it() -> None:
 def test_rotations_are_right_handed_and_orthonormal() -> None:
     angles = np.linspace(-7.0, 7.0, 9)
     axis = np.array([1.0, 2.0, -2.0]) / 3.0
-    about = rotations_about(tuple(axis), angles)
+    about = axis_rotations(tuple(axis), angles)
     quaternions = np.column_stack([np.sin(angles / 2)[:, None] * axis, np.cos(angles / 2)])
     np.testing.assert_allclose(about, matrices_of_quaternions(quaternions), atol=1e-14)
     np.testing.assert_allclose(about @ np.swapaxes(about, 1, 2), [np.eye(3)] * 9, atol=1e-14)

@@ -1,9 +1,15 @@
-"""Simulator and controller must see the same robot: same inertia, same gravity, same points."""
+"""All models must see the same robot: same places, same inertia, same gravity, same momentum.
+
+Of every shipped robot: Pinocchio (set-up and checks), MuJoCo (simulator), the kernels (tick), CasADi (planner)
+and NumPy (pictures). The equations of motion of the kernels are compared in ``test_dynamics_of_any_robot``, those
+of CasADi in ``test_symbolic_model_of_any_robot``.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -11,8 +17,17 @@ import pytest
 
 from aloft.hal.simulated.mujoco_model import Variation, build_mujoco_model
 from aloft.hal.simulated.scenes import platform, step
+from aloft.mathematics.rotations import to_matrix
+from aloft.planner.models.symbolic_model import SymbolicModel
+from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
+from aloft.robots.five_joint_leg import find_leg, forward
+from aloft.robots.kinematics import ball_feet, link_poses, link_poses_in_base, standing_com
+from aloft.robots.limb import place_limb, read_limb
 from aloft.robots.pinocchio_model import build_pinocchio_model
+
+from ..planner.models.test_symbolic_model import evaluate, to_pinocchio
+from .example_robots import URDF, needs_robots
 
 ROBOT = find_robot("bruce")
 SIMULATED = build_mujoco_model(ROBOT)
@@ -86,6 +101,101 @@ def test_centre_of_mass_momentum_and_contact_points(seed: int) -> None:
         np.testing.assert_allclose(
             data.site(contact.name).xpos, memory.oMf[frame].translation, rtol=0, atol=1e-10
         )
+
+
+@pytest.mark.parametrize("name", ["bruce", *(pytest.param(n, marks=needs_robots) for n in URDF)])
+def test_every_model_of_a_robot_puts_it_in_the_same_place(name: str) -> None:
+    robot = find_robot(name)
+    built = build_pinocchio_model(robot)
+    model, memory = built.model, built.model.createData()
+    random = np.random.default_rng(8)
+    coordinates, rates = random.uniform(-0.9, 0.9, (2, model.nv))
+    q, v, _ = to_pinocchio(coordinates, rates, np.zeros(model.nv))
+    base, joints, turn = q[:3], q[7:], pin.Quaternion(q[3:7]).toRotationMatrix()
+    pin.computeCentroidalMomentum(model, memory, q, v)
+    pin.framesForwardKinematics(model, memory, q)
+    com = memory.com[0].copy()
+    places = {robot.base: memory.oMi[1]}
+    places |= {joint.child: memory.oMi[model.getJointId(joint.name)] for joint in robot.joints}
+    points = np.array([memory.oMf[k].translation for k in built.contact_frames]).reshape(-1, 3)
+    for ball in ball_feet(robot):
+        frame = memory.oMf[built.contact_frames[ball.point]]
+        points[ball.point] += ball.radius * (frame.rotation[:, 2] - [0.0, 0.0, 1.0])
+
+    def close(found: Any, expected: Any) -> None:
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
+
+    # NumPy
+    poses = link_poses(robot, base[None], q[None, 3:7], joints[None])
+    for link, place in places.items():
+        position, rotation = poses.of(link)
+        close(position[0], place.translation)
+        close(rotation[0], place.rotation)
+
+    # kernels, seen from the base
+    matrix = np.empty((3, 3))
+    to_matrix(q[3:7], matrix)
+    close(matrix, turn)
+    for link, (rotation, position) in link_poses_in_base(robot, joints).items():
+        close(base + turn @ position, places[link].translation)
+        close(turn @ rotation, places[link].rotation)
+    contacts = ContactKinematics(robot)
+    contacts.evaluate(q[3:7], v[3:6], joints, v[6:])
+    lowest = points.copy()  # of the round rubber, of balls and others
+    for k, contact in enumerate(robot.contacts):
+        if k not in {ball.point for ball in ball_feet(robot)}:
+            up = memory.oMf[built.contact_frames[k]].rotation[:, 2]
+            lowest[k] += contact.radius * (up - [0.0, 0.0, 1.0])
+    close(base + contacts.points @ turn.T, lowest)
+    velocity = memory.hg.linear / robot.total_mass
+    close(turn @ (v[:3] + contacts.com_velocity), velocity)
+    for foot, frame in enumerate(built.sole_frames):
+        limb, leg = read_limb(robot, foot), find_leg(robot, foot)
+        pose, sole = np.empty((4, 3)), memory.oMf[frame]
+        angles = joints[list(limb.joints)]
+        place_limb(limb.links, limb.tip, angles, np.empty((len(angles), 6)), pose)
+        close(base + turn @ pose[0], sole.translation)
+        close(turn @ pose[1:], sole.rotation)
+        if leg is not None:
+            forward(leg.hip, leg.plane, leg.signs, angles, pose[0], pose[1:])
+            close(base + turn @ pose[0], sole.translation)
+            close(turn @ pose[1:], sole.rotation)
+
+    # CasADi
+    symbolic, symbols = SymbolicModel(robot), [ca.SX.sym(x, model.nv) for x in "qv"]
+    frames = symbolic.frames(symbols[0])
+    found = evaluate(
+        [
+            ca.horzcat(*(frames[link][1] for link in places)),
+            ca.horzcat(*symbolic.contact_points(symbols[0])),
+            symbolic.com(symbols[0]),
+            *symbolic.momentum(*symbols),
+        ],
+        symbols,
+        [coordinates, rates],
+    )
+    close(found[0].T, [place.translation for place in places.values()])
+    close(found[1].T, points)
+    close(found[2].ravel(), com)
+    close(found[3].ravel(), memory.hg.linear)
+    close(found[4].ravel(), memory.hg.angular)
+
+    # MuJoCo
+    simulated = build_mujoco_model(robot)
+    data = mujoco.MjData(simulated)
+    data.qpos[:3], data.qpos[3:7], data.qpos[7:] = base, q[[6, 3, 4, 5]], joints
+    data.qvel[:] = v
+    data.qvel[:3] = turn @ v[:3]
+    mujoco.mj_forward(simulated, data)
+    for link, place in places.items():
+        close(data.body(link).xpos, place.translation)
+        close(data.body(link).xmat.reshape(3, 3), place.rotation)
+    close(data.sensor("com").data, com)
+    close(data.sensor("com_velocity").data, velocity)
+    close(data.sensor("angular_momentum").data, memory.hg.angular)
+
+    q = np.concatenate([np.zeros(6), [1.0], robot.standing_position])
+    close(standing_com(robot), pin.centerOfMass(model, memory, q))
 
 
 def test_total_mass_is_the_papers() -> None:
@@ -180,10 +290,10 @@ def test_variation_and_scenes_reach_the_model() -> None:
     assert model.geom("right_toe").friction[0] == 0.5
     assert model.geom("box/0").solref[0] == pytest.approx(0.002)
     assert model.body("torso").ipos[0] == pytest.approx(0.02325 + 0.005)
-    assert step(0.05, 0.1).ground_height(0.2, 0.0) == 0.05
-    assert step(0.05, 0.1).ground_height(0.05, 0.0) == 0.0
+    assert step(0.05, 0.1).height(0.2, 0.0) == 0.05
+    assert step(0.05, 0.1).height(0.05, 0.0) == 0.0
     off = platform(0.35, 0.1)
-    assert off.ground_height(0.0, 0.0) == 0.0
-    assert off.ground_height(0.2, 0.0) == -0.35
+    assert off.height(0.0, 0.0) == 0.0
+    assert off.height(0.2, 0.0) == -0.35
     behind = platform(0.35, -0.1)
-    assert [behind.ground_height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]
+    assert [behind.height(x, 0.0) for x in (-0.2, 0.0, 0.2)] == [-0.35, 0.0, 0.0]

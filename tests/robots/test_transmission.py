@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.robots.description import find_robot
-from aloft.robots.transmission import Transmission, motor_gains
+from aloft.robots.transmission import TransmissionMap, motor_gains
 
 ROBOT = find_robot("bruce")
 NAMES = [joint.name for joint in ROBOT.joints]
@@ -20,7 +20,7 @@ VALUES = st.lists(st.floats(-50.0, 50.0), min_size=10, max_size=10).map(np.array
 def test_motion_and_torque_come_back_and_power_is_conserved(
     velocity: np.ndarray, torque: np.ndarray
 ) -> None:
-    transmission = Transmission(ROBOT)
+    transmission = TransmissionMap(ROBOT)
     motor_velocity, motor_torque, back = np.zeros(10), np.zeros(10), np.zeros(10)
     transmission.motor_motion(velocity, motor_velocity)
     transmission.motor_torque(torque, motor_torque)
@@ -36,7 +36,7 @@ def test_motion_and_torque_come_back_and_power_is_conserved(
 def test_the_transmission_of_bruce_is_the_published_one() -> None:
     # Westwood's kinematics, right leg: th2 = (ph2 - ph3)/2, th3 = -(ph2 + ph3)/2, th4 = -ph4,
     # th5 = ph4 + ph5; k2 = (t2 - t3)/2, k3 = -(t2 + t3)/2, k4 = t5 - t4, k5 = t5
-    transmission, out = Transmission(ROBOT), np.zeros(10)
+    transmission, out = TransmissionMap(ROBOT), np.zeros(10)
     motor = np.array([0.1, 0.2, 0.3, 0.4, 0.5] * 2)
     transmission.joint_motion(motor, out)
     np.testing.assert_allclose(out[:5], [-0.1, -0.05, -0.25, -0.4, 0.9], atol=1e-15)

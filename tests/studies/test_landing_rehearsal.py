@@ -9,7 +9,7 @@ import pytest
 from aloft.mathematics.arrays import Array
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.rehearsed import ZERO, Vector
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.graph import load
@@ -35,7 +35,7 @@ ERROR = np.array([0.008, -0.004, 0.06, -0.12, 0.02])
 SPREAD = np.array([-1.0, 0.0, 1.0])[:, None] * 1e-3
 
 
-def plan_of(task: str) -> JumpPlan:
+def plan_of(task: str) -> PlannedJump:
     plan = PlanLibrary(BRUCE, SHIPPED).find(read_task(GRAPHS / "tasks" / f"{task}.yaml"))
     assert plan is not None
     return plan

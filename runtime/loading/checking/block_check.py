@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ....files.nodes import ListNode, MapNode, Node
+from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.block import Block, Clock, Context, Input, Misfit, Output, Port
 from ...language.feedthrough import inputs_read_by_emit
 from ...language.fit import find_misfits, unmet_needs
@@ -16,10 +18,7 @@ from ...language.layout import LARGEST
 from ...language.parameters import Parameters
 from ...language.quantities import UNCHECKED, Quantity, quantity_of
 from ...language.signals import DTYPES, Field, Signal
-from ...language.stages import Position
 from ..flattening.flat import FlatBlock, FlatGraph
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import ListNode, MapNode, Node
 from .settings import Settings
 
 

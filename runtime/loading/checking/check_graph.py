@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ....files.problems import Code, Position, Problems, nearest
 from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
@@ -15,11 +16,10 @@ from ...language.importing import BlockImportError, UnknownModuleError
 from ...language.registry import find_block, nearest_names
 from ...language.schedule import ScheduleBlock, find_loops, order_blocks
 from ...language.signals import Signal
-from ...language.stages import BlockSpec, CheckedGraph, Position, Wire
+from ...language.stages import BlockSpec, CheckedGraph, Wire
 from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
-from ..problems import Code, Problems, nearest
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires

@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ....files.nodes import Entry, MapNode, text_of
+from ....files.problems import Code, Problems, listing, nearest
 from ....robots.description import RobotDescription
 from ...language.parameters import Parameters
 from ...language.quantities import quantity_of
 from ...language.signals import Field, Signal
 from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, MapNode, text_of
 from ..reading.selection import Selection, runs, select
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, part_signal, read_values

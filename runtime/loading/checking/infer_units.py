@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 
+from ....files.problems import Code, Problems
 from ...language.block import Block
 from ...language.quantities import UNCHECKED, Given, Quantity, quantity_of
 from ...language.unit_algebra import over
-from ..problems import Code, Problems
 from .block_check import BlockDraft
 from .inserted import own_unit
 

@@ -14,6 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ....files.nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
+from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Block, Input, Output
 from ...language.delay import DelayParameters, delay_block_type
 from ...language.errors import UnitError
@@ -24,8 +26,6 @@ from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
 from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
 from ..flattening.flat import FlatWire
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
 from .block_check import BlockDraft
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings, Position
+from ....files.nodes import Entry, MapNode, kind, plain
+from ....files.problems import Code, Position, Problems, listing, nearest
+from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings
 from ...placement.age import worst_age
 from ...placement.placed import PlacementError, command_sources, silence_limit
 from ..flattening.flat import FlatGraph
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, MapNode, kind, plain, read_quantity
-from ..reading.written import unknown_key, wrong_kind
+from ..reading.written import read_quantity, unknown_key, wrong_kind
 
 POLICY_KEYS = ("max_age", "late", "watch")
 LINK_KEYS = ("mode", *POLICY_KEYS, "of", "paths", "watchdog")

@@ -10,13 +10,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain
+from ....files.problems import Code, Problems, listing, nearest
+from ....files.validation import unit_of
 from ...language.block import Block, Clock, Context, Misfit
 from ...language.fit import find_misfits
-from ...language.parameters import Parameters, unit_of
+from ...language.parameters import Parameters
 from ...language.registry import find_block
 from ..flattening.flat import FlatBlock, FlatGraph
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, MapNode, Node, ScalarNode, from_plain
 from .parameters import check_parameters
 from .settings import Settings
 

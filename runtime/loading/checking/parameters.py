@@ -5,28 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
 
-from ....robots.description import RobotDescription
-from ...language.block import Block
-from ...language.errors import UnitError
-from ...language.fit import find_misfits
-from ...language.parameter_change import Adjustment
-from ...language.parameters import Parameters, is_live, unit_of
-from ...language.per_joint import BY_POSITION, by_name
-from ...language.registry import block_name
-from ...language.signals import Field
-from ...language.stages import Position
-from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock
-from ..problems import Code, LoadError, Problems, fix_for_key, listing, nearest
-from ..reading.nodes import (
-    Entry,
-    ListNode,
+from ....files.nodes import (
     MapNode,
     Node,
     ScalarNode,
@@ -35,26 +20,18 @@ from ..reading.nodes import (
     plain,
     text_of,
 )
+from ....files.problems import Code, LoadError, Position, Problems, listing, nearest
+from ....files.validation import find_mistakes, path_text, unit_of
+from ....robots.description import RobotDescription
+from ...language.block import Block
+from ...language.fit import find_misfits
+from ...language.parameter_change import Adjustment
+from ...language.parameters import Parameters, is_live
+from ...language.per_joint import BY_POSITION, by_name
+from ...language.registry import block_name
+from ...language.signals import Field
+from ..flattening.flat import FlatBlock
 from ..reading.overrides import Override, Overrides, read_overrides
-
-_WORDS: Mapping[str, str] = {
-    "float": "a number",
-    "int": "a whole number",
-    "bool": "true or false",
-    "string": "text",
-    "list": "a list",
-    "tuple": "a list",
-    "dict": "a mapping",
-    "mapping": "a mapping",
-    "model": "a mapping",
-    "finite": "a finite number",
-}
-_BOUNDS = {
-    "greater_than": ("gt", "more than"),
-    "greater_than_equal": ("ge", "at least"),
-    "less_than": ("lt", "less than"),
-    "less_than_equal": ("le", "at most"),
-}
 
 
 def check_parameters(
@@ -72,7 +49,7 @@ def check_parameters(
     try:
         params = model.model_validate(plain(flat.parameters))
     except ValidationError as error:
-        _report(flat, block_type, error.errors(include_url=False), robot, problems)
+        _report(flat, block_type, error, robot, problems)
         return None
     except Exception as error:  # noqa: BLE001  a check of the user's own failed
         problems.add(
@@ -132,76 +109,46 @@ def _refuse_beyond_64_bits(
     return ok
 
 
-@dataclass
-class _Mistake:
-    """All errors of pydantic about one place; there are several where the type is a union."""
-
-    code: Code
-    place: str
-    where: Position
-    node: Node | None
-    name: str
-    expected: list[str] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
-    near: tuple[str, ...] = ()
-    fix: str = ""
-
-
 def _report(
     flat: FlatBlock,
     block_type: type[Block],
-    errors: Sequence[Any],
+    error: ValidationError,
     robot: RobotDescription | None,
     problems: Problems,
 ) -> None:
+    """Report every mistake that pydantic has found."""
     model = block_type.Params
-    mistakes: dict[tuple[Code, str], _Mistake] = {}
-    for error in errors:
-        kind_of = str(error["type"])
-        steps, node, entry = _locate(flat.parameters, error["loc"])
-        name = str(error["loc"][0]) if error["loc"] else ""
-        if kind_of == "missing":
-            missing = str(error["loc"][-1]) if error["loc"] else ""
-            place = ".".join([flat.path, *steps, missing])
-            found = mistakes.setdefault(
-                (Code.MISSING_PARAMETER, place),
-                _Mistake(Code.MISSING_PARAMETER, place, _end(node, flat), None, missing),
-            )
-            found.expected.append(_with_text("a value", model, name))
-            found.fix = f"with: {{{missing}: ...}}" if len(error["loc"]) == 1 else f"{missing}: ..."
-            continue
-        place = ".".join([flat.path, *steps]).replace(".[", "[")
-        if kind_of == "extra_forbidden" and entry is not None:
-            legal = _siblings(model, error["loc"])
-            near = nearest(entry.key, legal)
-            mistakes[Code.UNKNOWN_PARAMETER, place] = _Mistake(
-                Code.UNKNOWN_PARAMETER, place, entry.key_where, None, entry.key,
-                [listing(legal)], [], near, _right_name(entry, near),
-            )  # fmt: skip
-            continue
-        where = node.where if steps and node is not None else _end(node, flat)
-        found = mistakes.setdefault(
-            (Code.BAD_PARAMETER, place),
-            _Mistake(Code.BAD_PARAMETER, place, where, node if steps else None, name),
+    for mistake in find_mistakes(error, model, flat.parameters):
+        name = str(mistake.location[0]) if mistake.location else ""
+        place = ".".join([flat.path, *([path_text(mistake.path)] if mistake.path else [])])
+        expected = " or ".join(mistake.expected)
+        if mistake.code is Code.MISSING_PARAMETER:
+            message = f"{flat.path} ({flat.use}) needs the parameter {mistake.key!r}"
+            expected = _with_text(expected, model, name)
+            if len(mistake.path) == 1:
+                mistake.fix = f"with: {{{mistake.key}: ...}}"
+        elif mistake.code is Code.UNKNOWN_PARAMETER:
+            message = f"{flat.path} ({flat.use}) has no parameter {mistake.key!r}"
+        elif mistake.node is None:
+            message = f"the parameters of {flat.path} do not go together"
+        else:
+            message = f"{place} cannot be {mistake.found}"
+            if BY_POSITION in mistake.kinds:
+                mistake.fix = f"{name}: {_by_name(mistake.node, robot)}"
+        if mistake.reasons:
+            message = f"{message}: {'; '.join(mistake.reasons)}"
+        if mistake.code is Code.BAD_PARAMETER and expected:
+            expected = _with_text(expected, model, name)
+        problems.add(
+            mistake.code,
+            message,
+            mistake.where,
+            at=place,
+            expected=expected,
+            found=mistake.found,
+            nearest=mistake.nearest,
+            fix=mistake.fix,
         )
-        expected, reason = _explain(error, node, _unit(model, name))
-        if expected and expected not in found.expected:
-            found.expected.append(expected)
-        if reason and reason not in found.reasons:
-            found.reasons.append(reason)
-        if kind_of == BY_POSITION:
-            found.fix = f"{name}: {_by_name(node, robot)}"
-        if isinstance(node, ScalarNode) and isinstance(node.value, str):
-            legal = tuple(w.strip("' ") for w in expected.replace(" or ", ",").split(","))
-            found.near = found.near or nearest(node.value, [w for w in legal if w])
-    for mistake in mistakes.values():
-        if _is_explained(mistake, mistakes.values()):
-            continue
-        if mistake.code is Code.BAD_PARAMETER and mistake.near:
-            mistake.fix = f"{mistake.name}: {mistake.near[0]}"
-        if mistake.code is Code.MISSING_PARAMETER and _is_meant(mistake, mistakes.values()):
-            continue  # one mistake, one problem
-        _add(flat, model, mistake, problems)
 
 
 def _by_name(node: Node, robot: RobotDescription | None) -> str:
@@ -214,135 +161,13 @@ def _by_name(node: Node, robot: RobotDescription | None) -> str:
     return "{" + ", ".join(f"{name}: ..." for name in names) + "}"
 
 
-def _right_name(entry: Entry, near: Sequence[str]) -> str:
-    if not near:
-        return f"remove {entry.key!r}"
-    return fix_for_key(entry.key, text_of(plain(entry.value)), entry.key_where, near[0])
-
-
-def _is_explained(mistake: _Mistake, others: Iterable[_Mistake]) -> bool:
-    """Whether a collection was refused only because of elements that other mistakes are about.
-
-    Where the type is a number or a mapping, pydantic reports the wrong element of a mapping, and
-    also that the mapping is not a number; the latter says nothing new.
-    """
-    return isinstance(mistake.node, (MapNode, ListNode)) and any(
-        other.place.startswith((f"{mistake.place}.", f"{mistake.place}[")) for other in others
-    )
-
-
-def _is_meant(missing: _Mistake, mistakes: Iterable[_Mistake]) -> bool:
-    """Whether a missing parameter is given under a misspelt name."""
-    parent = missing.place.rpartition(".")[0]
-    return any(
-        other.code is Code.UNKNOWN_PARAMETER
-        and other.place.rpartition(".")[0] == parent
-        and other.near[:1] == (missing.name,)
-        for other in mistakes
-    )
-
-
-def _add(flat: FlatBlock, model: type[Parameters], mistake: _Mistake, problems: Problems) -> None:
-    expected = " or ".join(mistake.expected)
-    found = ""
-    if mistake.code is Code.MISSING_PARAMETER:
-        message = f"{flat.path} ({flat.use}) needs the parameter {mistake.name!r}"
-    elif mistake.code is Code.UNKNOWN_PARAMETER:
-        message = f"{flat.path} ({flat.use}) has no parameter {mistake.name!r}"
-        found = mistake.name
-    elif mistake.node is None:
-        message = f"the parameters of {flat.path} do not go together"
-    else:
-        found = text_of(plain(mistake.node))
-        found = found if len(found) <= 80 else f"{found[:77]}..."
-        message = f"{mistake.place} cannot be {found}"
-    if mistake.reasons:
-        message = f"{message}: {'; '.join(mistake.reasons)}"
-    if mistake.code is Code.BAD_PARAMETER and expected:
-        expected = _with_text(expected, model, mistake.name)
-    problems.add(
-        mistake.code,
-        message,
-        mistake.where,
-        at=mistake.place,
-        expected=expected,
-        found=found,
-        nearest=mistake.near,
-        fix=mistake.fix,
-    )
-
-
-def _locate(root: MapNode, location: Sequence[str | int]) -> tuple[list[str], Node, Entry | None]:
-    """Follow a location of pydantic as far as the file has it; such a location also names the
-    members of unions, which are no keys of the file."""
-    node: Node = root
-    entry = None
-    steps: list[str] = []
-    for step in location:
-        if isinstance(node, MapNode) and (found := node.get(str(step))) is not None:
-            entry, node = found, found.value
-            steps.append(str(step))
-        elif isinstance(node, ListNode) and isinstance(step, int) and step < len(node.items):
-            node, entry = node.items[step], None
-            steps.append(f"[{step}]")
-    return steps, node, entry
-
-
-def _end(node: Node, flat: FlatBlock) -> Position:
-    return node.where if node is not flat.parameters else flat.parameters.where
-
-
-def _siblings(model: type[Parameters], location: Sequence[str | int]) -> tuple[str, ...]:
-    """The names that are legal where the last step of ``location`` stands."""
-    current: Any = model
-    for step in location[:-1]:
-        info = getattr(current, "model_fields", {}).get(step)
-        current = info.annotation if info is not None else None
-    return tuple(getattr(current, "model_fields", {}))
-
-
-def _unit(model: type[Parameters], name: str) -> str:
-    info = model.model_fields.get(name)
-    return unit_of(info) if info else ""
-
-
 def _with_text(expected: str, model: type[Parameters], name: str) -> str:
     """What is expected, with the parameter's unit and its line of text."""
     info = model.model_fields.get(name)
-    unit = _unit(model, name)
+    unit = unit_of(info) if info else ""
     if unit and unit not in expected:
         expected = f"{expected} in {unit}"
     return f"{expected} ({info.description})" if info and info.description else expected
-
-
-def _explain(error: Mapping[str, Any], node: Node, unit: str) -> tuple[str, str]:
-    """What was expected, and a reason where there is more to say."""
-    kind_of = str(error["type"])
-    context = error.get("ctx", {})
-    if kind_of in _BOUNDS:
-        key, words = _BOUNDS[kind_of]
-        return f"{words} {context[key]:g} {unit}".strip(), ""
-    if kind_of in ("too_short", "too_long"):
-        few = kind_of == "too_short"
-        limit = context["min_length" if few else "max_length"]
-        return f"{'at least' if few else 'at most'} {limit} values", ""
-    if kind_of in ("literal_error", "enum"):
-        return str(context["expected"]), ""
-    if kind_of == BY_POSITION:
-        return "a number for all joints, or numbers by joint name or pattern", str(error["msg"])
-    if kind_of in ("value_error", "assertion_error"):
-        return "", str(context.get("error", error["msg"]))
-    if kind_of == "int_from_float":
-        return "a whole number", ""
-    word = _WORDS.get(kind_of.partition("_")[0])
-    if word is None:
-        return str(error["msg"]), ""
-    if unit and isinstance(node, ScalarNode) and isinstance(node.value, str):
-        try:
-            parse_quantity(node.value, unit)
-        except UnitError as reason:
-            return word, str(reason)
-    return word, ""
 
 
 _PLACE = Position("the running graph", 0, 0)

@@ -8,13 +8,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from ....files.nodes import Entry, ScalarNode, kind, plain
+from ....files.problems import Code, Position, Problems, listing, nearest
 from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
 from ...language.fit import fix_without_robot
-from ...language.stages import ClockSpec, Position
+from ...language.stages import ClockSpec
 from ..flattening.flat import ROBOT_FILES, FlatGraph
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, ScalarNode, kind, plain, read_quantity
-from ..reading.written import CLOCK_KEYS, unknown_key
+from ..reading.written import CLOCK_KEYS, read_quantity, unknown_key
 
 _CLOCK_WORDS: Mapping[str, tuple[str, ...]] = {
     "kind": ("free", "paced", "robot"),

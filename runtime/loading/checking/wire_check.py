@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from ....files.nodes import text_of
+from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Input, Output
 from ...language.quantities import UNCHECKED, quantity_of
 from ...language.signals import Field, Signal
 from ...language.unit_algebra import over
 from ...language.units import Unit
 from ..flattening.flat import FlatGraph, FlatWire
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import text_of
 from .block_check import BlockDraft
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...language.stages import HasSource, Position
-from ..reading.nodes import Entry, MapNode, Node, plain, text_of
+from ....files.nodes import Entry, MapNode, Node, plain, text_of
+from ....files.problems import Position
+from ...language.stages import HasSource
 from ..reading.selection import WHOLE, Selection
 
 _WIDTH = 100

@@ -3,15 +3,14 @@ and applies overrides."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ...language.stages import Position
-from ..problems import Code, Problems, listing, nearest
-from ..reading.document import read_file, read_mapping
+from ....files.document import read_file, read_mapping
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, plain
+from ....files.problems import Code, Position, Problems, listing, nearest
 from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
-from ..reading.nodes import Entry, MapNode, Node, ScalarNode, plain
 from ..reading.overrides import (
     Override,
     Overrides,
@@ -32,6 +31,10 @@ _MAXIMAL_BLOCKS = 5000
 _SUFFIXES = (".yaml", ".yml")
 
 
+_GivenWire = tuple[WrittenWire | None, Position, str]
+"""A wire under ``wires``: the wire, its place and its file."""
+
+
 @dataclass(frozen=True)
 class _Scope:
     """Where blocks are expanded: the root, or one use of a sub-graph."""
@@ -45,8 +48,8 @@ class _Scope:
     shifted: bool = False
     """Whether the offset is said further out than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
-    wires: Mapping[str, tuple[WrittenWire | None, Position, str]] = field(default_factory=dict)
-    """Wires that other files give, by ``block.input``: the link, its place and its file."""
+    wires: Mapping[str, _GivenWire] = field(default_factory=dict)
+    """Wires that other files give, by ``block.input``."""
 
     @property
     def prefix(self) -> str:
@@ -157,7 +160,7 @@ class _Flattener:
     def _expand(self, files: list[WrittenGraph], scope: _Scope) -> None:
         prefix = scope.prefix
         sets: list[Override] = []
-        wires: dict[str, tuple[WrittenWire | None, Position, str]] = {}
+        wires: dict[str, _GivenWire] = {}
         first: dict[str, WrittenBlock] = {}
         mine: list[tuple[WrittenBlock, WrittenGraph]] = []
         for file in files:
@@ -174,14 +177,22 @@ class _Flattener:
                 first[block.name] = block
                 mine.append((block, file))
         inner = replace(scope, sets=(*sets, *scope.sets), wires={**wires, **scope.wires})
+        sets_of: dict[str, list[Override]] = {}
+        for override in inner.sets:
+            sets_of.setdefault(override.block, []).append(override)
+        wires_to: dict[str, dict[str, _GivenWire]] = {}
+        for target, given in inner.wires.items():
+            path, _, name = target.rpartition(".")
+            wires_to.setdefault(path, {})[name] = given
         for block, file in mine:
-            self._block(block, file, inner)
+            path = prefix + block.name
+            self._block(block, file, inner, sets_of.get(path, ()), wires_to.get(path, {}))
         self._report_lost(sets, wires, scope)
 
     def _report_lost(
         self,
         sets: Iterable[Override],
-        wires: Mapping[str, tuple[WrittenWire | None, Position, str]],
+        wires: Mapping[str, _GivenWire],
         scope: _Scope,
     ) -> None:
         """Report overrides and wires of blocks that do not exist."""
@@ -237,7 +248,15 @@ class _Flattener:
         node = scope.bindings.substitute(entry.value)
         return read_wire(node, scope.prefix, scope.instance, at, self.problems)
 
-    def _block(self, block: WrittenBlock, file: WrittenGraph, scope: _Scope) -> None:
+    def _block(
+        self,
+        block: WrittenBlock,
+        file: WrittenGraph,
+        scope: _Scope,
+        sets: Sequence[Override],
+        wires: Mapping[str, _GivenWire],
+    ) -> None:
+        """Add a block, or expand a sub-graph; ``sets`` and ``wires`` are what other files give it."""
         path = scope.prefix + block.name
         if len(self.drafts) >= _MAXIMAL_BLOCKS:
             self.problems.add(Code.TOO_LARGE, f"more than {_MAXIMAL_BLOCKS} blocks", block.where)
@@ -251,57 +270,53 @@ class _Flattener:
         if not isinstance(parameters, MapNode):
             parameters = MapNode((), block.where)
         use = substitute(block.use) if block.use else None
-        for override in scope.sets:
-            if override.block == path and override.path == ("use",):
+        for override in sets:
+            if override.path == ("use",):
                 use = override.value
-            elif override.block == path:
+            else:
                 parameters = parameters.assign(override.path, override.value, override.where)
-        links, places = self._links(block, file, scope, path)
-        rate = substitute(block.rate) if block.rate else scope.rate
-        offset = substitute(block.offset) if block.offset else scope.offset
-        machine = substitute(block.machine) if block.machine else scope.machine
-        shifted = block.offset is None and (block.rate is not None or scope.shifted)
+        named = isinstance(use, ScalarNode) and isinstance(use.value, str)
+        if use is not None and not named:
+            expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
+            wrong_kind(use, "'use'", expected, self.problems, at=path)
+        links, places = self._links(block, file, scope, path, wires)
         draft = _GraphDraft(
             FlatBlock(
                 path,
                 block.where,
-                "",
-                block.where,
+                str(use.value) if isinstance(use, ScalarNode) and named else "",
+                use.where if use is not None and named else block.where,
                 file.folder,
                 parameters,
-                rate=rate,
-                offset=offset,
+                rate=substitute(block.rate) if block.rate else scope.rate,
+                offset=substitute(block.offset) if block.offset else scope.offset,
                 input_places=places,
-                machine=machine,
+                machine=substitute(block.machine) if block.machine else scope.machine,
             ),
             links,
-            shifted,
+            block.offset is None and (block.rate is not None or scope.shifted),
         )
-        if use is None or not (isinstance(use, ScalarNode) and isinstance(use.value, str)):
-            if use is not None:
-                expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
-                wrong_kind(use, "'use'", expected, self.problems, at=path)
-        elif use.value.endswith(_SUFFIXES):
-            inner = replace(scope, rate=rate, offset=offset, machine=machine, shifted=shifted)
-            self._instance(draft, use, file, inner)
-            return
+        if draft.block.use.endswith(_SUFFIXES):
+            self._instance(draft, file, scope)
         else:
-            draft.block = replace(draft.block, use=use.value, use_where=use.where)
-        self.drafts[path] = draft
+            self.drafts[path] = draft
 
     def _links(
-        self, block: WrittenBlock, file: WrittenGraph, scope: _Scope, path: str
+        self,
+        block: WrittenBlock,
+        file: WrittenGraph,
+        scope: _Scope,
+        path: str,
+        wires: Mapping[str, _GivenWire],
     ) -> tuple[dict[str, WrittenWire | None], dict[str, Position]]:
         links: dict[str, WrittenWire | None] = {}
         places: dict[str, Position] = {}
         for entry in block.inputs or ():
             links[entry.key] = self._link(entry, scope, f"{path}.{entry.key}")
             places[entry.key] = entry.key_where
-        for target, (link, where, wire_file) in scope.wires.items():
-            owner, _, name = target.rpartition(".")
-            if owner != path:
-                continue
+        for name, (link, where, wire_file) in wires.items():
             if name in places and wire_file == file.file:
+                target = f"{path}.{name}"
                 self.problems.add(
                     Code.WIRED_TWICE,
                     f"{target} is wired here and at its block",
@@ -316,14 +331,13 @@ class _Flattener:
             places[name] = where
         return links, places
 
-    def _instance(
-        self, draft: _GraphDraft, use: ScalarNode, file: WrittenGraph, scope: _Scope
-    ) -> None:
+    def _instance(self, draft: _GraphDraft, file: WrittenGraph, scope: _Scope) -> None:
         """Expand one use of a sub-graph."""
-        path, problems = draft.block.path, self.problems
-        instance = Instance(path, draft.block.where, str(use.value), draft.links)
+        block, problems = draft.block, self.problems
+        path = block.path
+        instance = Instance(path, block.where, block.use, draft.links)
         self.instances[path] = instance
-        located = self.files.locate(use, file, scope.stack)
+        located = self.files.locate(ScalarNode(block.use, block.use_where), file, scope.stack)
         subgraph = self.files.read(*located, subgraph=True) if located else None
         if located is None or subgraph is None:
             return
@@ -331,13 +345,22 @@ class _Flattener:
         incomplete, self.files.incomplete = self.files.incomplete, False
         files = self.files.gather(subgraph, stack, subgraph=True)
         missing, self.files.incomplete = self.files.incomplete, incomplete
-        values = parameter_values(draft.block, subgraph, problems)
+        values = parameter_values(block, subgraph, problems)
         if values is None or missing:
             return
         instance.broken = False
-        instance.declare_inputs(subgraph, draft.block.input_places, problems)
+        instance.declare_inputs(subgraph, block.input_places, problems)
         report_unused(subgraph, files, problems)
-        inner = replace(scope, bindings=Bindings(values, problems), instance=path, stack=stack)
+        inner = replace(
+            scope,
+            bindings=Bindings(values, problems),
+            instance=path,
+            stack=stack,
+            rate=block.rate,
+            offset=block.offset,
+            machine=block.machine,
+            shifted=draft.shifted,
+        )
         for entry in subgraph.outputs:
             instance.outputs[entry.key] = self._link(entry, inner, f"{path}.{entry.key}")
         self._expand(files, inner)

@@ -12,10 +12,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
+from ....files.problems import Code, Problems, listing, nearest
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
 from ...transports.registry import EXAMPLE, endpoint_fault, transport_type
-from ..problems import Code, Problems, listing, nearest
-from ..reading.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from .flat import FlatBlock, FlatGraph
 from .subgraphs import Instance
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from ....files.nodes import Node, ScalarNode, kind
+from ....files.problems import Code, Position, Problems
 from ...language.errors import AloftError
 from ...language.schedule import hyperperiod
-from ...language.stages import Position
-from ..problems import Code, Problems
-from ..reading.nodes import Node, ScalarNode, kind, read_quantity
+from ..reading.written import read_quantity
 from .flat import FlatBlock
 
 

@@ -9,9 +9,8 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from ...language.stages import Position
-from ..problems import Code, Problems, fix_for_key, listing, nearest
-from ..reading.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
+from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
+from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
 from ..reading.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
 from .flat import FlatBlock, FlatWire, WireElement, WirePart
@@ -113,7 +112,8 @@ class Resolver:
                 return None
             if link.delay:
                 total = replace(total, delay=link.delay, initial=link.initial)
-            total = replace(total, truth=total.truth or link.truth)
+            if link.truth:
+                total = replace(total, truth=True)
             if link.parts:
                 return self._resolve_composite(
                     link, replace(total, where=start.where), selection, at
@@ -387,9 +387,14 @@ class Bindings:
                 return replace(node, value=text[1:])
             return self._value(text[1:], node)
         if isinstance(node, ListNode):
-            return replace(node, items=tuple(self.substitute(item) for item in node.items))
-        entries = tuple(replace(e, value=self.substitute(e.value)) for e in node.entries)
-        return replace(node, entries=entries)
+            items = tuple(self.substitute(item) for item in node.items)
+            same = all(new is old for new, old in zip(items, node.items, strict=True))
+            return node if same else replace(node, items=items)
+        values = [self.substitute(entry.value) for entry in node.entries]
+        if all(new is e.value for new, e in zip(values, node.entries, strict=True)):
+            return node
+        entries = (replace(e, value=new) for new, e in zip(values, node.entries, strict=True))
+        return replace(node, entries=tuple(entries))
 
     def _value(self, name: str, node: ScalarNode) -> Node:
         if self.values is None:

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
-from ...language.stages import Position
+from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, text_of
+from ....files.problems import Code, Position, Problems, nearest
 from ...language.units import QUANTITY
-from ..problems import Code, Problems, nearest
-from ..reading.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, text_of
 from ..reading.selection import WHOLE, Selection, read_selection
 from ..reading.written import WIRE_KEYS, unknown_key, wrong_kind
 

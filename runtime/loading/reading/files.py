@@ -12,10 +12,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...language.stages import Position
-from ..problems import Code, LoadError, Problems, listing, nearest
-from .document import read_file
-from .nodes import MapNode, ScalarNode, plain, texts_of
+from ....files.document import read_file
+from ....files.nodes import MapNode, ScalarNode, plain, texts_of
+from ....files.problems import Code, LoadError, Position, Problems, listing, nearest
 from .written import COMMON_KEYS, GRAPH_KEYS, WrittenGraph, read_graph
 
 Stack = tuple[tuple[Path, str], ...]

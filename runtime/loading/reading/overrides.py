@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...language.stages import Position
-from ..problems import Code, Problems
-from .document import read_value
-from .nodes import Entry, MapNode, Node, ScalarNode, from_plain, move, plain, text_of
+from ....files.document import read_value
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain, move, plain, text_of
+from ....files.problems import Code, Position, Problems
 from .written import GRAPH_KEYS
 
 Overrides = Mapping[str, Any] | Iterable[str]

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.blocks.control.safety_faults import Fault
-from aloft.blocks.control.safety_monitor import SafetyMonitor
+from aloft.blocks.control.safety_monitor import SafetyFault, SafetyMonitor
 from aloft.blocks.signals import CommandMode, DrivePhase, SwitchFault
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
@@ -44,7 +43,7 @@ def make(**params):
 
 
 def fault(bench):
-    return Fault(int(bench.get("state").fault))
+    return SafetyFault(int(bench.get("state").fault))
 
 
 def assert_damps(bench, reason):
@@ -67,14 +66,14 @@ def test_passes_the_command_unchanged(bench):
 def test_tilt_must_last(bench):
     bench.set("base", orientation=leaning(1.3))
     bench.step(10)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.set("base", orientation=leaning(1.1))
     bench.step()
     bench.set("base", orientation=leaning(1.3))
     bench.step(10)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step()
-    assert_damps(bench, Fault.TILT)
+    assert_damps(bench, SafetyFault.TILT)
 
 
 def test_damping_is_for_good_and_the_first_reason_stays(bench):
@@ -83,7 +82,7 @@ def test_damping_is_for_good_and_the_first_reason_stays(bench):
     bench.set("base", orientation=leaning(0.0))
     bench.set("desired", torque=np.nan)
     bench.step(50)
-    assert_damps(bench, Fault.TILT)
+    assert_damps(bench, SafetyFault.TILT)
     assert bench.block.metrics()["safety_fault_time_s"] == pytest.approx(10 / 500)
 
 
@@ -92,9 +91,9 @@ def test_a_joint_beyond_its_limit(bench):
     position[3] = ROBOT.joint_limits[3, 0] - 0.06
     bench.set("joints", position=position)
     bench.step(10)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step()
-    assert_damps(bench, Fault.JOINT_LIMIT)
+    assert_damps(bench, SafetyFault.JOINT_LIMIT)
 
 
 def test_different_joints_in_turn_are_not_one_that_stays_beyond(bench):
@@ -103,7 +102,7 @@ def test_different_joints_in_turn_are_not_one_that_stays_beyond(bench):
         position[3 if tick % 2 else 8] = ROBOT.joint_limits[3, 0] - 0.06
         bench.set("joints", position=position)
         bench.step()
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
 
 
 def test_limits_and_damping_follow_from_the_motors_or_are_given_by_joint():
@@ -111,13 +110,16 @@ def test_limits_and_damping_follow_from_the_motors_or_are_given_by_joint():
     peak = np.abs(ROBOT.joint_to_motor).T @ ROBOT.motors.peak_torque
     bench.set("wbc", solved=True)
     bench.set("base", orientation=leaning(0.0))
-    for torque, reason in ((9.9 * peak, Fault.NONE), (10.1 * peak, Fault.ABSURD_COMMAND)):
+    for torque, reason in (
+        (9.9 * peak, SafetyFault.NONE),
+        (10.1 * peak, SafetyFault.ABSURD_COMMAND),
+    ):
         bench.set("desired", **{**COMMAND, "torque": torque})
         bench.step()
         assert fault(bench) == reason
     assert bench.get("command").damping == pytest.approx(peak / 20.0)
     patterns = {"*": 60.0, "*_knee": 5.0}
-    for joint, reason in ((2, Fault.NONE), (3, Fault.JOINT_SPEED)):
+    for joint, reason in ((2, SafetyFault.NONE), (3, SafetyFault.JOINT_SPEED)):
         bench = make(speed_limit=patterns)
         velocity = np.zeros(10)
         velocity[joint] = 6.0
@@ -134,13 +136,13 @@ def test_a_joint_without_limits_is_never_beyond_them():
     bench.set("wbc", solved=True)
     bench.set("joints", position=np.full(10, 50.0))
     bench.step(100)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
 
 
 def test_a_joint_too_fast(bench):
     bench.set("joints", velocity=np.r_[np.zeros(9), -61.0])
     bench.step(11)
-    assert_damps(bench, Fault.JOINT_SPEED)
+    assert_damps(bench, SafetyFault.JOINT_SPEED)
 
 
 def test_readings_that_stop_changing():
@@ -148,11 +150,11 @@ def test_readings_that_stop_changing():
     for tick in range(20):
         bench.set("joints", velocity=1e-9 * tick)
         bench.step()
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step(4)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step()
-    assert_damps(bench, Fault.STALE_SENSORS)
+    assert_damps(bench, SafetyFault.STALE_SENSORS)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +171,7 @@ def test_readings_that_stop_changing():
 def test_an_absurd_state_stops_at_once(bench, port, field, value):
     bench.set(port, **{field: value})
     bench.step()
-    assert_damps(bench, Fault.ABSURD_STATE)
+    assert_damps(bench, SafetyFault.ABSURD_STATE)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +181,7 @@ def test_an_absurd_state_stops_at_once(bench, port, field, value):
 def test_an_absurd_command_never_reaches_the_drives(bench, field, value):
     bench.set("desired", **{field: value})
     bench.step()
-    assert_damps(bench, Fault.ABSURD_COMMAND)
+    assert_damps(bench, SafetyFault.ABSURD_COMMAND)
 
 
 def test_a_solver_that_keeps_failing(bench):
@@ -189,9 +191,9 @@ def test_a_solver_that_keeps_failing(bench):
     bench.step()
     bench.set("wbc", solved=False)
     bench.step(24)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step()
-    assert_damps(bench, Fault.SOLVER)
+    assert_damps(bench, SafetyFault.SOLVER)
 
 
 def test_fault_survives_a_restore(bench):
@@ -201,11 +203,11 @@ def test_fault_survives_a_restore(bench):
     broken = bench.snapshot()
     bench.restore(healthy)
     bench.step()
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.restore(broken)
     bench.set("desired", torque=0.0)
     bench.step()
-    assert_damps(bench, Fault.ABSURD_COMMAND)
+    assert_damps(bench, SafetyFault.ABSURD_COMMAND)
 
 
 HEALTHY = {
@@ -233,27 +235,27 @@ def of_knee(values, value):
 @pytest.mark.parametrize(
     ("field", "bad", "ticks", "reason", "text"),
     [
-        ("condition", 0x88, 1, Fault.DRIVE,
+        ("condition", 0x88, 1, SafetyFault.DRIVE,
          "drive left_knee_motor: its watchdog ran out, or the emergency stop is pressed"),
-        ("condition", 0x00, 1, Fault.DRIVE, "drive left_knee_motor: its error byte is 0x00, whose"),
-        ("age", 0.021, 1, Fault.SILENT_DRIVE,
+        ("condition", 0x00, 1, SafetyFault.DRIVE, "drive left_knee_motor: its error byte is 0x00, whose"),
+        ("age", 0.021, 1, SafetyFault.SILENT_DRIVE,
          "drive left_knee_motor has not answered for 21 ms; answer_age is 20 ms"),
-        ("age", np.nan, 1, Fault.SILENT_DRIVE, "drive left_knee_motor has not answered for nan ms"),
-        ("voltage", 13.1, 11, Fault.VOLTAGE,
+        ("age", np.nan, 1, SafetyFault.SILENT_DRIVE, "drive left_knee_motor has not answered for nan ms"),
+        ("voltage", 13.1, 11, SafetyFault.VOLTAGE,
          "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V"),
-        ("temperature", 81.0, 11, Fault.TEMPERATURE,
+        ("temperature", 81.0, 11, SafetyFault.TEMPERATURE,
          "drive left_knee_motor: its winding has 81 deg C; highest_temperature is 80"),
-        ("current", -29.5, 11, Fault.CURRENT,
+        ("current", -29.5, 11, SafetyFault.CURRENT,
          "drive left_knee_motor: -29.5 A; largest_current is 29 A"),
     ],
 )  # fmt: skip
 def test_a_drive_that_is_not_well(field, bad, ticks, reason, text):
     bench = with_health(**{field: of_knee(HEALTHY[field], bad)})
     bench.step(ticks - 1)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.set("health", **{field: HEALTHY[field]})
     bench.step()
-    assert fault(bench) == Fault.NONE, "it must be so in a row"
+    assert fault(bench) == SafetyFault.NONE, "it must be so in a row"
     bench.set("health", **{field: of_knee(HEALTHY[field], bad)})
     bench.step(ticks)
     assert_damps(bench, reason)
@@ -266,22 +268,22 @@ def test_a_drive_that_is_not_well(field, bad, ticks, reason, text):
 @pytest.mark.parametrize(
     ("bad", "ticks", "reason", "text"),
     [
-        ({"imu_age": 0.03}, 1, Fault.SILENT_IMU,
+        ({"imu_age": 0.03}, 1, SafetyFault.SILENT_IMU,
          "the sensor board has sent nothing for 30 ms; imu_age is 20 ms"),
-        ({"joints_valid": False}, 51, Fault.INVALID_JOINTS,
+        ({"joints_valid": False}, 51, SafetyFault.INVALID_JOINTS,
          "the joint readings were marked as not valid for more than 100 ms"),
-        ({"imu_valid": False}, 51, Fault.INVALID_IMU,
+        ({"imu_valid": False}, 51, SafetyFault.INVALID_IMU,
          "the IMU's readings were marked as not valid for more than 100 ms"),
-        ({"contacts_valid": False}, 51, Fault.INVALID_CONTACTS,
+        ({"contacts_valid": False}, 51, SafetyFault.INVALID_CONTACTS,
          "the foot switches' readings were marked as not valid for more than 100 ms"),
-        ({"stamp": 1.0}, 27, Fault.STALE_HEALTH,
+        ({"stamp": 1.0}, 27, SafetyFault.STALE_HEALTH,
          "the robot has measured nothing new for 50 ms"),
     ],
 )  # fmt: skip
 def test_sensors_that_are_not_to_be_trusted(bad, ticks, reason, text):
     bench = with_health(**bad)
     bench.step(ticks - 1)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.step()
     assert_damps(bench, reason)
     assert bench.block.metrics()["safety_reason"] == text
@@ -292,16 +294,16 @@ def test_sensors_that_are_not_to_be_trusted(bad, ticks, reason, text):
 def test_drives_that_do_not_drive_are_not_judged(state):
     bench = with_health(condition=np.full(10, 0x88), voltage=np.full(10, 5.0), state=int(state))
     bench.step(100)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
 
 
 def test_what_is_not_measured_is_not_judged():
     bench = with_health(voltage=np.zeros(10))
     bench.step(100)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench = make(lowest_voltage=13.2)  # nothing is wired to `health`
     bench.step(100)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
 
 
 def test_a_fall_does_not_end_the_run_but_says_why(bench):
@@ -315,10 +317,10 @@ def test_a_fall_does_not_end_the_run_but_says_why(bench):
 def test_a_foot_switch_at_fault_ends_the_run_when_the_robot_may_stop(bench):
     bench.set("switches", fault=[0, 0, 0, int(SwitchFault.STUCK_CLOSED)], stop=False)
     bench.step(100)
-    assert fault(bench) == Fault.NONE
+    assert fault(bench) == SafetyFault.NONE
     bench.set("switches", stop=True)
     bench.step()
-    assert_damps(bench, Fault.SWITCH)
+    assert_damps(bench, SafetyFault.SWITCH)
     text = f"foot switch {ROBOT.contacts[3].name} is stuck: it was closed in the air"
     assert bench.block.metrics()["safety_reason"] == text == bench.clock.stop_reason
 

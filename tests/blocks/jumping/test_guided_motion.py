@@ -6,7 +6,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.blocks.jumping.guided_motion import GuidedBody, Motion, MotionRecorder, check_limits
+from aloft.blocks.jumping.guided_motion import (
+    GuidedBody,
+    GuidedMotion,
+    MotionRecorder,
+    check_limits,
+)
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.language.errors import BlockError
@@ -28,7 +33,7 @@ def motion(**changes):
         "rotation": np.zeros(3), "rotation_rate": np.zeros(3),
         "by_momentum": (False, False, False), "foot_velocity": np.zeros((2, 3)),
     }  # fmt: skip
-    return Motion(**{**values, **changes})
+    return GuidedMotion(**{**values, **changes})
 
 
 def moved(built, q, wanted, v, tolerance):

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from aloft.blocks.jumping.jump_phase import (
     TABLE,
     TRANSITIONS,
-    Condition,
     JumpPhase,
+    PhaseCondition,
     find_conditions,
     next_phase,
     time_to_height,
@@ -304,22 +304,24 @@ def conditions(
     now=0.0, in_phase=0.0, lift_off=1.0, touchdown=1.3, remaining=0.0, unloaded=0.0,
     planned=Phase.STAND, another=False, limits=LIMITS, ahead=0.0,
 ):  # fmt: skip
-    holds = np.zeros(len(Condition), bool)
+    holds = np.zeros(len(PhaseCondition), bool)
     times = np.array([now, in_phase, lift_off, touchdown, remaining, unloaded, ahead])
     find_conditions(times, limits, int(planned), another, holds)
-    return {condition for condition in Condition if holds[condition]}
+    return {condition for condition in PhaseCondition if holds[condition]}
 
 
-@pytest.mark.parametrize("transition", TRANSITIONS, ids=lambda t: f"{t.phase.name}-{t.when.name}")
+@pytest.mark.parametrize(
+    "transition", TRANSITIONS, ids=lambda t: f"{t.phase.name}-{t.condition.name}"
+)
 def test_each_transition_is_taken_when_it_alone_applies(transition):
-    holds = np.zeros(len(Condition), bool)
+    holds = np.zeros(len(PhaseCondition), bool)
     assert next_phase(TABLE, int(transition.phase), holds) == transition.phase
-    holds[transition.when] = True
-    assert next_phase(TABLE, int(transition.phase), holds) == transition.to
+    holds[transition.condition] = True
+    assert next_phase(TABLE, int(transition.phase), holds) == transition.following
 
 
 def test_of_several_the_first_in_the_table_is_taken():
-    holds = np.ones(len(Condition), bool)
+    holds = np.ones(len(PhaseCondition), bool)
     found = {phase: Phase(next_phase(TABLE, int(phase), holds)) for phase in Phase}
     assert found == {
         Phase.STAND: Phase.FAULT, Phase.SQUAT: Phase.FAULT, Phase.THRUST: Phase.FAULT,
@@ -329,11 +331,11 @@ def test_of_several_the_first_in_the_table_is_taken():
 
 
 def test_every_phase_but_the_first_can_be_reached():
-    assert {t.to for t in TRANSITIONS} == set(Phase) - {Phase.STAND}
+    assert {t.following for t in TRANSITIONS} == set(Phase) - {Phase.STAND}
 
 
 def test_when_the_conditions_hold():
-    C = Condition
+    C = PhaseCondition
     assert conditions() == {C.TOUCHED_DOWN}
     assert C.PLAN_SQUATS in conditions(planned=Phase.SQUAT)
     assert C.PLAN_THRUSTS not in conditions(planned=Phase.SQUAT)

@@ -1,22 +1,41 @@
-"""What a thrust lacks in speed and height, and how much later it should end for that."""
+"""When a plan is read: thrusts that are too slow, falls onto the toes, and somersaults.
+
+The rotation of a somersault at touchdown is simulated with the law's own physics.
+"""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from aloft.blocks.jumping.plan_progress import (
-    FallSettings,
-    Flight,
-    Motion,
-    Progress,
+    PlanProgress,
+    ProgressConstants,
     delay_change,
     follow_fall,
+    follow_turn,
     speed_error,
     time_to_fall,
+    turned_beyond,
+    value_at,
 )
-from aloft.blocks.signals import Phase
+from aloft.blocks.signals import DynamicsTerms, JumpReference, Phase
 from aloft.mathematics.constants import GRAVITY
+from aloft.planner.library.jump_table import FlightRotation
+from aloft.robots.description import find_robot
+
+SIZES = find_robot("bruce").dimensions
+
+
+def constants(**values):
+    written = ProgressConstants.allocate()
+    for name, value in {"period": PERIOD, **values}.items():
+        setattr(written, name, value)
+    return written
 
 
 def apex(height, speed):
@@ -66,25 +85,24 @@ PERIOD, LASTS, SPEED = 0.002, 0.39, 1.05
 
 
 def ballistic(since, lower, slower):
+    """Height and speed."""
     height = 0.4 - lower + (SPEED - slower) * since - 0.5 * GRAVITY * since**2
-    speed = SPEED - slower - GRAVITY * since
-    return Motion(np.array([0.0, 0.0, height]), np.array([0.0, 0.0, speed]), np.zeros((2, 3)))
+    return height, SPEED - slower - GRAVITY * since
 
 
 def fly(lower=0.0, slower=0.0, gain=20.0, phase=Phase.FLIGHT, toes_first=True):
     """By how much later the plan is read in the end [s], and when a robot comes down that flies off
     ``lower`` [m] and ``slower`` [m/s] than in the plan, after its planned touchdown [s]."""
-    progress = Progress(np.array(0.0), np.array(0.0))
-    planned = Flight(np.array(int(phase)), np.array(LASTS), np.array(toes_first))
-    settings = FallSettings(gain, 0.5, PERIOD)
+    progress, params = PlanProgress.allocate(), SimpleNamespace(toes_gain=np.array(gain))
+    terms, reference = DynamicsTerms.allocate(SIZES), JumpReference.allocate(SIZES)
+    reference.phase, reference.touchdown_time, reference.toes_first = phase, LASTS, toes_first
     for tick in range(round(0.97 * LASTS / PERIOD)):
         present = tick * PERIOD
-        read = np.array([present - float(progress.late), 0.0, 0.0])
-        follow_fall(
-            read, ballistic(present, lower, slower), ballistic(read[0], 0.0, 0.0), planned,
-            settings, progress,
-        )  # fmt: skip
-    lowest = float(ballistic(LASTS, 0.0, 0.0).com[2])
+        read = present - float(progress.late)
+        terms.com[2], terms.com_velocity[2] = ballistic(present, lower, slower)
+        reference.com[2], reference.com_velocity[2] = ballistic(read, 0.0, 0.0)
+        follow_fall(read, terms, reference, progress, params, constants())
+    lowest = ballistic(LASTS, 0.0, 0.0)[0]
     return float(progress.late), time_to_fall(0.4 - lower - lowest, SPEED - slower) - LASTS
 
 
@@ -107,3 +125,138 @@ def test_toes_land_in_the_plan_when_the_robot_does(lower, slower):
 )
 def test_other_parts_of_a_plan_keep_their_time(other):
     assert fly(0.01, 0.05, **other)[0] == 0.0
+
+
+# Somersaults
+
+FLIGHT = 0.36
+SLOW, FAST = 10.0, 20.0
+"""Rates of rotation with the legs out and tucked [rad/s]."""
+TIMES = np.linspace(0.0, FLIGHT, 181)
+RATES = np.interp(TIMES, [0.0, 0.08, 0.25, 0.31, FLIGHT], [SLOW, FAST, FAST, SLOW, SLOW])
+LEFT = np.concatenate(
+    [np.cumsum((0.5 * np.diff(TIMES) * (RATES[1:] + RATES[:-1]))[::-1])[::-1], [0]]
+)
+TURN_SPEED, HEIGHT = 1.7, 0.4
+"""Of the planned lift-off [m/s, m]."""
+
+
+def about_y(angle):
+    return np.array([0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle)])
+
+
+@dataclass
+class Flight:
+    """A robot whose joints follow the plan at once, with ``spin`` times its momentum, ahead of its rotation
+    by ``ahead`` [rad] at lift-off, and ``faster`` upwards [m/s]. ``sign`` is -1 backwards."""
+
+    spin: float = 1.0
+    ahead: float = 0.0
+    faster: float = 0.0
+    sign: float = 1.0
+    early: float = 0.04
+    late: float = 0.03
+    aim: float = 0.0
+    rates: np.ndarray = field(default_factory=lambda: RATES)
+    delays: list[float] = field(default_factory=list)
+
+    def fly(self) -> tuple[float, float]:
+        """By how much it has turned further than the plan [rad], and how late the plan is [s]; both when it
+        lands."""
+        terms, reference = DynamicsTerms.allocate(SIZES), JumpReference.allocate(SIZES)
+        reference.phase, reference.touchdown_time = Phase.FLIGHT, FLIGHT
+        terms.base_rotation[:] = np.eye(3)
+        marks = np.array([0.075, 0.295, FAST, self.sign])
+        rotation = FlightRotation(TIMES, self.rates, LEFT, marks)
+        progress = PlanProgress.allocate()
+        written = constants(gain=50.0, early=self.early, late=self.late, aim=self.aim)
+        momentum = 0.05 * FAST
+        goal = HEIGHT + FLIGHT * (TURN_SPEED - 0.5 * GRAVITY * FLIGHT)
+        turned, time = self.ahead, 0.0
+        while True:
+            speed = TURN_SPEED + self.faster
+            height = HEIGHT + time * (speed - 0.5 * GRAVITY * time)
+            at = time - float(progress.late)
+            if height <= goal and time > 0.1:
+                planned = LEFT[0] - value_at(TIMES, LEFT, at)
+                return turned - planned, float(progress.late)
+            rate = value_at(TIMES, RATES, at)
+            terms.centroidal_matrix[4, 4] = momentum / rate
+            terms.angular_momentum[1] = self.sign * self.spin * momentum
+            terms.com[2], terms.com_velocity[2] = height, speed - GRAVITY * time
+            reference.com[2] = HEIGHT + at * (TURN_SPEED - 0.5 * GRAVITY * at)
+            reference.com_velocity[2] = TURN_SPEED - GRAVITY * at
+            reference.orientation[:] = about_y(self.sign * (LEFT[0] - value_at(TIMES, LEFT, at)))
+            angle = self.sign * turned
+            terms.base_rotation[0, 0] = terms.base_rotation[2, 2] = math.cos(angle)
+            terms.base_rotation[0, 2], terms.base_rotation[2, 0] = math.sin(angle), -math.sin(angle)
+            follow_turn(at, terms, reference, rotation, progress, written)
+            self.delays.append(float(progress.late))
+            turned += self.spin * rate * PERIOD
+            time += PERIOD
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("spin", "ahead"), [(1.0, 0.15), (1.0, -0.1), (1.04, 0.0), (0.98, 0.0), (1.05, -0.1)]
+)
+def test_it_has_turned_as_planned_when_it_lands(spin, ahead, sign):
+    left, late = Flight(spin=spin, ahead=ahead, sign=sign).fly()
+    without = abs(ahead + (spin - 1.0) * LEFT[0])
+    assert abs(left) < 0.03
+    assert abs(left) < 0.3 * without
+    assert abs(late) < 0.003
+
+
+def test_the_plan_is_on_time_for_a_robot_that_falls_sooner_or_later():
+    for faster in (-0.025, 0.05):
+        left, late = Flight(faster=faster).fly()
+        flies = (
+            TURN_SPEED
+            + faster
+            + math.sqrt(
+                (TURN_SPEED + faster) ** 2 - TURN_SPEED**2 + (TURN_SPEED - GRAVITY * FLIGHT) ** 2
+            )
+        ) / GRAVITY
+        assert late == pytest.approx(flies - FLIGHT, abs=0.004)
+        assert abs(left) < 0.03
+
+
+def test_a_robot_on_the_plan_is_left_alone():
+    flight = Flight()
+    flight.fly()
+    assert np.abs(flight.delays).max() < 0.002
+
+
+def test_a_plan_that_turns_no_faster_in_the_tuck_is_read_by_the_clock():
+    flight = Flight(ahead=0.2, rates=np.full_like(RATES, FAST))
+    flight.fly()
+    before_the_legs_are_out = flight.delays[: int(0.29 / PERIOD)]
+    assert before_the_legs_are_out == [0.0] * len(before_the_legs_are_out)
+
+
+def test_who_turns_too_far_leaves_the_tuck_earlier_and_else_later_within_the_limits():
+    for ahead, sign in ((0.2, -1.0), (-0.2, 1.0)):
+        flight = Flight(ahead=ahead, early=0.006, late=0.004)
+        flight.fly()
+        most = sign * max(sign * delay for delay in flight.delays)
+        assert most == pytest.approx(-0.006 if ahead > 0.0 else 0.004, abs=6e-4)
+
+
+def test_the_aim_is_where_it_ends():
+    left, _ = Flight(ahead=0.1, aim=-0.06).fly()
+    assert left == pytest.approx(-0.06, abs=0.02)
+
+
+@pytest.mark.parametrize("turned", [0.3, -0.2])
+def test_the_angle_beyond_the_plan_has_no_jump_at_half_a_turn(turned):
+    for planned in (0.0, 3.1, 6.2):
+        angle = planned + turned
+        rotation = np.array(
+            [
+                [math.cos(angle), 0, math.sin(angle)],
+                [0, 1, 0],
+                [-math.sin(angle), 0, math.cos(angle)],
+            ]
+        )
+        assert turned_beyond(rotation, about_y(planned)) == pytest.approx(turned)

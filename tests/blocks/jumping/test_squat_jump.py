@@ -1,29 +1,34 @@
-"""The planned jump obeys physics: momentum, feet, limits, and what was asked for."""
+"""The planned jump obeys physics and the task; the block plays it back, and says what it needs."""
 
 from __future__ import annotations
+
+import time
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.blocks.jumping.squat_jump import SquatJumpTask, plan_squat_jump
-from aloft.blocks.jumping.squat_jump_reference import SquatJumpReference
+from aloft.blocks.jumping.squat_jump import (
+    SquatJumpParameters,
+    SquatJumpReference,
+    plan_squat_jump,
+)
+from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
 
 from ...robots.limbed_robots import quadruped
 
 ROBOT = find_robot("bruce")
 BUILT = build_pinocchio_model(ROBOT)
-DEFAULTS = SquatJumpReference.Params()
+DEFAULTS = SquatJumpParameters()
 
 
 def plan(**changes):
-    names = SquatJumpTask.__dataclass_fields__
-    task = {k: v for k, v in DEFAULTS.model_dump().items() if k in names}
-    return plan_squat_jump(BUILT, ROBOT, SquatJumpTask(**{**task, **changes}))
+    return plan_squat_jump(BUILT, ROBOT, SquatJumpParameters(**changes))
 
 
 @pytest.fixture(scope="module")
@@ -148,10 +153,8 @@ def test_a_quadruped_with_ball_feet_jumps_too():
         "rise": 0.06, "squat_depth": 0.06, "lift_off_drop": 0.01, "touchdown_drop": 0.01,
         "landing_depth": 0.04, "lean": 0.0, "touchdown_pitch": 0.0, "distance": 0.05,
     }  # fmt: skip
-    names = set(SquatJumpTask.__dataclass_fields__)
-    values = {k: v for k, v in DEFAULTS.model_dump().items() if k in names}
     built = build_pinocchio_model(robot)
-    table = plan_squat_jump(built, robot, SquatJumpTask(**{**values, **task}))
+    table = plan_squat_jump(built, robot, SquatJumpParameters(**task))
     columns = table.columns
     height = columns["com"][:, 2]
     assert height.max() == pytest.approx(height[0] + 0.06, abs=1e-4)
@@ -166,3 +169,38 @@ def test_a_quadruped_with_ball_feet_jumps_too():
         v[3:6], v[6:] = columns["angular_velocity"][row], columns["joint_velocity"][row]
         pin.computeCentroidalMomentum(built.model, data, q, v)
         assert data.hg.angular == pytest.approx(columns["angular_momentum"][row], abs=1e-6)
+
+
+def test_the_plan_is_made_within_a_second_and_runs_through_every_phase():
+    begun = time.process_time()
+    bench = BlockBench(SquatJumpReference, robot="bruce", rate=500.0, plain=True)
+    assert time.process_time() - begun < 1.0
+    reference, phases = bench.get("reference"), []
+    for tick in range(1500):
+        bench.step()
+        assert float(reference.time) == pytest.approx(tick * 0.002)
+        assert np.linalg.norm(reference.orientation) == pytest.approx(1.0, abs=1e-12)
+        if not phases or phases[-1] != int(reference.phase):
+            phases.append(int(reference.phase))
+    assert phases == [
+        Phase.STAND, Phase.SQUAT, Phase.THRUST, Phase.FLIGHT, Phase.LANDING, Phase.RECOVER,
+    ]  # fmt: skip
+
+
+def test_it_goes_on_from_a_snapshot():
+    bench = BlockBench(SquatJumpReference, robot="bruce")
+    bench.step(550)
+    snapshot = bench.snapshot()
+    bench.step(20)
+    wanted = bench.get("reference").joint_position.copy()
+    bench.restore(snapshot)
+    bench.step(20)
+    assert (bench.get("reference").joint_position == wanted).all()
+
+
+def test_it_needs_a_robot():
+    with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
+        BlockBench(
+            SquatJumpReference,
+            dimensions={"n_joints": 10, "n_contacts": 4, "n_feet": 2, "n_velocities": 16},
+        )

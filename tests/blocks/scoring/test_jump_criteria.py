@@ -15,7 +15,7 @@ from aloft.blocks.scoring.jump_criteria import (
     first_failure,
     mean_turn,
 )
-from aloft.blocks.scoring.stand_criteria import NEVER
+from aloft.blocks.scoring.standing import NEVER
 
 
 def directions(*angles: float) -> np.ndarray:

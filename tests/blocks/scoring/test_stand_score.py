@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from aloft.blocks.scoring.footing import Footing
+from aloft.blocks.scoring.footing import Footing, measure_feet, unroll
 from aloft.blocks.scoring.stand_score import StandScore
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
@@ -160,32 +160,28 @@ def test_point_feet_turn_as_their_pattern_does():
     footing, truth = Footing(robot), standing(robot)
     middle, before, after = np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((4, 2))
     upright = np.array([0.0, 0.0, 0.0, 1.0])
-    footing.measuring(truth["contact_position"], upright, middle, before).run()
+    feet = footing.foot_of_point
+    measure_feet(feet, truth["contact_position"], upright, middle, before)
     turn = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
     points = truth["contact_position"].copy()
     points[:, :2] = points[:, :2] @ turn.T + [1.0, 2.0]
-    footing.measuring(points, upright, middle, after).run()
+    measure_feet(feet, points, upright, middle, after)
     assert after == pytest.approx(before @ turn.T, abs=1e-12)
-
-
-def unroll(footing, joints, orientation, middle):
-    for call in footing.unrolling(joints, orientation, middle):
-        call.run()
 
 
 def test_a_ball_that_rolls_does_not_slide():
     """Ball feet roll as the body squats; their places but for the rolling stay."""
     robot = ROBOTS["quadruped"]
-    footing, upright = Footing(robot), np.array([0.0, 0.0, 0.0, 1.0])
+    balls, upright = Footing(robot).ball_feet(), np.array([0.0, 0.0, 0.0, 1.0])
     lean = robot.standing_position.copy()
     places = []
     for turn in (0.0, 0.1):
         pitch = np.array([0.0, math.sin(0.5 * turn), 0.0, math.cos(0.5 * turn)])
         middle = np.zeros((4, 2))
-        unroll(footing, lean, pitch, middle)
+        unroll(balls, lean, pitch, middle)
         places.append(middle.copy())
     # Turning the whole robot by 0.1 rad about y rolls every ball by its radius times that.
     radius = robot.contacts[0].radius
     assert places[1] - places[0] == pytest.approx(np.tile([-0.1 * radius, 0.0], (4, 1)), abs=1e-4)
-    unroll(footing, lean, upright, middle := np.ones((4, 2)))
+    unroll(balls, lean, upright, middle := np.ones((4, 2)))
     assert middle == pytest.approx(1.0 + places[0])

@@ -30,7 +30,7 @@ from aloft.hal.bear.configuration import Hardware, HardwareError
 from aloft.hal.bear.driven_robot import read_hardware
 from aloft.hal.bear.protocol import Instruction, frame_bytes
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
-from aloft.hal.twin.faults import Fault
+from aloft.hal.twin.faults import InjectedFault
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot
@@ -88,7 +88,7 @@ class Bench:
         assert self.states() <= {1, 3}  # on a busy machine damping may have come by now
 
 
-def make_bench(folder: Path, *faults: Fault) -> TwinServer:
+def make_bench(folder: Path, *faults: InjectedFault) -> TwinServer:
     hardware = Hardware.for_twin(ROBOT)
     bus = {"period": 0.02, "reply_time": 2.0, "lost_cycles": 3, "port": "x"}
     hardware = Hardware.model_validate(
@@ -175,7 +175,7 @@ def test_a_graph_that_is_killed_or_stands_still(bench: Bench, how: signal.Signal
 
 @pytest.mark.long
 def test_the_cable_is_pulled(tmp_path: Path) -> None:
-    fault = Fault(kind="pulled_cable", start=0.5)
+    fault = InjectedFault(kind="pulled_cable", start=0.5)
     with make_bench(tmp_path, fault) as server:
         bench = Bench(server, tmp_path)
         found = result(bench.start())
@@ -187,7 +187,7 @@ def test_the_cable_is_pulled(tmp_path: Path) -> None:
 def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
     with make_bench(tmp_path) as server:
         bench = Bench(server, tmp_path)
-        server.twin.faults = type(server.twin.faults)([Fault(kind="second_writer")], 0)
+        server.twin.faults = type(server.twin.faults)([InjectedFault(kind="second_writer")], 0)
         process = bench.start()
         bench.wait_until_it_drives(process)
         found = result(process)
@@ -285,6 +285,13 @@ def test_why_the_motor_thread_must_not_go_on() -> None:
     robot = block(_watchdog=SimpleNamespace(tripped=True))
     robot.context.clock.command_limit = 0.015
     assert reason(robot).endswith("or no commands came over the links for 15 ms")
+
+
+@pytest.mark.parametrize(("limit", "age"), [(0.0, 0.02), (0.015, 0.015), (0.05, 0.02)])
+def test_a_command_may_be_as_old_as_the_stricter_limit(limit: float, age: float) -> None:
+    robot = block()
+    robot.context.clock.command_limit = limit
+    assert BearRobot.oldest_command.fget(robot) == age  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("phase", [DrivePhase.OFF, DrivePhase.DRIVING])

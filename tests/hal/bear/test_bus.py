@@ -123,6 +123,7 @@ READ, WRITE = Instruction.READ_STATUS, Instruction.WRITE_CONFIG
 @pytest.mark.parametrize(
     ("device", "code", "size", "sensible"),
     [
+        (1, Instruction.PING, 0, True), (1, Instruction.SAVE_CONFIG, 0, True),
         (1, Instruction.PING, 1, False), (1, Instruction.SAVE_CONFIG, 5, False),
         (1, READ, 0, False), (1, READ, 1, True), (1, READ, len(CONFIG), True),
         (1, Instruction.READ_CONFIG, len(CONFIG) + 1, False), (BROADCAST, READ, 1, False),
@@ -138,9 +139,11 @@ def test_only_sensible_instructions_are_somebody_elses(
     data = bytes(range(size))
     bus.overhear(frame_bytes(device, code, data))
     assert bus.counts.foreign == int(sensible)
-    if size:  # some adapters send back what was sent
-        bus.overhear(frame_bytes(device, code, data), own=data)
-        assert bus.counts.foreign == int(sensible)
+    # some adapters send back what was sent
+    bus.overhear(frame_bytes(device, code, data), own=data)
+    assert bus.counts.foreign == int(sensible)
+    bus.overhear(frame_bytes(device, code, data), own=b"other data")
+    assert bus.counts.foreign == 2 * int(sensible)
 
 
 def test_answers_of_others_are_stray() -> None:

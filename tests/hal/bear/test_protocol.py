@@ -8,7 +8,7 @@ from aloft.hal.bear.protocol import (
     BROADCAST,
     CONFIG,
     STATUS,
-    Frame,
+    BusFrame,
     FrameReader,
     Instruction,
     checksum,
@@ -16,10 +16,10 @@ from aloft.hal.bear.protocol import (
 )
 
 DEVICES = st.integers(0, 0xFC) | st.just(BROADCAST)
-FRAMES = st.builds(Frame, DEVICES, st.integers(0, 255), st.binary(max_size=253))
+FRAMES = st.builds(BusFrame, DEVICES, st.integers(0, 255), st.binary(max_size=253))
 
 
-def bytes_of(frame: Frame) -> bytes:
+def bytes_of(frame: BusFrame) -> bytes:
     return frame_bytes(frame.device, frame.code, frame.data)
 
 
@@ -32,7 +32,7 @@ def test_published_frames() -> None:
 
 
 @given(st.lists(FRAMES, max_size=5), st.integers(1, 17))
-def test_frames_round_trip_in_any_pieces(frames: list[Frame], piece: int) -> None:
+def test_frames_round_trip_in_any_pieces(frames: list[BusFrame], piece: int) -> None:
     stream = b"".join(map(bytes_of, frames))
     reader = FrameReader()
     found = []
@@ -44,7 +44,7 @@ def test_frames_round_trip_in_any_pieces(frames: list[Frame], piece: int) -> Non
 
 @given(FRAMES, st.data())
 def test_a_changed_byte_is_never_taken_for_the_same_frame(
-    frame: Frame, data: st.DataObject
+    frame: BusFrame, data: st.DataObject
 ) -> None:
     good = bytearray(bytes_of(frame))
     place = data.draw(st.integers(0, len(good) - 1))
@@ -53,7 +53,7 @@ def test_a_changed_byte_is_never_taken_for_the_same_frame(
 
 
 @given(st.binary(max_size=40), FRAMES)
-def test_the_reader_never_keeps_more_than_one_frame(noise: bytes, frame: Frame) -> None:
+def test_the_reader_never_keeps_more_than_one_frame(noise: bytes, frame: BusFrame) -> None:
     reader = FrameReader()
     reader.feed(noise)
     reader.clear()
@@ -61,7 +61,7 @@ def test_the_reader_never_keeps_more_than_one_frame(noise: bytes, frame: Frame) 
 
 
 @given(FRAMES)
-def test_a_frame_behind_garbage_is_found(frame: Frame) -> None:
+def test_a_frame_behind_garbage_is_found(frame: BusFrame) -> None:
     # 00 00 can begin no frame, so the garbage cannot swallow what follows it
     reader = FrameReader()
     assert reader.feed(b"\xff\x07\x00\x00" + bytes_of(frame)) == [frame]

@@ -1,14 +1,17 @@
 """The sensor board's stream: packets, garbage between them, commands."""
 
 import struct
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aloft.blocks.signals import ImuReading
 from aloft.hal.bear.bus import BusError
-from aloft.hal.bear.sense_board import PACKET, BoardMode, SenseBoard, command_bytes
+from aloft.hal.bear.sense_board import LENGTH, LONGEST, PACKET, BoardMode, SenseBoard, command_bytes
 
 
 class Nothing:
@@ -124,3 +127,12 @@ def test_what_belongs_to_no_packet_is_counted() -> None:
     hurt[10] ^= 1
     assert board.feed(bytes(hurt) + packet(NUMBERS, 0x80)) == 1
     assert board.damaged == 1 and board.skipped == 3 + PACKET
+
+
+def test_mounted_sensors_may_fill_the_packet_and_no_more() -> None:
+    sensor: Any = SimpleNamespace(name="sole", signal=ImuReading)
+    sensor.packet_size = lambda: LONGEST - LENGTH
+    SenseBoard(Nothing(), [sensor])
+    sensor.packet_size = lambda: LONGEST - LENGTH + 1
+    with pytest.raises(BusError, match=f"{LONGEST - LENGTH + 1} bytes of mounted sensors is too"):
+        SenseBoard(Nothing(), [sensor])

@@ -19,8 +19,8 @@ from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import DeadMan
 from aloft.hal.bear.watchdog import (
     AlwaysHeld,
+    DriveWatchdog,
     GamepadButton,
-    Watchdog,
     damping_frame,
     open_switch,
     wait_until_held,
@@ -30,7 +30,7 @@ DEVICES = [1, 2, 3]
 FRAME = damping_frame(DEVICES)
 SECONDS = 30.0
 """No wait of a test lasts longer."""
-Make = Callable[[float, float], Watchdog]
+Make = Callable[[float, float], DriveWatchdog]
 
 
 @pytest.fixture
@@ -43,10 +43,10 @@ def port() -> Iterator[tuple[int, int]]:
 
 @pytest.fixture
 def make(port: tuple[int, int]) -> Iterator[Make]:
-    made: list[Watchdog] = []
+    made: list[DriveWatchdog] = []
 
-    def start(limit: float, silence: float = 0.0) -> Watchdog:
-        made.append(Watchdog(port[1], DEVICES, limit, silence))
+    def start(limit: float, silence: float = 0.0) -> DriveWatchdog:
+        made.append(DriveWatchdog(port[1], DEVICES, limit, silence))
         return made[-1]
 
     yield start

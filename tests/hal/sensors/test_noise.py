@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.hal.random_streams import sensor_stream
-from aloft.hal.sensors.noise import DelayLine, FieldErrors, NoiseModel, delay_sample
+from aloft.hal.sensors.noise import FieldErrors, NoiseModel, delay_sample
 
 
 def errors(size: int, **model: Any) -> FieldErrors:
@@ -53,10 +53,10 @@ def test_range_and_resolution() -> None:
 
 
 def test_a_delayed_reading_is_an_earlier_sample() -> None:
-    line = DelayLine(np.zeros((4, 2)), np.zeros(1, np.int64), np.array([0, 3]))
+    past = np.zeros((4, 2)), np.zeros(1, np.int64), np.array([0, 3])
     reading, found = np.zeros(2), []
     for k in range(7):
-        delay_sample(np.array([10.0 + k, 20.0 + k]), line, reading)
+        delay_sample(np.array([10.0 + k, 20.0 + k]), *past, reading)
         found.append(reading.tolist())
     assert [row[0] for row in found] == [10.0 + k for k in range(7)]
     assert [row[1] for row in found] == [20.0, 20.0, 20.0, 20.0, 21.0, 22.0, 23.0]

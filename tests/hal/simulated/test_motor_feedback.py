@@ -10,15 +10,15 @@ import pytest
 from aloft.blocks.signals import CommandMode, JointCommand
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.protocol import Mode
-from aloft.hal.drive_control import DriveGains, DriveGoals, joint_gains
-from aloft.hal.simulated.motor_feedback import FeedbackState, MotorFeedback
+from aloft.hal.drive_control import CommandTargets, DriveGains, DriveGoals, joint_gains
+from aloft.hal.simulated.motor_feedback import FeedbackState, MotorFeedback, close_loops
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.state import TickRecord
 from aloft.hal.twin.devices import EmulatedActuator
 from aloft.hal.twin.drives import EmulatedDrives
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
-from aloft.robots.transmission import Transmission, motor_gains
+from aloft.robots.transmission import TransmissionMap, motor_gains
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
@@ -45,10 +45,22 @@ def command(rng: np.random.Generator) -> JointCommand:
     return made
 
 
-def feedback(**params: Any) -> tuple[MotorFeedback, FeedbackState]:
+class Feedback(MotorFeedback):
+    """The loops with one command at a time."""
+
+    def write(
+        self, command: JointCommand, arrived: bool, position: Array, velocity: Array, out: Array
+    ) -> bool:
+        rows = {name: values[None] for name, values in command if name != "mode"}
+        return close_loops(
+            self.loops, CommandTargets.bind(rows), 0, arrived, position, velocity, out
+        )
+
+
+def feedback(**params: Any) -> tuple[Feedback, FeedbackState]:
     state = FeedbackState.allocate(ROBOT.dimensions)
     gains = DriveGains.model_validate(params)
-    return MotorFeedback(ROBOT, gains, 0.001, STEPS, state), state
+    return Feedback(ROBOT, gains, 0.001, STEPS, state), state
 
 
 def motion(rng: np.random.Generator) -> tuple[Array, Array]:
@@ -120,7 +132,7 @@ def test_they_give_the_joints_what_the_twins_drives_give() -> None:
     twin.take_states()
     driver = DriveGoals(ROBOT, stiffness, damping, *motors, 0.0015)
     made, _ = feedback()
-    to_motors = Transmission(ROBOT).motor_motion
+    to_motors = TransmissionMap(ROBOT).motor_motion
     wanted, seen = command(rng), motion(rng)
     mine, its = np.zeros(N), np.zeros(N)
     made.write(wanted, True, *seen, mine)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from aloft.blocks.signals import CommandMode
-from aloft.hal.simulated.geared_rotors import unsupported_motor
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.hal.simulated.unsupported import unsupported_motor
 from aloft.robots.description import RobotDescription
 from aloft.runtime.testing.bench import BlockBench
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from aloft.blocks.signals.drive_conditions import describe
-from aloft.hal.bear.protocol import CONFIG, STATUS, Frame, Instruction, Mode, Torque
+from aloft.blocks.signals.robot import describe_conditions
+from aloft.hal.bear.protocol import CONFIG, STATUS, BusFrame, Instruction, Mode, Torque
 from aloft.hal.twin.devices import EmulatedActuator
 
 
@@ -12,7 +12,7 @@ def write(actuator: EmulatedActuator, **values: float) -> None:
         register = STATUS.get(name) or CONFIG[name]
         code = Instruction.WRITE_STATUS if name in STATUS else Instruction.WRITE_CONFIG
         data = bytes((register.address,)) + register.pack(value)
-        assert actuator.answer(Frame(actuator.device, code, data)) is None
+        assert actuator.answer(BusFrame(actuator.device, code, data)) is None
 
 
 def test_a_goal_beyond_its_limit_is_ignored_and_not_clamped() -> None:
@@ -41,7 +41,7 @@ def test_the_watchdog() -> None:
     actuator.advance(0.002)
     assert not actuator.driving
     assert actuator.status["torque_enable"] == Torque.ERROR
-    assert describe(actuator.error_byte).startswith("its watchdog ran out")
+    assert describe_conditions(actuator.error_byte).startswith("its watchdog ran out")
     write(actuator, torque_enable=Torque.ON)
     assert not actuator.driving, "the error must be cleared by switching off first"
     write(actuator, torque_enable=Torque.OFF)
@@ -69,12 +69,12 @@ def test_supply_and_temperature(name: str, value: float, text: str) -> None:
     actuator.status[name] = value
     actuator.advance(0.001)
     assert not actuator.driving
-    assert describe(actuator.error_byte).startswith(text)
+    assert describe_conditions(actuator.error_byte).startswith(text)
 
 
 def test_a_damaged_packet_is_reported_once() -> None:
     actuator = EmulatedActuator(1)
     actuator.garble()
-    assert describe(actuator.error_byte) == "it received a damaged packet"
+    assert describe_conditions(actuator.error_byte) == "it received a damaged packet"
     actuator.answered()
     assert actuator.error_byte == 0x80

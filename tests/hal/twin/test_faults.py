@@ -9,7 +9,7 @@ import pytest
 
 from aloft.blocks.signals import CommandMode, DrivePhase
 from aloft.hal.bear.protocol import FrameReader, frame_bytes
-from aloft.hal.twin.faults import Fault, Faults, corrupt_byte, read_fault
+from aloft.hal.twin.faults import Faults, InjectedFault, corrupt_byte, read_fault
 from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
@@ -136,7 +136,7 @@ def test_switches(kind: str) -> None:
 
 
 def test_before_the_robot_was_let_go_there_are_none() -> None:
-    faults = Faults([Fault(kind="lost", start=0.0)], 0)
+    faults = Faults([InjectedFault(kind="lost", start=0.0)], 0)
     assert not faults.active("lost")
     faults.now = 0.0
     assert faults.active("lost") and not faults.active("late")
@@ -144,7 +144,7 @@ def test_before_the_robot_was_let_go_there_are_none() -> None:
 
 def test_a_share_is_drawn_from_seed_exchange_and_place_only() -> None:
     def drawn(seed: int, target: str) -> list[bool]:
-        faults = Faults([Fault(kind="lost", share=0.3)], seed)
+        faults = Faults([InjectedFault(kind="lost", share=0.3)], seed)
         faults.now = 1.0
         found = []
         for exchange in range(300):
@@ -166,10 +166,10 @@ def test_one_changed_byte_is_no_good_frame_any_more() -> None:
 
 
 def test_a_fault_in_one_line() -> None:
-    assert read_fault("dead 0.5 left_knee_motor") == Fault(
+    assert read_fault("dead 0.5 left_knee_motor") == InjectedFault(
         kind="dead", start=0.5, target="left_knee_motor"
     )
-    assert read_fault("lost 1 * share=0.1") == Fault(kind="lost", start=1.0, share=0.1)
+    assert read_fault("lost 1 * share=0.1") == InjectedFault(kind="lost", start=1.0, share=0.1)
     with pytest.raises(AloftError, match="fault 'slow 1': kind: Input should be 'lost', 'trunc"):
         read_fault("slow 1")
     with pytest.raises(AloftError, match="'more' is one word too many"):

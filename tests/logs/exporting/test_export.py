@@ -15,7 +15,8 @@ from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_
 from aloft.logs.exporting.export import EXPORTS, export_mcap, export_parquet
 from aloft.logs.file.reader import READ_ALONE, PackedRows, RecordedRun, read
 from aloft.logs.recording.recorder import Recorder
-from aloft.robots.kinematics import link_poses, matrices_of_quaternions, quaternions_of_matrices
+from aloft.mathematics.rotations import matrices_of_quaternions, quaternions_of_matrices
+from aloft.robots.kinematics import link_poses
 from aloft.robots.robot_description import RobotDescription
 
 ROOT = Path(__file__).parents[3]

@@ -17,8 +17,8 @@ from aloft.logs.viewing.contacts import Flights
 from aloft.logs.viewing.robot_shapes import quaternion_from_z
 from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names
+from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.robots.description import RobotDescription
-from aloft.robots.kinematics import matrices_of_quaternions
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph

@@ -22,7 +22,7 @@ from aloft.logs.viewing.robot_shapes import (
     read_meshes,
     shapes_of,
 )
-from aloft.robots.description import Look, Mesh, RobotDescription, Shape, find_robot
+from aloft.robots.description import Appearance, Mesh, RobotDescription, Shape, find_robot
 
 from ...robots.example_robots import needs_robots
 
@@ -68,7 +68,7 @@ def with_look(folder: Path, *files: str) -> RobotDescription:
         for name in files
     )
     ball = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 0.0004), radius=0.05)
-    return BRUCE.changed(looks={BRUCE.base: Look(meshes=meshes, shapes=(ball,))})
+    return BRUCE.changed(looks={BRUCE.base: Appearance(meshes=meshes, shapes=(ball,))})
 
 
 def test_a_link_is_drawn_as_its_meshes(tmp_path: Path) -> None:

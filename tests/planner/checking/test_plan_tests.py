@@ -14,40 +14,45 @@ import pytest
 from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.planner.checking.evidence import Evidence
-from aloft.planner.checking.plan_tests import _short, active_limits, allowed_motor_torque
+from aloft.planner.checking.plan_tests import (
+    _short,
+    _standing_knots,
+    active_limits,
+    allowed_motor_torque,
+)
 from aloft.planner.checking.replay import replay
 from aloft.planner.checking.validity import PlanTest, check_plan
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.task.plan import JumpPlan, read_plan
+from aloft.planner.task.plan import PlannedJump, read_plan
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
 JOINTS = [joint.name for joint in ROBOT.joints]
 
 
-def found(plan: JumpPlan) -> dict[str, PlanTest]:
+def found(plan: PlannedJump) -> dict[str, PlanTest]:
     return {test.name: test for test in check_plan(plan, ROBOT).tests}
 
 
-def shifted(plan: JumpPlan, name: str, amount: float, index: object) -> JumpPlan:
+def shifted(plan: PlannedJump, name: str, amount: float, index: object) -> PlannedJump:
     array = getattr(plan, name).copy()
     array[index] += amount
     return replace(plan, **{name: array})
 
 
-def asked(plan: JumpPlan, **values: object) -> JumpPlan:
+def asked(plan: PlannedJump, **values: object) -> PlannedJump:
     return replace(plan, task=plan.task.model_copy(update=values))
 
 
 @cache
-def shipped(name: str) -> JumpPlan:
+def shipped(name: str) -> PlannedJump:
     (path,) = SHIPPED.glob(f"{name}-*.npz")
     return read_plan(path)
 
 
 @pytest.fixture(scope="module")
-def evidence(by_hand: JumpPlan) -> Evidence:
+def evidence(by_hand: PlannedJump) -> Evidence:
     return Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
 
 
@@ -65,14 +70,14 @@ def evidence(by_hand: JumpPlan) -> Evidence:
     ],
 )
 def test_a_shift_of_the_plan_is_the_error_that_is_found(
-    by_hand: JumpPlan, name: str, array: str, amount: float, index: tuple[int, int], where: str
+    by_hand: PlannedJump, name: str, array: str, amount: float, index: tuple[int, int], where: str
 ) -> None:
     test = found(shifted(by_hand, array, amount, index))[name]
     assert test.value == pytest.approx(abs(amount), abs=test.limit / 10.0)
     assert where in test.where
 
 
-def test_another_task_is_missed_by_the_difference(by_hand: JumpPlan, evidence: Evidence) -> None:
+def test_another_task_is_missed_by_the_difference(by_hand: PlannedJump, evidence: Evidence) -> None:
     flight_time = by_hand.touchdown_time - by_hand.lift_off_time
     tests = found(asked(by_hand, rise=0.09, distance_x=0.03, twist=0.6, flight_time=0.3))
     assert tests["rise"].value == pytest.approx(0.005, abs=1e-5)
@@ -90,7 +95,7 @@ def test_another_task_is_missed_by_the_difference(by_hand: JumpPlan, evidence: E
         assert tests["take_off_speed"].value == pytest.approx(abs(exact - speed), abs=1e-9)
 
 
-def test_a_whole_plan_moved_is_as_far_from_the_origin(by_hand: JumpPlan) -> None:
+def test_a_whole_plan_moved_is_as_far_from_the_origin(by_hand: PlannedJump) -> None:
     for axis, amount in ((0, 0.01), (1, -0.02)):
         moved = shifted(by_hand, "position", amount, (slice(None), axis))
         test = found(moved)["origin"]
@@ -100,7 +105,7 @@ def test_a_whole_plan_moved_is_as_far_from_the_origin(by_hand: JumpPlan) -> None
     assert sunk["foot_below_ground"].value == pytest.approx(0.02, abs=1e-3)
 
 
-def test_forces_outside_of_their_cone_and_without_contact(by_hand: JumpPlan) -> None:
+def test_forces_outside_of_their_cone_and_without_contact(by_hand: PlannedJump) -> None:
     knot, point = 20, 1
     lift = max(float(by_hand.contact_force[knot, point, 2]), 0.0)
     sideways = float(by_hand.contact_force[knot, point, 1])
@@ -117,7 +122,7 @@ def test_forces_outside_of_their_cone_and_without_contact(by_hand: JumpPlan) -> 
 
 
 def test_feet_that_should_arrive_at_rest_have_the_speed_of_the_fall(
-    by_hand: JumpPlan, evidence: Evidence
+    by_hand: PlannedJump, evidence: Evidence
 ) -> None:
     test = found(asked(by_hand, impact=False))["touchdown_speed"]
     knot = evidence.replay.flights[0][1]
@@ -126,7 +131,7 @@ def test_feet_that_should_arrive_at_rest_have_the_speed_of_the_fall(
     assert test.value == pytest.approx(speeds.max(), rel=1e-6)
 
 
-def test_clearances_grow_with_what_is_asked(by_hand: JumpPlan) -> None:
+def test_clearances_grow_with_what_is_asked(by_hand: PlannedJump) -> None:
     feet = found(asked(by_hand, foot_clearance=0.2))["foot_clearance"].value
     assert found(asked(by_hand, foot_clearance=0.25))["foot_clearance"].value == pytest.approx(
         feet + 0.05
@@ -213,7 +218,7 @@ def test_motors_do_the_work_of_the_joints(evidence: Evidence) -> None:
     np.testing.assert_allclose(of_motors, power, atol=1e-9)
 
 
-def test_what_the_tests_share(evidence: Evidence, by_hand: JumpPlan) -> None:
+def test_what_the_tests_share(evidence: Evidence, by_hand: PlannedJump) -> None:
     samples = evidence.replay.samples
     landed = samples.time > by_hand.touchdown_time + 1e-6
     assert evidence.progress.min() == 0.0 and evidence.progress.max() == 1.0
@@ -248,7 +253,7 @@ def test_turns_are_followed_through_whole_circles(name: str, pitch: float, yaw: 
     assert abs(turned[1] - yaw) < 15.0
 
 
-def test_figures_are_those_of_the_replay(by_hand: JumpPlan, evidence: Evidence) -> None:
+def test_figures_are_those_of_the_replay(by_hand: PlannedJump, evidence: Evidence) -> None:
     figures = evidence.figures()
     start, end = evidence.replay.flights[0]
     assert figures["take_off_speed_m_s"] == pytest.approx(np.sqrt(2 * GRAVITY * 0.085), abs=0.3)
@@ -262,12 +267,12 @@ def test_figures_are_those_of_the_replay(by_hand: JumpPlan, evidence: Evidence) 
     assert figures["jumps"] == 1.0 and end > start
 
 
-def change_of_sole(plan: JumpPlan) -> Callable[..., JumpPlan]:
+def change_of_sole(plan: PlannedJump) -> Callable[..., PlannedJump]:
     return lambda amount: shifted(plan, "position", amount, (20, 1))
 
 
 @pytest.mark.parametrize("amount", [0.004, -0.006])
-def test_a_knot_moved_aside_slips_by_as_much(by_hand: JumpPlan, amount: float) -> None:
+def test_a_knot_moved_aside_slips_by_as_much(by_hand: PlannedJump, amount: float) -> None:
     before = found(by_hand)["foot_slip"].value
     slip = found(change_of_sole(by_hand)(amount))["foot_slip"].value
     assert slip == pytest.approx(abs(amount), abs=before + 1e-4)
@@ -300,11 +305,11 @@ def test_a_limit_is_named_without_the_side(name: str, short: str) -> None:
     assert _short(name) == short
 
 
-def scaled(plan: JumpPlan, **task: object) -> JumpPlan:
+def scaled(plan: PlannedJump, **task: object) -> PlannedJump:
     return replace(plan, task=plan.task.model_copy(update=task))
 
 
-def test_a_plan_that_is_far_from_all_limits_reaches_none(by_hand: JumpPlan) -> None:
+def test_a_plan_that_is_far_from_all_limits_reaches_none(by_hand: PlannedJump) -> None:
     limits = active_limits(scaled(by_hand, friction=50.0), ROBOT)
     assert "friction" not in limits
     evidence = Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
@@ -316,7 +321,7 @@ def test_a_plan_that_is_far_from_all_limits_reaches_none(by_hand: JumpPlan) -> N
     assert {each.removesuffix(" motor speed") for each in limits if "speed" in each and "at" not in each} == fast  # fmt: skip
 
 
-def test_less_friction_makes_friction_a_limit_and_the_last_one(by_hand: JumpPlan) -> None:
+def test_less_friction_makes_friction_a_limit_and_the_last_one(by_hand: PlannedJump) -> None:
     force = by_hand.contact_force
     loaded = force[:, :, 2] > 1.0
     used = (np.hypot(force[:, :, 0], force[:, :, 1])[loaded] / force[:, :, 2][loaded]).max()
@@ -328,7 +333,7 @@ def test_less_friction_makes_friction_a_limit_and_the_last_one(by_hand: JumpPlan
         assert not binds or limits[-1] == "friction"
 
 
-def test_less_effort_makes_motors_a_limit_the_more_the_less(by_hand: JumpPlan) -> None:
+def test_less_effort_makes_motors_a_limit_the_more_the_less(by_hand: PlannedJump) -> None:
     evidence = Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
     middle = evidence.middles
     torque = np.abs(evidence.motor_torque[middle]) / ROBOT.motors.peak_torque
@@ -340,7 +345,9 @@ def test_less_effort_makes_motors_a_limit_the_more_the_less(by_hand: JumpPlan) -
 
 
 @pytest.mark.parametrize(("joint", "side"), [(0, 0), (3, 1)])
-def test_a_joint_that_stays_at_its_limit_is_named(by_hand: JumpPlan, joint: int, side: int) -> None:
+def test_a_joint_that_stays_at_its_limit_is_named(
+    by_hand: PlannedJump, joint: int, side: int
+) -> None:
     name = f"{_short(ROBOT.joints[joint].name)} joint limit"
     assert name not in active_limits(by_hand, ROBOT)
     position = by_hand.position.copy()
@@ -383,6 +390,25 @@ def test_two_jumps_are_followed_one_after_the_other(two_jumps: Evidence) -> None
     assert samples.points[between][:, :, 2].min() > 0.049
 
 
+def test_feet_of_several_jumps_rest_at_each_place_by_itself(two_jumps: Evidence) -> None:
+    assert found(two_jumps.plan)["foot_slip"].value < 1e-3
+
+
+def test_the_feet_stand_between_two_jumps_until_the_first_heel_lifts() -> None:
+    contact = np.zeros((14, 2), bool)
+    contact[4:10] = True
+    contact[8:10, 1] = False  # the heels lift at knot 8
+    flights = ((1, 4), (10, 12))
+    given = SimpleNamespace(
+        replay=SimpleNamespace(flights=flights), plan=SimpleNamespace(contact=contact)
+    )
+    assert _standing_knots(given) == [8]  # type: ignore[arg-type]
+    contact[4:10, 1] = False
+    assert _standing_knots(given) == [10]  # type: ignore[arg-type]
+    given.replay.flights = ((1, 4),)
+    assert _standing_knots(given) == []  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(("jump", "amount"), [(0, 0.05), (1, -0.04)])
 def test_the_jump_that_misses_its_task_is_named(
     two_jumps: Evidence, jump: int, amount: float
@@ -406,7 +432,7 @@ def test_the_jump_that_misses_its_task_is_named(
     assert moved["impact"].where == f" jump {jump + 1}"
 
 
-def test_no_limit_is_negative(by_hand: JumpPlan, two_jumps: Evidence) -> None:
+def test_no_limit_is_negative(by_hand: PlannedJump, two_jumps: Evidence) -> None:
     for plan in (two_jumps.plan, by_hand, asked(by_hand, formulation="full")):
         for test in check_plan(plan, ROBOT).tests:
             assert test.limit > 0.0 or test.name == "body_on_ground", test
@@ -425,7 +451,7 @@ def test_the_clearance_of_the_feet_is_that_in_the_middle_of_each_flight(
 
 
 @pytest.mark.parametrize(("joint", "side"), [(0, 0), (0, 1), (3, 0), (3, 1), (9, 1)])
-def test_a_joint_beyond_either_limit_is_named(by_hand: JumpPlan, joint: int, side: int) -> None:
+def test_a_joint_beyond_either_limit_is_named(by_hand: PlannedJump, joint: int, side: int) -> None:
     limits = ROBOT.joint_limits
     position = by_hand.position.copy()
     position[10, 7 + joint] = limits[joint, side] + (0.2 if side else -0.2)
@@ -433,7 +459,7 @@ def test_a_joint_beyond_either_limit_is_named(by_hand: JumpPlan, joint: int, sid
     assert test.value == pytest.approx(0.2) and test.where.startswith(f"{JOINTS[joint]} at ")
 
 
-def test_the_hardest_motors_are_named(by_hand: JumpPlan, evidence: Evidence) -> None:
+def test_the_hardest_motors_are_named(by_hand: PlannedJump, evidence: Evidence) -> None:
     tests, motors = found(by_hand), ROBOT.transmission.motors
     speed = np.abs(evidence.motor_speed)
     sample, motor = np.unravel_index(int(speed.argmax()), speed.shape)

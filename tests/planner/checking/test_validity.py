@@ -8,7 +8,7 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.planner.checking import validity
-from aloft.planner.checking.evidence import Found
+from aloft.planner.checking.evidence import PlanTestResult
 from aloft.planner.checking.validity import (
     InvalidPlanError,
     ValidityReport,
@@ -17,7 +17,7 @@ from aloft.planner.checking.validity import (
     require_valid,
 )
 from aloft.planner.library.library import SHIPPED
-from aloft.planner.task.plan import JumpPlan, read_plan
+from aloft.planner.task.plan import PlannedJump, read_plan
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -26,7 +26,7 @@ NOT_MET_BY_HAND = {"pull", "velocity_defect", "angular_velocity_defect"}
 
 
 @pytest.fixture(scope="module")
-def report(by_hand: JumpPlan) -> ValidityReport:
+def report(by_hand: PlannedJump) -> ValidityReport:
     return check_plan(by_hand, ROBOT)
 
 
@@ -35,7 +35,7 @@ def test_a_plan_by_hand_fails_for_what_is_wrong_with_it_alone(report: ValidityRe
     assert not report.valid
 
 
-def test_figures(report: ValidityReport, by_hand: JumpPlan) -> None:
+def test_figures(report: ValidityReport, by_hand: PlannedJump) -> None:
     assert report.figures["rise_m"] == pytest.approx(0.085, abs=1e-6)
     assert report.figures["flight_time_s"] == pytest.approx(by_hand.flight_time)
     assert report.figures["flight_error_mm"] < 1e-3
@@ -44,8 +44,8 @@ def test_figures(report: ValidityReport, by_hand: JumpPlan) -> None:
 
 def shifted(
     name: str, amount: float, column: int, rows: slice = slice(None)
-) -> Callable[..., JumpPlan]:
-    def change(plan: JumpPlan) -> JumpPlan:
+) -> Callable[..., PlannedJump]:
+    def change(plan: PlannedJump) -> PlannedJump:
         array = getattr(plan, name).copy()
         array.reshape(len(array), -1)[rows, column] += amount
         return replace(plan, **{name: array})
@@ -53,40 +53,40 @@ def shifted(
     return change
 
 
-def asked(**values: object) -> Callable[..., JumpPlan]:
+def asked(**values: object) -> Callable[..., PlannedJump]:
     return lambda plan: replace(plan, task=plan.task.model_copy(update=values))
 
 
-def at_flight(plan: JumpPlan) -> slice:
+def at_flight(plan: PlannedJump) -> slice:
     k = plan.knot_at(plan.lift_off_time)
     return slice(k + 5, k + 6)
 
 
-def in_flight(name: str, amount: float, column: int) -> Callable[..., JumpPlan]:
+def in_flight(name: str, amount: float, column: int) -> Callable[..., PlannedJump]:
     return lambda plan: shifted(name, amount, column, at_flight(plan))(plan)
 
 
-def at_lift_off(name: str, amount: float, column: int) -> Callable[..., JumpPlan]:
-    def change(plan: JumpPlan) -> JumpPlan:
+def at_lift_off(name: str, amount: float, column: int) -> Callable[..., PlannedJump]:
+    def change(plan: PlannedJump) -> PlannedJump:
         k = plan.knot_at(plan.lift_off_time)
         return shifted(name, amount, column, slice(k, k + 1))(plan)
 
     return change
 
 
-def scaled_force(plan: JumpPlan) -> JumpPlan:
+def scaled_force(plan: PlannedJump) -> PlannedJump:
     return replace(plan, contact_force=1.6 * plan.contact_force)
 
 
-def flying_later(plan: JumpPlan) -> JumpPlan:
+def flying_later(plan: PlannedJump) -> PlannedJump:
     return replace(plan, lift_off_time=plan.lift_off_time + 0.01)
 
 
-def without_contact(plan: JumpPlan) -> JumpPlan:
+def without_contact(plan: PlannedJump) -> PlannedJump:
     return replace(plan, contact=np.zeros_like(plan.contact))
 
 
-CHANGES: dict[str, Callable[[JumpPlan], JumpPlan]] = {
+CHANGES: dict[str, Callable[[PlannedJump], PlannedJump]] = {
     "start": shifted("position", 0.01, 8, slice(0, 1)),
     "origin": shifted("position", 0.01, 0),
     "rest_at_start": shifted("velocity", 0.1, 2, slice(0, 1)),
@@ -128,7 +128,7 @@ CHANGES: dict[str, Callable[[JumpPlan], JumpPlan]] = {
 
 @pytest.mark.parametrize("name", CHANGES)
 def test_every_test_fails_for_its_own_reason(
-    name: str, by_hand: JumpPlan, report: ValidityReport
+    name: str, by_hand: PlannedJump, report: ValidityReport
 ) -> None:
     before = {test.name: test for test in report.tests}
     assert name in NOT_MET_BY_HAND or name not in before or before[name].passed
@@ -146,7 +146,7 @@ def test_every_test_is_made_to_fail_above(report: ValidityReport) -> None:
     assert untried == {"pull", "angular_velocity_defect"}, "those two fail in the plan by hand"
 
 
-def test_broken_arrays_are_said_before_anything_is_computed(by_hand: JumpPlan) -> None:
+def test_broken_arrays_are_said_before_anything_is_computed(by_hand: PlannedJump) -> None:
     nothing = by_hand.com.copy()
     nothing[3, 0] = np.nan
     for plan, words in (
@@ -159,13 +159,13 @@ def test_broken_arrays_are_said_before_anything_is_computed(by_hand: JumpPlan) -
         assert words in found.tests[0].where
 
 
-def test_a_plan_without_a_flight_is_not_valid(by_hand: JumpPlan) -> None:
+def test_a_plan_without_a_flight_is_not_valid(by_hand: PlannedJump) -> None:
     grounded = replace(by_hand, phase=np.full_like(by_hand.phase, Phase.STAND))
     found = check_plan(grounded, ROBOT)
     assert [test.name for test in found.failed] == ["phases"]
 
 
-def test_a_plan_that_fails_is_not_handed_over(by_hand: JumpPlan) -> None:
+def test_a_plan_that_fails_is_not_handed_over(by_hand: PlannedJump) -> None:
     forged = by_hand.with_report({"valid": True})
     with pytest.raises(InvalidPlanError) as caught:
         require_valid(forged, ROBOT)
@@ -175,7 +175,7 @@ def test_a_plan_that_fails_is_not_handed_over(by_hand: JumpPlan) -> None:
     assert "at most 0.001 N is allowed" in message
 
 
-def test_the_report_is_kept_with_the_plan(by_hand: JumpPlan) -> None:
+def test_the_report_is_kept_with_the_plan(by_hand: PlannedJump) -> None:
     plan = checked(by_hand, ROBOT)
     assert not plan.valid
     assert {test["name"] for test in plan.report["tests"] if not test["passed"]} == NOT_MET_BY_HAND
@@ -197,10 +197,12 @@ def test_a_landing_may_have_more_of_the_motors_than_the_rest() -> None:
     assert min(times) >= plan.touchdown_time - 1e-3  # said in milliseconds
 
 
-def test_a_test_passes_up_to_its_limit(by_hand: JumpPlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    def bounds(evidence: object) -> Iterator[Found]:
+def test_a_test_passes_up_to_its_limit(
+    by_hand: PlannedJump, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def bounds(evidence: object) -> Iterator[PlanTestResult]:
         for name, value in (("at", 2.0), ("above", 2.0 + 1e-9), ("below", -5.0), ("none", np.nan)):
-            yield Found(name, value, 2.0, "m", "a length")
+            yield PlanTestResult(name, value, 2.0, "m", "a length")
 
     monkeypatch.setattr(validity, "PLAN_TESTS", (bounds,))
     found = check_plan(by_hand, ROBOT)

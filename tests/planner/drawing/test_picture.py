@@ -14,7 +14,7 @@ from aloft.planner.checking.evidence import Evidence
 from aloft.planner.checking.replay import replay
 from aloft.planner.drawing.picture import phases_of, plan_panels, write_picture
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.plotting import Line, Panel
 from aloft.robots.description import find_robot
@@ -22,7 +22,7 @@ from aloft.robots.description import find_robot
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def test_a_plans_picture(by_hand: JumpPlan, tmp_path: Path) -> None:
+def test_a_plans_picture(by_hand: PlannedJump, tmp_path: Path) -> None:
     robot = find_robot("bruce")
     path = write_picture(tmp_path / "a" / "p.svg", by_hand, robot)
     root = ElementTree.parse(path).getroot()

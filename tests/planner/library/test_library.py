@@ -21,7 +21,7 @@ from aloft.planner.library.library import (
     task_distance,
 )
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import JumpPlan, PlanFileError, write_plan
+from aloft.planner.task.plan import PlanFileError, PlannedJump, write_plan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
@@ -33,14 +33,14 @@ IN_SITU = read_task(SHIPPED.parent / "tasks" / "in_situ.yaml")
 class Planner:
     """Stands in for the solver: gives the plan it has, under the task that is asked for."""
 
-    def __init__(self, plan: JumpPlan | None, fails_warm: bool = False) -> None:
+    def __init__(self, plan: PlannedJump | None, fails_warm: bool = False) -> None:
         self.plan = plan
         self.fails_warm = fails_warm
         self.started_from: list[str | None] = []
 
     def __call__(
-        self, task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None
-    ) -> JumpPlan:
+        self, task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+    ) -> PlannedJump:
         self.started_from.append(warm_start.task.name if warm_start else None)
         if self.plan is None or (self.fails_warm and warm_start is not None):
             raise PlanError("no plan", family="apex")
@@ -48,7 +48,7 @@ class Planner:
 
 
 @pytest.fixture(scope="module")
-def good() -> JumpPlan:
+def good() -> PlannedJump:
     plan = PlanLibrary(ROBOT, Path("nowhere")).find(IN_SITU)
     assert plan is not None
     return plan
@@ -59,7 +59,7 @@ def near(name: str = "near", **values: object) -> JumpTask:
     return make_task({"name": name, "rise": 0.1503, **values}).resolved(ROBOT)
 
 
-def test_a_kept_plan_needs_no_solver(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_kept_plan_needs_no_solver(tmp_path: Path, good: PlannedJump) -> None:
     solver = Planner(None)
     plan, kept = PlanLibrary(ROBOT, tmp_path).plan(IN_SITU, solver)
     assert kept and solver.started_from == []
@@ -68,7 +68,7 @@ def test_a_kept_plan_needs_no_solver(tmp_path: Path, good: JumpPlan) -> None:
 
 
 def test_what_is_not_there_is_solved_from_the_nearest_and_kept(
-    tmp_path: Path, good: JumpPlan
+    tmp_path: Path, good: PlannedJump
 ) -> None:
     library, solver = PlanLibrary(ROBOT, tmp_path), Planner(good)
     plan, kept = library.plan(near(), solver)
@@ -80,7 +80,7 @@ def test_what_is_not_there_is_solved_from_the_nearest_and_kept(
     assert [path.name for path in tmp_path.iterdir()] == [kept_name(near(), ROBOT)]
 
 
-def test_a_replaced_file_is_read_again(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_replaced_file_is_read_again(tmp_path: Path, good: PlannedJump) -> None:
     library = PlanLibrary(ROBOT, tmp_path, ())
     path = library.add(replace(good, task=near().resolved(ROBOT)))
     assert [task.rise for _, task in library.tasks()] == [0.1503]
@@ -88,19 +88,19 @@ def test_a_replaced_file_is_read_again(tmp_path: Path, good: JumpPlan) -> None:
     assert [task.rise for _, task in library.tasks()] == [0.16]
 
 
-def test_a_warm_start_that_fails_is_tried_from_nothing(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_warm_start_that_fails_is_tried_from_nothing(tmp_path: Path, good: PlannedJump) -> None:
     solver = Planner(good, fails_warm=True)
     PlanLibrary(ROBOT, tmp_path).plan(near(), solver)
     assert solver.started_from == ["in_situ", None]
 
 
-def test_anew_starts_from_nothing(tmp_path: Path, good: JumpPlan) -> None:
+def test_anew_starts_from_nothing(tmp_path: Path, good: PlannedJump) -> None:
     solver = Planner(good)
     _, kept = PlanLibrary(ROBOT, tmp_path).plan(IN_SITU, solver, anew=True)
     assert not kept and solver.started_from == [None]
 
 
-def test_a_plan_that_is_not_valid_is_never_kept(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_plan_that_is_not_valid_is_never_kept(tmp_path: Path, good: PlannedJump) -> None:
     with pytest.raises(InvalidPlanError, match="rise: how far the apex") as caught:
         PlanLibrary(ROBOT, tmp_path).plan(
             make_task({"recipe": "paper", "name": "high", "rise": 0.2}), Planner(good)
@@ -109,7 +109,9 @@ def test_a_plan_that_is_not_valid_is_never_kept(tmp_path: Path, good: JumpPlan) 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_kept_plan_that_is_not_valid_is_not_handed_over(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_kept_plan_that_is_not_valid_is_not_handed_over(
+    tmp_path: Path, good: PlannedJump
+) -> None:
     library, task = (
         PlanLibrary(ROBOT, tmp_path),
         make_task({"recipe": "paper", "name": "high", "rise": 0.2}),
@@ -119,7 +121,7 @@ def test_a_kept_plan_that_is_not_valid_is_not_handed_over(tmp_path: Path, good: 
         library.plan(task, Planner(good))
 
 
-def test_a_damaged_file_is_an_error_that_names_it(tmp_path: Path, good: JumpPlan) -> None:
+def test_a_damaged_file_is_an_error_that_names_it(tmp_path: Path, good: PlannedJump) -> None:
     library = PlanLibrary(ROBOT, tmp_path, others=())
     path = library.add(replace(good, task=near()))
     whole = path.read_bytes()
@@ -140,7 +142,7 @@ def test_a_damaged_file_is_an_error_that_names_it(tmp_path: Path, good: JumpPlan
 
 
 def test_a_shipped_plan_wins_over_a_cached_one(
-    tmp_path: Path, good: JumpPlan, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, good: PlannedJump, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     shipped = PlanLibrary(ROBOT, tmp_path / "shipped", others=())
@@ -153,7 +155,7 @@ def test_a_shipped_plan_wins_over_a_cached_one(
     assert chosen.path_of(near()) == cached  # a folder that somebody has named
 
 
-def test_the_nearest_is_by_scaled_distance(tmp_path: Path, good: JumpPlan) -> None:
+def test_the_nearest_is_by_scaled_distance(tmp_path: Path, good: PlannedJump) -> None:
     library = PlanLibrary(ROBOT, tmp_path, others=())
     assert library.nearest(near()) is None
     for name, values in (("far", {"distance_x": 0.3}), ("close", {"twist": 0.2})):
@@ -180,7 +182,7 @@ def test_another_robot_finds_nothing(tmp_path: Path) -> None:
     assert PlanLibrary(other, tmp_path / "plans").find(IN_SITU) is None
 
 
-def test_pruning_leaves_the_tasks_that_are_named(tmp_path: Path, good: JumpPlan) -> None:
+def test_pruning_leaves_the_tasks_that_are_named(tmp_path: Path, good: PlannedJump) -> None:
     library = PlanLibrary(ROBOT, tmp_path)
     kept, gone = (library.add(replace(good, task=near(rise=rise))) for rise in (0.1501, 0.1502))
     (tmp_path / "notes.txt").write_text("mine")

@@ -18,7 +18,7 @@ from aloft.planner.library.nearest_feasible import (
     values_towards,
 )
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot
@@ -41,8 +41,8 @@ class Planner:
         self.plan = found
 
     def __call__(
-        self, task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None
-    ) -> JumpPlan:
+        self, task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+    ) -> PlannedJump:
         self.asked.append(task)
         self.warm.append(warm_start is not None)
         if not self.allows(task):
@@ -54,10 +54,10 @@ class Planner:
 def _no_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """What stands in for plans is valid."""
 
-    def solved(task: JumpTask, robot: Any, warm: Any, solve: Any, *, refine: bool) -> JumpPlan:
+    def solved(task: JumpTask, robot: Any, warm: Any, solve: Any, *, refine: bool) -> PlannedJump:
         assert not refine, "a finer grid costs more than a value that is a step nearer"
         plan = solve(task, robot, warm)
-        assert isinstance(plan, JumpPlan)
+        assert isinstance(plan, PlannedJump)
         return plan
 
     monkeypatch.setattr(module, "solve_and_check", solved)

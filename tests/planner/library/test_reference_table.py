@@ -8,7 +8,7 @@ import pytest
 from aloft.planner.library.jump_table import JumpTable
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.reference_table import reference_table
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -17,7 +17,7 @@ STAND = 0.3
 
 
 @pytest.fixture(scope="module", params=["forward_10cm", "twist_30deg", "in_situ"])
-def plan(request: pytest.FixtureRequest) -> JumpPlan:
+def plan(request: pytest.FixtureRequest) -> PlannedJump:
     task = read_task(SHIPPED.parent / "tasks" / f"{request.param}.yaml")
     found = PlanLibrary(ROBOT, Path("nowhere")).find(task)
     assert found is not None
@@ -25,7 +25,7 @@ def plan(request: pytest.FixtureRequest) -> JumpPlan:
 
 
 @pytest.fixture(scope="module")
-def table(plan: JumpPlan) -> JumpTable:
+def table(plan: PlannedJump) -> JumpTable:
     return reference_table(plan, ROBOT, STAND)
 
 
@@ -60,7 +60,7 @@ def test_accelerations_are_the_changes_of_the_joint_rates(table: JumpTable) -> N
     assert np.quantile(off, 0.9) < 20.0
 
 
-def test_forces_change_the_momentum(table: JumpTable, plan: JumpPlan) -> None:
+def test_forces_change_the_momentum(table: JumpTable, plan: PlannedJump) -> None:
     for start, end in ((STAND, table.lift_off_time), (table.touchdown_time, table.time[-1])):
         rows = (table.time >= start - 1e-9) & (table.time <= end + 1e-9)
         rows &= np.append(np.diff(table.time) > 1e-9, True)  # after an impact, not before it
@@ -74,7 +74,7 @@ def test_forces_change_the_momentum(table: JumpTable, plan: JumpPlan) -> None:
 
 
 def test_heels_are_down_on_the_ground_and_up_where_they_rise(
-    table: JumpTable, plan: JumpPlan
+    table: JumpTable, plan: PlannedJump
 ) -> None:
     pitch = table.columns["foot_pitch"]
     standing = (table.time < table.thrust_time) | (table.time > table.touchdown_time + 1e-9)
@@ -84,7 +84,7 @@ def test_heels_are_down_on_the_ground_and_up_where_they_rise(
     assert (lift_off > 0.1).all() if rises else (np.abs(lift_off) < 0.01).all()
 
 
-def test_the_knots_are_in_it(table: JumpTable, plan: JumpPlan) -> None:
+def test_the_knots_are_in_it(table: JumpTable, plan: PlannedJump) -> None:
     for knot in (0, len(plan.time) // 3, len(plan.time) - 1):
         row = int(np.abs(table.time - STAND - plan.time[knot]).argmin())
         np.testing.assert_allclose(
@@ -94,7 +94,7 @@ def test_the_knots_are_in_it(table: JumpTable, plan: JumpPlan) -> None:
     assert np.diff(table.time)[1:].max() <= 0.002 + 1e-9
 
 
-def test_it_begins_and_ends_at_rest(table: JumpTable, plan: JumpPlan) -> None:
+def test_it_begins_and_ends_at_rest(table: JumpTable, plan: PlannedJump) -> None:
     for row in (0, 1, -1):
         for name in ("com_velocity", "com_acceleration", "angular_momentum_rate"):
             np.testing.assert_allclose(table.columns[name][row], 0.0, atol=1e-2)
@@ -113,7 +113,7 @@ def test_the_flight_keeps_its_momentum(table: JumpTable) -> None:
 
 
 def test_torques_are_the_plans_in_the_middle_of_every_interval(
-    table: JumpTable, plan: JumpPlan
+    table: JumpTable, plan: PlannedJump
 ) -> None:
     steps = np.diff(plan.time)
     middles = STAND + plan.time[:-1] + 0.5 * steps

@@ -13,7 +13,7 @@ from aloft.planner.models.midpoint import (
     midpoint_residuals,
     rotation,
 )
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.robots.description import find_robot
 
 
@@ -44,7 +44,7 @@ def test_angles_follow_a_somersault() -> None:
     np.testing.assert_allclose(found[:, [0, 2]], 0.0, atol=1e-12)
 
 
-def test_the_residual_is_what_a_force_is_wrong_by(by_hand: JumpPlan) -> None:
+def test_the_residual_is_what_a_force_is_wrong_by(by_hand: PlannedJump) -> None:
     dynamics = ExactDynamics(find_robot("bruce"))
     gap, wrench = midpoint_residuals(by_hand, dynamics)
     # Made with small steps of another method: fulfilled to second order only.

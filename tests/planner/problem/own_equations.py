@@ -11,17 +11,16 @@ import numpy as np
 from aloft.blocks.signals import Phase
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.constants import GRAVITY
+from aloft.mathematics.rotations import matrices_of_quaternions, multiply
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.midpoint import angular_motion, euler_angles, euler_rates, rotation
-from aloft.planner.models.quaternions import product
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.robots.description import RobotDescription
-from aloft.robots.kinematics import matrices_of_quaternions
 
 WEIGHT = np.array([0.0, 0.0, -GRAVITY])
 
 
-def paper_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> dict[str, float]:
+def paper_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, float]:
     """The largest residual of each of the paper's equations in section III, over all knots.
 
     Units: m, rad or m/s for ``integration`` (a quaternion's components count as rad), m/s^2 for
@@ -45,7 +44,8 @@ def paper_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> dict[str, float]
         v, force = plan.velocity[k], plan.contact_force[k - 1]
         turn = matrices_of_quaternions(q[k, None, 3:7])[0]
         half = 0.5 * dt * v[3:6]
-        turned = product(q[k - 1, 3:7], np.append(half, 1.0)) / np.sqrt(1.0 + half @ half)
+        turned = np.empty(4)
+        multiply(q[k - 1, 3:7], np.append(half, 1.0) / np.sqrt(1.0 + half @ half), turned)
         note("integration", q[k, :3] - q[k - 1, :3] - dt * turn @ v[:3])
         note("integration", q[k, 3:7] - turned)
         note("integration", q[k, 7:] - q[k - 1, 7:] - dt * v[6:])
@@ -64,7 +64,7 @@ def paper_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> dict[str, float]
     return found
 
 
-def rigid_body_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> dict[str, float]:
+def rigid_body_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, float]:
     """The largest residual of each of the single rigid body's equations, over all intervals.
 
     Units: m, rad or their rates for ``integration``, m/s^2 for ``force balance``, N m for ``moment
@@ -102,7 +102,7 @@ def rigid_body_residuals(plan: JumpPlan, dynamics: ExactDynamics) -> dict[str, f
     return found
 
 
-def standing_inertia(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
+def standing_inertia(plan: PlannedJump, dynamics: ExactDynamics) -> Array:
     """The robot's inertia about its centre of mass in its first pose, torso axes (3, 3)."""
     pin, q = dynamics.pin, plan.position[0]
     pin.ccrba(dynamics.model, dynamics.data, q, np.zeros(dynamics.model.nv))
@@ -110,7 +110,7 @@ def standing_inertia(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
     return np.asarray(turn.T @ np.array(dynamics.data.Ig.inertia) @ turn)
 
 
-def unmodelled_momentum(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
+def unmodelled_momentum(plan: PlannedJump, dynamics: ExactDynamics) -> Array:
     """The angular momentum [N m s] of the robot minus that in the plan, (N, 3)."""
     exact = [
         dynamics.centroidal(q, v)[2] for q, v in zip(plan.position, plan.velocity, strict=True)
@@ -118,7 +118,7 @@ def unmodelled_momentum(plan: JumpPlan, dynamics: ExactDynamics) -> Array:
     return np.array(exact) - plan.angular_momentum
 
 
-def own_residuals(plan: JumpPlan, robot: RobotDescription) -> dict[str, float]:
+def own_residuals(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]:
     """The residuals of the plan's formulation; none for ``full``, whose residuals ``midpoint`` computes."""
     evaluate = RESIDUALS.get(plan.task.formulation)
     return evaluate(plan, ExactDynamics(plan.task.equipped(robot))) if evaluate else {}

@@ -13,7 +13,7 @@ from aloft.planner.checking.validity import broken_array, check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.solving.solve import FORMULATIONS, solve_jump
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import ARRAYS, JumpPlan
+from aloft.planner.task.plan import ARRAYS, PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
@@ -36,7 +36,7 @@ REDUCED = [(formulation, jump) for formulation in ("paper", "srbm") for jump in 
 
 
 @lru_cache(maxsize=16)
-def planned(formulation: str, jump: str) -> JumpPlan:
+def planned(formulation: str, jump: str) -> PlannedJump:
     values: dict[str, Any] = {
         "recipe": "paper",
         "name": jump,
@@ -47,7 +47,7 @@ def planned(formulation: str, jump: str) -> JumpPlan:
     return solve_jump(make_task(values), ROBOT)
 
 
-def knot(plan: JumpPlan, time: float) -> int:
+def knot(plan: PlannedJump, time: float) -> int:
     return int(np.abs(plan.time - time).argmin())
 
 
@@ -87,7 +87,7 @@ def test_an_array_that_is_changed_breaks_its_equation(
     plan = planned(formulation, "forward")
     changed = {name: np.array(getattr(plan, name)) for name in ARRAYS}
     changed[array][5, ..., column] += 0.01
-    broken = JumpPlan(
+    broken = PlannedJump(
         task=plan.task, lift_off_time=plan.lift_off_time, touchdown_time=plan.touchdown_time,
         **changed,
     )  # fmt: skip

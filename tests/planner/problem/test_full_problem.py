@@ -15,7 +15,7 @@ from aloft.planner.library.library import SHIPPED
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import Knots, make_task
 from aloft.robots.description import find_robot
@@ -67,7 +67,7 @@ def test_a_plan_does_not_depend_on_the_number_of_threads() -> None:
     assert len(found) == 1
 
 
-def momenta(plan: JumpPlan) -> tuple[float, float]:
+def momenta(plan: PlannedJump) -> tuple[float, float]:
     lift_off, touchdown = plan.knot_at(plan.lift_off_time), plan.knot_at(plan.touchdown_time)
     sizes = np.abs(plan.angular_momentum).max(axis=1)
     return float(sizes[lift_off]), float(sizes[touchdown])
@@ -95,7 +95,7 @@ def test_angular_momentum_can_be_bounded(where: str) -> None:
     assert momenta(plan)[index] == pytest.approx(most, abs=1e-5)
     assert f"{where}_momentum" not in [test.name for test in check_plan(plan, ROBOT).failed]
     # The check itself notices what the plan was not asked for.
-    cheated = check_plan(JumpPlan(**{**vars(free), "task": task}), ROBOT)
+    cheated = check_plan(PlannedJump(**{**vars(free), "task": task}), ROBOT)
     assert f"{where}_momentum" in [test.name for test in cheated.failed]
 
 

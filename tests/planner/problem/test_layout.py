@@ -6,7 +6,7 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.planner.problem.layout import layout
-from aloft.planner.task.task import TaskError, make_task
+from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -55,5 +55,5 @@ def test_points_that_are_not_there() -> None:
         {"phase": "thrust"}, {"phase": "thrust", "contacts": "claw"}, {"phase": "flight"},
         {"phase": "landing"},
     ]  # fmt: skip
-    with pytest.raises(TaskError, match="no contact point of bruce is named like 'claw'"):
+    with pytest.raises(JumpTaskError, match="no contact point of bruce is named like 'claw'"):
         layout(make_task({"recipe": "paper", "name": "a", "rise": 0.1, "phases": phases}), ROBOT)

@@ -11,7 +11,7 @@ import pytest
 
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.quaternions import pose_of
+from aloft.planner.models.midpoint import pose_of
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
 from aloft.planner.problem.stage_functions import (

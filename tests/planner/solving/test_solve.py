@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.planner.checking.validity import InvalidPlanError, check_plan, checked
 from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.problem.guess import ballistic_guess
@@ -31,11 +32,10 @@ from aloft.planner.solving.solve import (
 )
 from aloft.planner.solving.solver import solve
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import ARRAYS, JumpPlan
+from aloft.planner.task.plan import ARRAYS, PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
-from aloft.robots.kinematics import matrices_of_quaternions
 
 from ..independence import smallest_singular_value
 
@@ -252,7 +252,7 @@ def test_a_shipped_somersault_turns_over_and_is_exact(
 HIGH = make_task({"recipe": "paper", "name": "high", "rise": 0.2})
 
 
-def failing(plan: JumpPlan, *tests: tuple[str, float, float]) -> JumpPlan:
+def failing(plan: PlannedJump, *tests: tuple[str, float, float]) -> PlannedJump:
     rows = [{"name": n, "value": v, "limit": a, "passed": False} for n, v, a in tests]
     return plan.with_report({"valid": False, "tests": rows, "figures": {}})
 
@@ -268,12 +268,12 @@ def failing(plan: JumpPlan, *tests: tuple[str, float, float]) -> JumpPlan:
     ],
 )
 def test_what_finer_intervals_may_cure(
-    by_hand: JumpPlan, tests: list[tuple[str, float, float]], expected: bool
+    by_hand: PlannedJump, tests: list[tuple[str, float, float]], expected: bool
 ) -> None:
     assert curable(failing(by_hand, *tests)) is expected
 
 
-def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: JumpPlan) -> None:
+def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: PlannedJump) -> None:
     failed = failing(replace(by_hand, task=HIGH), ("flight_position", 2e-3, 1e-3))
     assert asks_for_finer(HIGH, failed)
     assert asks_for_finer(HIGH.model_copy(update={"name": "other"}), failed)
@@ -309,10 +309,10 @@ def test_the_reach_of_the_real_actuators(task: dict[str, Any]) -> None:
     assert plan.statistics["violation"] <= 1e-6
 
 
-def test_an_invalid_plan_is_not_refined_without_end(by_hand: JumpPlan) -> None:
+def test_an_invalid_plan_is_not_refined_without_end(by_hand: PlannedJump) -> None:
     calls = []
 
-    def make(task: Any, robot: Any, start: JumpPlan | None) -> JumpPlan:
+    def make(task: Any, robot: Any, start: PlannedJump | None) -> PlannedJump:
         calls.append(start)
         bent = by_hand.position.copy()
         bent[len(bent) // 2, 0] += 2e-3

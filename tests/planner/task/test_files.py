@@ -14,14 +14,14 @@ from hypothesis import strategies as st
 
 from aloft.planner.task.files import ABANDONED, remove_abandoned, write_whole
 from aloft.planner.task.read_task import read_task
-from aloft.planner.task.task import JumpTask, TaskError, make_task
+from aloft.planner.task.task import JumpTask, JumpTaskError, make_task
 from aloft.studies.batch.plan_grid import read_grid
 
 
 def message(tmp_path: Path, text: str, read: Any = read_task) -> str:
     path = tmp_path / "odd.yaml"
     path.write_text(text)
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         read(path)
     return str(caught.value).replace(f"{tmp_path}/", "")
 
@@ -82,11 +82,11 @@ def test_mistakes_of_a_grid(tmp_path: Path, text: str, expected: str) -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(TaskError, match=r"cannot read .*nowhere\.yaml: No such file"):
+    with pytest.raises(JumpTaskError, match=r"cannot read .*nowhere\.yaml: No such file"):
         read_task(tmp_path / "nowhere.yaml")
     path = tmp_path / "bytes.yaml"
     path.write_bytes(b"rise: \xff")
-    with pytest.raises(TaskError, match=r"is not UTF-8 text \(byte 6\)"):
+    with pytest.raises(JumpTaskError, match=r"is not UTF-8 text \(byte 6\)"):
         read_task(path)
 
 
@@ -119,7 +119,7 @@ MANY = settings(
 def test_whatever_values_are_a_task_or_a_clear_error(values: dict[str, Any]) -> None:
     try:
         task = make_task({"name": "any", **values})
-    except TaskError as error:
+    except JumpTaskError as error:
         assert all(line.startswith("task: ") for line in str(error).splitlines() if line)
     else:
         assert make_task(task.model_dump(mode="json")) == task
@@ -139,7 +139,7 @@ def test_whatever_a_file_holds_is_a_task_or_a_clear_error(
         path.write_text(yaml.safe_dump(content, allow_unicode=True), encoding="utf-8")
         try:
             read(path)
-        except TaskError as error:
+        except JumpTaskError as error:
             assert str(path) in str(error)
 
 
@@ -149,7 +149,7 @@ def test_whatever_text_is_a_task_or_a_clear_error(tmp_path: Path, text: str) -> 
     path = tmp_path / "any.yaml"
     path.write_text(text, encoding="utf-8", errors="replace")
     for read in (read_task, read_grid):
-        with pytest.raises(TaskError):
+        with pytest.raises(JumpTaskError):
             read(path)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from aloft.planner.task.ground import scene_of
-from aloft.planner.task.task import TaskError, make_task
+from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
 
 BRUCE = find_robot("bruce")
@@ -79,7 +79,7 @@ def test_stairs_are_one_box_each() -> None:
     ],
 )  # fmt: skip
 def test_ground_that_cannot_be_built_is_refused(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         scene(**values)
     assert "landing_height: " in str(caught.value)
     assert words in str(caught.value)

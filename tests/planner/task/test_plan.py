@@ -9,15 +9,15 @@ import pytest
 
 from aloft.planner.task.plan import (
     ARRAYS,
-    JumpPlan,
     PlanFileError,
+    PlannedJump,
     plan_bytes,
     read_plan,
     write_plan,
 )
 
 
-def test_a_plan_comes_back_to_the_last_bit(by_hand: JumpPlan, tmp_path: Path) -> None:
+def test_a_plan_comes_back_to_the_last_bit(by_hand: PlannedJump, tmp_path: Path) -> None:
     plan = replace(by_hand, statistics={"cost": np.float64(0.1)}, versions={"casadi": "3.8"})
     again = read_plan(write_plan(tmp_path / "folder" / "plan.npz", plan))
     for name in ARRAYS:
@@ -29,7 +29,7 @@ def test_a_plan_comes_back_to_the_last_bit(by_hand: JumpPlan, tmp_path: Path) ->
     assert plan_bytes(again) == plan_bytes(plan)
 
 
-def test_the_file_can_be_read_with_numpy_alone(by_hand: JumpPlan, tmp_path: Path) -> None:
+def test_the_file_can_be_read_with_numpy_alone(by_hand: PlannedJump, tmp_path: Path) -> None:
     names = {"contacts": ["right_toe", "right_heel", "left_toe", "left_heel"]}
     path = write_plan(tmp_path / "plan.npz", by_hand, names)
     with np.load(path) as file:
@@ -40,7 +40,7 @@ def test_the_file_can_be_read_with_numpy_alone(by_hand: JumpPlan, tmp_path: Path
     assert header["names"] == names
 
 
-def test_nothing_but_the_plan_is_left_in_the_folder(by_hand: JumpPlan, tmp_path: Path) -> None:
+def test_nothing_but_the_plan_is_left_in_the_folder(by_hand: PlannedJump, tmp_path: Path) -> None:
     for _ in range(2):
         write_plan(tmp_path / "plan.npz", by_hand)
     with pytest.raises(TypeError):
@@ -49,7 +49,7 @@ def test_nothing_but_the_plan_is_left_in_the_folder(by_hand: JumpPlan, tmp_path:
     assert read_plan(tmp_path / "plan.npz").task == by_hand.task
 
 
-def test_what_is_no_plan_is_refused(by_hand: JumpPlan, tmp_path: Path) -> None:
+def test_what_is_no_plan_is_refused(by_hand: PlannedJump, tmp_path: Path) -> None:
     path = write_plan(tmp_path / "plan.npz", by_hand)
     with pytest.raises(PlanFileError, match=r"cannot read .*no\.npz: No such file"):
         read_plan(tmp_path / "no.npz")
@@ -63,21 +63,21 @@ def test_what_is_no_plan_is_refused(by_hand: JumpPlan, tmp_path: Path) -> None:
         read_plan(tmp_path / "other.npz")
 
 
-def test_arrays_of_different_length_are_refused(by_hand: JumpPlan) -> None:
+def test_arrays_of_different_length_are_refused(by_hand: PlannedJump) -> None:
     with pytest.raises(ValueError, match="com has 3 rows, but the plan has"):
         replace(by_hand, com=by_hand.com[:3])
     with pytest.raises(ValueError, match="times that never decrease"):
         replace(by_hand, time=by_hand.time[::-1])
 
 
-def test_knot_at(by_hand: JumpPlan) -> None:
+def test_knot_at(by_hand: PlannedJump) -> None:
     middle = len(by_hand.time) // 4
     assert by_hand.knot_at(float(by_hand.time[middle])) == middle
     assert by_hand.knot_at(float(by_hand.time[middle]) + 1e-4) == middle
     assert by_hand.knot_at(-1.0) == 0
 
 
-def test_processor_times_are_not_kept_so_that_bytes_repeat(by_hand: JumpPlan) -> None:
+def test_processor_times_are_not_kept_so_that_bytes_repeat(by_hand: PlannedJump) -> None:
     plans = [
         replace(by_hand, statistics={"cpu_s": t, "solver_cpu_s": t, "iterations": 12})
         for t in (0.1, 0.2)

@@ -16,7 +16,7 @@ from aloft.planner.task.read_task import (
     leg_travel,
     read_task,
 )
-from aloft.planner.task.task import TaskError, make_task
+from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
 
 TEXT = "rise: 12 cm\nweights: {force: 0.01, impulse: 5}\nmargins: {joints: 0.06 rad}\n"
@@ -57,14 +57,14 @@ def test_a_changed_task_is_called_by_what_it_asks_for(hop: Path) -> None:
     ],
 )
 def test_a_wrong_change_is_named(hop: Path, changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         changed_task(hop, changes)
     assert str(caught.value).startswith(words)
 
 
 def test_what_is_wrong_in_the_file_has_its_line(hop: Path) -> None:
     hop.write_text(TEXT + "distans: 3\n")
-    with pytest.raises(TaskError, match=r"hop.yaml:4:1: distans"):
+    with pytest.raises(JumpTaskError, match=r"hop.yaml:4:1: distans"):
         changed_task(hop, {"rise": 0.1})
 
 
@@ -155,7 +155,7 @@ def test_nothing_is_solved_for_a_contradiction() -> None:
     def solve(*_: Any) -> Any:
         raise AssertionError("it was solved")
 
-    with pytest.raises(TaskError, match=r"odd: flight_time: a rise of 0\.15 m takes"):
+    with pytest.raises(JumpTaskError, match=r"odd: flight_time: a rise of 0\.15 m takes"):
         solve_and_check(
             make_task({"name": "odd", "rise": 0.15, "flight_time": 0.9}), ROBOT, None, solve
         )

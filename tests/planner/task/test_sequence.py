@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from aloft.planner.task.ground import scene_of
-from aloft.planner.task.sequence import Hop, Place, edge_of
-from aloft.planner.task.task import JumpTask, TaskError, make_task
+from aloft.planner.task.sequence import Hop, StanceLocation, edge_of
+from aloft.planner.task.task import JumpTask, JumpTaskError, make_task
 from aloft.robots.description import find_robot
 
 
@@ -47,12 +47,12 @@ def test_places_add_up_and_edges_lie_between_them() -> None:
         rise=0.15, distance_x=0.1, twist=0.2,
         jumps=[{"landing_height": "5 cm"}, {"landing_height": "-5 cm", "rotation": 6.28}],
     )  # fmt: skip
-    assert steps.places()[1] == Place(0.1, 0.0, 0.05, 0.2, 0.0)
-    assert steps.places()[2] == Place(0.2, 0.0, 0.0, 0.4, 6.28)
+    assert steps.places()[1] == StanceLocation(0.1, 0.0, 0.05, 0.2, 0.0)
+    assert steps.places()[2] == StanceLocation(0.2, 0.0, 0.0, 0.4, 6.28)
     edges = [edge_of(hop, at) for hop, at in zip(steps.hops(), steps.places(), strict=False)]
     assert edges == pytest.approx([0.05, 0.15])
-    assert edge_of(Hop(landing_height=0.1, step_edge=0.02), Place(1.0, 0, 0, 0, 0)) == 1.02
-    assert edge_of(Hop(landing_height=0.1), Place(1.0, 0, 0, 0, 0)) is None
+    assert edge_of(Hop(landing_height=0.1, step_edge=0.02), StanceLocation(1.0, 0, 0, 0, 0)) == 1.02
+    assert edge_of(Hop(landing_height=0.1), StanceLocation(1.0, 0, 0, 0, 0)) is None
 
 
 @pytest.mark.parametrize("name", ["squat_time", "thrust_time", "landing_time", "flight_time"])
@@ -107,7 +107,7 @@ def test_a_sequence_of_contacts() -> None:
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         task(**values)
     assert words in str(caught.value)
 
@@ -165,11 +165,15 @@ def test_one_gap_alone() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(TaskError, match=r"rough draws the ground: give rough, or landing_height"):
+    with pytest.raises(
+        JumpTaskError, match=r"rough draws the ground: give rough, or landing_height"
+    ):
         row(landing_height=0.02)
-    with pytest.raises(TaskError, match=r"it jumps 0\.1 m ahead, and cannot pass a gap of 0\.2 m"):
+    with pytest.raises(
+        JumpTaskError, match=r"it jumps 0\.1 m ahead, and cannot pass a gap of 0\.2 m"
+    ):
         scene_of(make_task({"name": "a", "rise": 0.1, "distance_x": 0.1, "gap": 0.2}), BRUCE)
-    with pytest.raises(TaskError, match=r"at place 0 a foot at .* narrow the gap"):
+    with pytest.raises(JumpTaskError, match=r"at place 0 a foot at .* narrow the gap"):
         scene_of(make_task({"name": "a", "rise": 0.1, "distance_x": 0.2, "gap": 0.15}), BRUCE)
-    with pytest.raises(TaskError, match=r"rough.step.*nearest is steps"):
+    with pytest.raises(JumpTaskError, match=r"rough.step.*nearest is steps"):
         row(rough={"step": 0.02})

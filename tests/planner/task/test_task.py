@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from aloft.planner.task.read_task import read_task
-from aloft.planner.task.task import JumpTask, Knots, TaskError, make_task
+from aloft.planner.task.task import JumpTask, JumpTaskError, Knots, make_task
 from aloft.robots.description import find_robot
 
 
@@ -38,13 +38,13 @@ def test_about_sixty_intervals() -> None:
     ],
 )
 def test_what_is_wrong_is_said_with_its_key(values: dict[str, object], words: str) -> None:
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         make_task({"name": "a", **values}, where="jump.yaml")
     assert f"jump.yaml: {words}" in str(caught.value)
 
 
 def test_all_that_is_wrong_is_said_at_once() -> None:
-    with pytest.raises(TaskError) as caught:
+    with pytest.raises(JumpTaskError) as caught:
         make_task({"name": "a", "rise": -1.0, "friction": 9.0, "distance_x": 7.0})
     assert len(str(caught.value).splitlines()) == 3
 
@@ -64,18 +64,20 @@ def test_a_file_gives_the_task_its_name(tmp_path: Path) -> None:
 def test_a_file_that_is_no_task(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text(text)
-    with pytest.raises(TaskError, match=words):
+    with pytest.raises(JumpTaskError, match=words):
         read_task(path)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(TaskError, match=r"cannot read .*no\.yaml: No such file"):
+    with pytest.raises(JumpTaskError, match=r"cannot read .*no\.yaml: No such file"):
         read_task(tmp_path / "no.yaml")
 
 
 def test_an_unknown_joint_of_a_stance_is_named() -> None:
     task = make_task({"name": "a", "rise": 0.1, "final": {"right_elbow": 0.1}})
-    with pytest.raises(TaskError, match="final: bruce has no joint right_elbow; there is right_"):
+    with pytest.raises(
+        JumpTaskError, match="final: bruce has no joint right_elbow; there is right_"
+    ):
         task.end_joints(find_robot("bruce"))
     assert task.start_joints(find_robot("bruce"))["left_knee"] == -0.8
 

@@ -118,6 +118,17 @@ def test_a_collada_file_with_nodes_in_nodes(tmp_path: Path) -> None:
     assert np.allclose(triangles[2], 0.01 * np.array([[0, 0, 5], [-2, 2, 5], [-2, 0, 5]]))
 
 
+def test_corners_of_a_collada_file_may_have_further_numbers(tmp_path: Path) -> None:
+    (tmp_path / "a.dae").write_text(COLLADA)
+    wide = COLLADA.replace("0 0 0 1 0 0 1 1 0 0 1 0", "0 0 0 7 1 0 0 8 1 1 0 9 0 1 0 7")
+    (tmp_path / "b.dae").write_text(wide.replace('stride="3"', 'stride="4"'))
+    bare = '<technique_common><accessor stride="3"/></technique_common>'
+    (tmp_path / "c.dae").write_text(COLLADA.replace(bare, ""))
+    expected = mesh_triangles(tmp_path / "a.dae")
+    for name in ("b.dae", "c.dae"):
+        np.testing.assert_array_equal(mesh_triangles(tmp_path / name), expected)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "told"),
     [

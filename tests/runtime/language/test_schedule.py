@@ -63,6 +63,11 @@ def test_all_rings_are_reported() -> None:
     ]
 
 
+def test_what_leads_into_a_loop_or_out_of_it_is_no_part_of_it() -> None:
+    graph = blocks("in0:\n in1: in0\n a: in1, b\n b: a\n out0: b\n out1: out0, in0")
+    assert [str(loop) for loop in find_loops(graph)] == ["a.y -> b.u0 -> b.y -> a.u1"]
+
+
 def test_no_loops_where_there_are_none() -> None:
     assert find_loops(blocks("a:\n b: a\n c: a, b")) == ()
 

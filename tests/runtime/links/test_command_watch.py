@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from aloft.files.problems import Code
 from aloft.runtime.language.stages import WATCHDOG, CheckedGraph, LinkPolicy, LinkSettings
 from aloft.runtime.links.command_watch import CommandWatch
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import LoadError, load
-from aloft.runtime.loading.problems import Code
 from aloft.runtime.placement.placed import Link, command_sources, place, silence_limit
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub

@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
+from aloft.files.problems import Position
 from aloft.runtime.graph import Graph
-from aloft.runtime.language.stages import CheckedGraph, ClockSpec, Position
+from aloft.runtime.language.stages import CheckedGraph, ClockSpec
 from aloft.runtime.loading import LoadError, check, load, load_text
 
 PATH = Path("graph.yaml")

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from aloft.files.problems import Problem
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import LoadError, load_text
-from aloft.runtime.loading.problems import Problem
 
 PARTS = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter

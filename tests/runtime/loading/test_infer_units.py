@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from aloft.files.problems import Problem
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.registry import all_blocks
 from aloft.runtime.loading import check, load, load_text
-from aloft.runtime.loading.problems import Problem
 
 SENSOR = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter

@@ -2,10 +2,10 @@
 
 import pytest
 
+from aloft.files.problems import LoadError
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading.checking.parameters import adjust, entries
 from aloft.runtime.loading.load import load_text
-from aloft.runtime.loading.problems import LoadError
 from aloft.runtime.running.memory import BoundGraph
 
 TEXT = """

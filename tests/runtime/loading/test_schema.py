@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from jsonschema import Draft7Validator
 
+from aloft.files.document import read_file, read_value
+from aloft.files.nodes import plain
+from aloft.files.problems import Problems
 from aloft.runtime.loading import graph_schema, schema_text
-from aloft.runtime.loading.problems import Problems
-from aloft.runtime.loading.reading.document import read_file, read_value
-from aloft.runtime.loading.reading.nodes import plain
 
 ROOT = Path(__file__).parents[3]
 NO_GRAPHS = {ROOT / "graphs" / name for name in ("tasks", "studies", "hardware")}

@@ -9,6 +9,7 @@ import pytest
 from aloft.blocks.general.sources import SineWave
 from aloft.blocks.general.user_code import Function
 from aloft.blocks.general.vectors import Vector
+from aloft.files.problems import LoadError
 from aloft.mathematics.compiling import chain_code
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
@@ -20,7 +21,6 @@ from aloft.runtime.language.parameters import Parameters, live_parameter, parame
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.loading.checking.parameters import adjust
-from aloft.runtime.loading.problems import LoadError
 from aloft.runtime.running import timing
 from aloft.runtime.running.chain import Chain
 from aloft.runtime.running.executor import Executor

@@ -84,3 +84,9 @@ def test_another_interface_of_numpy_is_noticed(monkeypatch: pytest.MonkeyPatch) 
     wrong = pytest.raises(RuntimeError, match="the counter of arrays does not work with NumPy")
     with wrong, count_array_allocations():
         pass
+
+
+def test_zeros_are_counted_with_the_bytes_of_all_elements() -> None:
+    with count_array_allocations() as counted:
+        assert allocations._counters[0]._count_calloc(None, 5, 40)
+    assert (counted.count, counted.total_bytes) == (1, 200)

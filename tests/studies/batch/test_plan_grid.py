@@ -10,9 +10,9 @@ import pytest
 from aloft.planner.library import library
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import JumpPlan
+from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
-from aloft.planner.task.task import JumpTask, TaskError, make_task
+from aloft.planner.task.task import JumpTask, JumpTaskError, make_task
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.studies.batch import plan_grid as grid
 from aloft.studies.batch.jobs import JobResult, attempt
@@ -51,7 +51,9 @@ def solver(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     )
     assert kept is not None
 
-    def solve(task: JumpTask, robot: RobotDescription, warm_start: JumpPlan | None) -> JumpPlan:
+    def solve(
+        task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
+    ) -> PlannedJump:
         asked.append(task.name)
         assert warm_start is None, "what is in a library must not depend on the order"
         if task.rise is not None and task.rise > 0.2:
@@ -88,7 +90,7 @@ def test_a_grid_is_for_one_robot() -> None:
         make_task({"name": "a", "rise": 0.1}),
         make_task({"name": "b", "rise": 0.1, "robot": "x"}),
     ]
-    with pytest.raises(TaskError, match="a grid is for one robot, found bruce, x"):
+    with pytest.raises(JumpTaskError, match="a grid is for one robot, found bruce, x"):
         robot_of(tasks)
 
 

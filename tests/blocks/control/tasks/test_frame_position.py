@@ -10,6 +10,7 @@ import pytest
 from aloft.blocks.control.frames import Frame
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
 from aloft.blocks.control.tasks.frame_position import FramePosition
+from aloft.blocks.control.tasks.posture import Posture
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.signals import PointTarget
 from aloft.runtime.language.errors import BlockError
@@ -45,6 +46,11 @@ def test_its_target_is_an_input_of_the_controller_called_after_the_entry():
     again = WholeBodyController.Params.model_validate({"tasks": ["Posture", link]})
     assert WholeBodyController.fitted(again, ".") is kind
     assert WholeBodyController.fitted(WholeBodyController.Params(), ".") is WholeBodyController
+
+
+def test_only_its_target_is_an_input_of_its_own():
+    assert list(FramePosition.own_inputs()) == ["target"]
+    assert not Posture.own_inputs()
 
 
 def test_an_unknown_frame_and_two_inputs_of_one_name_are_reported():

@@ -15,42 +15,25 @@ from typing import Any
 
 import yaml
 
-from ...language.stages import Position
-from ..problems import Code, Problems, nearest
 from .nodes import Entry, ListNode, MapNode, Node, Plain, ScalarNode
+from .problems import Code, Position, Problems, nearest
 
 _PREFIX = "tag:yaml.org,2002:"
 _LIMIT = 200_000  # values in one file, counting an alias each time it is used
 _DEPTH = 100  # levels of nesting; PyYAML's own composer overflows the stack on a hostile file
 _TOO_DEEP = f"nested more than {_DEPTH} levels deep"
-_BaseLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # PyYAML is not typed
 
-
-class _GraphLoader(_BaseLoader):  # type: ignore[misc]  # PyYAML is not typed
-    """The safe loader, resolving plain scalars as in YAML 1.2."""
-
-    yaml_implicit_resolvers: dict[Any, Any] = {}
-
-
-for _name, _pattern, _first in (
-    ("null", r"(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
-    ("bool", r"(?:true|True|TRUE|false|False|FALSE)$", list("tTfF")),
-    (
-        "int",
-        r"[-+]?(?:[0-9][0-9_]*|0x[0-9a-fA-F_]+|0o[0-7_]+|0b[01_]+)$",
-        list("-+0123456789"),
-    ),
-    (
-        "float",
-        (
-            r"(?:[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
-            r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
-        ),
-        list("-+0123456789."),
-    ),
-    ("merge", r"<<$", ["<"]),
-):
-    _GraphLoader.add_implicit_resolver(_PREFIX + _name, re.compile(_pattern), _first)
+_PLAIN = re.compile(
+    r"(?P<null>~|null|Null|NULL|)$"
+    r"|(?P<bool>true|True|TRUE|false|False|FALSE)$"
+    r"|(?P<int>[-+]?(?:[0-9][0-9_]*|0x[0-9a-fA-F_]+|0o[0-7_]+|0b[01_]+))$"
+    r"|(?P<float>[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
+)
+"""What a scalar without quotes and tag is in YAML 1.2; all others are texts."""
+_FIRST = frozenset("-+0123456789.~nNtTfF")
+"""The first characters of what ``_PLAIN`` matches, as most scalars are texts."""
 
 
 GRAPH_FILE = ("a graph file", "rate, robot, blocks")
@@ -122,7 +105,7 @@ def read_mapping(
 def read_value(text: str, shown: str, problems: Problems) -> Node | None:
     """The one value in a YAML text; ``None`` for an empty text and after a problem."""
     try:
-        loader = _GraphLoader(_hide_brackets(text))
+        loader = _Loader(_hide_brackets(text))
         try:
             return _Composer(loader, shown, problems).compose()
         finally:
@@ -208,7 +191,7 @@ class _Composer:
         if self.loader.check_event(yaml.StreamEndEvent):
             return None
         self.loader.get_event()  # the document's start
-        node, _ = self._node()
+        node, _ = self._node(self.loader.get_event())
         self.loader.get_event()  # the document's end
         if not self.loader.check_event(yaml.StreamEndEvent):
             where = self._where(self.loader.peek_event())
@@ -223,8 +206,7 @@ class _Composer:
         self.problems.add(code, message, where)
         return _Rejected()
 
-    def _node(self) -> tuple[Node, int]:
-        event = self.loader.get_event()
+    def _node(self, event: Any) -> tuple[Node, int]:
         where = self._where(event)
         if isinstance(event, yaml.AliasEvent):
             if event.anchor not in self.anchors:
@@ -265,10 +247,15 @@ class _Composer:
 
     def _scalar(self, event: Any, where: Position) -> Plain:
         text: str = event.value.translate(_SHOWN)
-        full = event.tag
-        if full is None or full == "!":
-            full = self.loader.resolve(yaml.ScalarNode, text, event.implicit)
-        tag = full.removeprefix(_PREFIX)
+        if event.tag is None or event.tag == "!":
+            if not event.implicit[0] or (text and text[0] not in _FIRST):
+                return text
+            match = _PLAIN.match(text)
+            if match is None:
+                return text
+            tag = str(match.lastgroup)
+        else:
+            tag = event.tag.removeprefix(_PREFIX)
         if tag in ("str", "merge"):
             return text
         lowered = text.replace("_", "").lower()
@@ -284,7 +271,7 @@ class _Composer:
                 return float(lowered.replace(".inf", "inf").replace(".nan", "nan"))
         except ValueError:
             pass
-        self._unknown_tag(full, where, text)
+        self._unknown_tag(event.tag or f"!!{tag}", where, text)
         return text
 
     def _unknown_tag(self, tag: str, where: Position, text: str = "") -> None:
@@ -299,22 +286,20 @@ class _Composer:
     def _list(self, where: Position) -> tuple[ListNode, int]:
         items = []
         size = 1
-        while not self.loader.check_event(yaml.SequenceEndEvent):
-            item, item_size = self._node()
+        while not isinstance(event := self.loader.get_event(), yaml.SequenceEndEvent):
+            item, item_size = self._node(event)
             items.append(item)
             size += item_size
-        self.loader.get_event()
         return ListNode(tuple(items), where), size
 
     def _map(self, where: Position) -> tuple[MapNode, int]:
         entries: dict[str, Entry] = {}
         merged: dict[str, Entry] = {}
         size = 1
-        while not self.loader.check_event(yaml.MappingEndEvent):
-            key_event = self.loader.peek_event()
+        while not isinstance(key_event := self.loader.get_event(), yaml.MappingEndEvent):
             key_where = self._where(key_event)
-            key_node, _ = self._node()
-            value, value_size = self._node()
+            key_node, _ = self._node(key_event)
+            value, value_size = self._node(self.loader.get_event())
             size += value_size
             if not isinstance(key_node, ScalarNode):
                 self.problems.add(
@@ -337,7 +322,6 @@ class _Composer:
                 )
             else:
                 entries[key] = Entry(key, key_where, value)
-        self.loader.get_event()
         # A written key wins over a merged one; merged keys come last, in their own order.
         combined = entries | {k: e for k, e in merged.items() if k not in entries}
         return MapNode(tuple(combined.values()), where), size

@@ -2,11 +2,11 @@
 
 import pytest
 
-from aloft.runtime.language.stages import Position
-from aloft.runtime.loading.problems import (
+from aloft.files.problems import (
     MOST_SHOWN,
     Code,
     LoadError,
+    Position,
     Problem,
     Problems,
     fix_for_key,

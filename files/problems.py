@@ -6,13 +6,26 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..language.errors import AloftError, ExitCode
-from ..language.stages import Position
+from ..runtime.language.errors import AloftError, ExitCode
 
 if TYPE_CHECKING:
     from rich.text import Text
+
+
+class Position(NamedTuple):
+    """A place in a file; lines and columns count from one. Printed as ``file:line:col``.
+
+    Line zero stands for the file as a whole, or for an override.
+    """
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}" if self.line else self.file
 
 
 class Code(StrEnum):

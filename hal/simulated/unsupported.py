@@ -1,11 +1,15 @@
-"""Which rotors are geared to several joints, and which of these MuJoCo cannot express."""
+"""What of a robot's description the simulator cannot do: rotors that couple joints of two branches, and
+feet that cannot stand on level ground. A check of a graph looks at it without the simulator."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...robots.description import RobotDescription
-from ...robots.kinematics import joints_above
+from ...robots.kinematics import joints_above, standing_heights
+
+UNEVEN = 0.002
+"""The largest difference in height of contact points in the standing pose [m]."""
 
 
 def unsupported_motor(robot: RobotDescription) -> str:
@@ -40,3 +44,21 @@ def shared_motors(robot: RobotDescription) -> list[int]:
         if inertia[motor] and geared[motor].sum() > 1 and joined:
             found.append(motor)
     return found
+
+
+def uneven_contacts(robot: RobotDescription) -> str:
+    """A text that says which contact points are above the lowest one in the standing pose, so that
+    the robot cannot stand on level ground; empty if all are at one height."""
+    heights = standing_heights(robot)
+    above = heights - heights.min(initial=np.inf)
+    if float(above.max(initial=0.0)) <= UNEVEN:
+        return ""
+    found = [
+        f"{contact.name} by {1e3 * height:.0f} mm"
+        for contact, height in zip(robot.contacts, above.tolist(), strict=True)
+        if height > UNEVEN
+    ]
+    return (
+        f"{robot.name} cannot stand on level ground: in its standing pose these contact points are "
+        f"above the lowest one: {', '.join(found)}"
+    )

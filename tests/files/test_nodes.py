@@ -11,19 +11,17 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.runtime.language.stages import Position
-from aloft.runtime.loading.problems import Problems
-from aloft.runtime.loading.reading.nodes import (
+from aloft.files.nodes import (
     MapNode,
     ScalarNode,
     from_plain,
     kind,
     move,
     plain,
-    read_quantity,
     text_of,
     texts_of,
 )
+from aloft.files.problems import Position
 
 HERE, THERE = Position("graph.yaml", 3, 7), Position("other.yaml", 1, 2)
 KEYS = st.sampled_from(["a", "b", "c"])
@@ -117,19 +115,3 @@ def test_arrays_are_lists_and_anything_else_its_text() -> None:
 )  # fmt: skip
 def test_values_in_words(value: Any, words: str) -> None:
     assert kind(from_plain(value, HERE)) == words
-
-
-@pytest.mark.parametrize(
-    ("value", "seconds"),
-    [
-        (4, 4.0), (0.5, 0.5), ("250 ms", 0.25), ("2 min", 120.0), (9e11, 9e11), (0, None), (-1, None),
-        (True, None), (1e12, None), (math.inf, None), (10**400, None), ("3 Hz", None), ("x", None),
-        (None, None), ([1], None),
-    ],
-)  # fmt: skip
-def test_a_quantity_is_positive_and_finite(value: Any, seconds: float | None) -> None:
-    problems = Problems()
-    assert read_quantity(from_plain(value, HERE), "clock.late", "s", problems) == seconds
-    report = problems.report("graph.yaml")
-    assert report.ok == (seconds is not None)
-    assert all(p.where == HERE and p.at == "clock.late" for p in report.problems)

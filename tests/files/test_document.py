@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.runtime.language.stages import Position
+from aloft.files.document import read_file, read_mapping, read_value
+from aloft.files.nodes import MapNode, ScalarNode, plain, text_of
+from aloft.files.problems import Position, Problems
 from aloft.runtime.loading import check
-from aloft.runtime.loading.problems import Problems
-from aloft.runtime.loading.reading.document import read_file, read_mapping, read_value
-from aloft.runtime.loading.reading.nodes import MapNode, ScalarNode, plain, text_of
 
 
 def read(text: str) -> Any:

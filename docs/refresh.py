@@ -1,0 +1,318 @@
+"""Writes what is generated in README and in the pages under docs/.
+
+::
+
+    python docs/refresh.py                    all that needs no file
+    python docs/refresh.py NAME [FILE ...]    one of ``PAGES``, from the results of a command
+
+``python docs/refresh.py --help`` names all of them, each with the command that makes its files. What is
+written stands in the page between ``<!-- mark -->`` and ``<!-- end of mark -->``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from result_tables import (
+    FRONTIER_PICTURE,
+    SEEDS,
+    TICK_PICTURE,
+    agreement_table,
+    comparison_table,
+    direction_table,
+    frontier_table,
+    impulse_table,
+    quarter_table,
+    results_sentence,
+    results_table,
+    short_tasks_table,
+    short_tick_table,
+    table,
+    tasks_table,
+    tick_tables,
+    twin_table,
+)
+
+from aloft.benchmarks.tick.chart import tick_chart
+from aloft.planner.task.margins import Margins
+from aloft.planner.task.sequence import Hop, PhaseSpec, RoughGround
+from aloft.planner.task.task import JumpTask, Knots, Weights
+from aloft.robots.importing.urdf_text import find_file
+from aloft.runtime.language.parameters import Parameters
+from aloft.studies.batch.seeds import run_seeds
+
+ROOT = Path(__file__).parent.parent
+DOCS, README = ROOT / "docs", ROOT / "README.md"
+
+
+def refresh(page: Path, mark: str, text: str, of: str = "") -> None:
+    """Write ``text`` between ``<!-- mark -->`` and ``<!-- end of mark -->`` of a page.
+
+    Args:
+        of: what the second mark is the end of, where that is not ``mark`` itself.
+
+    Raises:
+        ValueError: the page does not have both marks.
+    """
+    begin, end = f"<!-- {mark} -->\n", f"<!-- end of {of or mark} -->"
+    before, found, rest = page.read_text(encoding="utf-8").partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise ValueError(f"{page.name} has no {begin.strip()} with an {end} behind it")
+    page.write_text(before + begin + text + end + after, encoding="utf-8")
+
+
+def read_json(path: Path) -> Any:
+    """What a command has written."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def write_agreement(file: Path) -> None:
+    """How far the methods of the whole-body controller agree."""
+    refresh(DOCS / "whole_body.md", "agreement", agreement_table(read_json(file)))
+
+
+def write_comparisons(*folders: Path) -> None:
+    """The comparisons with other methods, and their pictures."""
+    page = DOCS / "comparisons.md"
+    for folder in folders:
+        found = read_json(folder / "summary.json")
+        study = found["study"]
+        refresh(page, f"study: {study}", comparison_table(found), of=study)
+        for picture in found["plots"]:
+            shutil.copyfile(folder / f"{picture}.svg", page.with_name(f"{study}_{picture}.svg"))
+
+
+EXCERPT = re.compile(r"(<!-- from: (\S+) -->\n```\w+\n)(.*?)(```)", re.DOTALL)
+
+
+def refreshed_excerpt(match: re.Match[str]) -> str:
+    """The excerpt as the file has it now. It stays what lies between its first and its last line.
+
+    Raises:
+        ValueError: its first or its last line is gone.
+    """
+    head, path, text, tail = match.groups()
+    excerpt, lines = text.splitlines(), (ROOT / path).read_text(encoding="utf-8").splitlines()
+    first = lines.index(excerpt[0])
+    last = lines.index(excerpt[-1], first)
+    return head + "\n".join(lines[first : last + 1]) + "\n" + tail
+
+
+def write_excerpts() -> None:
+    """README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
+    text = README.read_text(encoding="utf-8")
+    README.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
+
+
+def write_frontier(folder: Path) -> None:
+    """How far jumps reach, and the picture of it."""
+    refresh(DOCS / "frontier.md", "frontier", frontier_table(read_json(folder / "frontier.json")))
+    shutil.copyfile(folder / FRONTIER_PICTURE, DOCS / FRONTIER_PICTURE)
+
+
+def write_landing(*files: Path) -> None:
+    """Where the landing laws place the feet after a push: two studies."""
+    for mark, file in zip(("", " 12 cm"), files, strict=False):
+        rows = read_json(file)["rows"]
+        for name, made in (
+            ("impulses", impulse_table), ("quarters", quarter_table), ("directions", direction_table),
+        ):  # fmt: skip
+            refresh(DOCS / "landing.md", name + mark, made(rows))
+
+
+def write_results() -> None:
+    """The standard trial's reported seeds, which are run for it, and README's sentence."""
+    rows = list(run_seeds(ROOT / "graphs" / "jump.yaml", [], SEEDS))
+    refresh(DOCS / "results.md", "results", results_table(rows))
+    refresh(README, "results", results_sentence(rows))
+
+
+URDF = "package://example-robot-data/robots/go1_description/urdf/go1.urdf"
+
+
+def printed_of_robots() -> dict[str, str]:
+    """What ``aloft robot`` prints and writes for an example, by what it is called on the page."""
+    source = find_file(URDF, Path("/"))
+    if source is None:
+        raise SystemExit("the package example-robot-data is not installed")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copy(source, folder / "go1.urdf")
+
+        def aloft(*arguments: str) -> str:
+            command = [sys.executable, "-m", "aloft", "robot", *arguments]
+            run = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+            return "\n".join(line.rstrip() for line in run.stdout.splitlines()).strip("\n")
+
+        shown = aloft("show", "go1.urdf")
+        aloft("import", "go1.urdf")
+        written = (folder / "go1.yaml").read_text(encoding="utf-8").strip("\n")
+    return {"robot show go1.urdf": shown, "go1.yaml": written}
+
+
+def with_printed(page: str, blocks: Mapping[str, str]) -> str:
+    """The page with the blocks behind their marks."""
+    for name, text in blocks.items():
+        pattern = rf"(<!-- printed: {re.escape(name)} -->\n```\w*\n).*?(```\n)"
+        page = re.sub(pattern, lambda m, t=text: f"{m[1]}{t}\n{m[2]}", page, flags=re.DOTALL)
+    return page
+
+
+def write_robots() -> None:
+    """What ``aloft robot`` prints for an example; needs the package example-robot-data."""
+    page = DOCS / "robots.md"
+    text = with_printed(page.read_text(encoding="utf-8"), printed_of_robots())
+    page.write_text(text, encoding="utf-8")
+
+
+TASK_PARAMETERS = "task parameters"
+
+
+def task_parameter_tables() -> str:
+    """The tables of everything a task file may say, from the declarations."""
+    parts = []
+    for title, owner in (
+        ("", JumpTask),
+        ("One of `jumps`", Hop),
+        ("One of `phases`", PhaseSpec),
+        ("`rough`", RoughGround),
+        ("`knots`", Knots),
+        ("`weights`", Weights),
+        ("`margins`", Margins),
+    ):
+        head = f"{title}:\n\n" if title else ""
+        names = ("parameter", "unit", "default", "bounds", "")
+        parts.append(head + table(names, _parameters(owner)))
+    return "\n".join(parts)
+
+
+def _parameters(owner: type[Parameters]) -> Iterator[Sequence[str]]:
+    for name, field in owner.model_fields.items():
+        extra = field.json_schema_extra
+        unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+        default = "required" if field.is_required() else _default(field.default)
+        cells = (f"`{name}`", unit, default, _bounds(field.metadata), field.description or "")
+        yield [cell.replace("|", "\\|") for cell in cells]
+
+
+def _default(value: Any) -> str:
+    if value is None:
+        return "-"
+    if hasattr(type(value), "model_fields"):
+        return "see below"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _bounds(metadata: Sequence[Any]) -> str:
+    signs = (("gt", "> "), ("ge", ">= "), ("lt", "< "), ("le", "<= "))
+    found = [
+        f"{sign}{getattr(item, key):g}"
+        for item in metadata
+        for key, sign in signs
+        if getattr(item, key, None) is not None
+    ]
+    return ", ".join(found)
+
+
+def write_task_parameters() -> None:
+    """The parameters of a task."""
+    refresh(DOCS / "planning.md", TASK_PARAMETERS, task_parameter_tables())
+
+
+def write_tasks(file: Path) -> None:
+    """The tasks that BRUCE was tried on, and some of them in README."""
+    summary = read_json(file)
+    refresh(DOCS / "results.md", "tasks", tasks_table(summary))
+    refresh(README, "tasks", short_tasks_table(summary))
+
+
+def write_robots_results(file: Path) -> None:
+    """The tasks that other robots were tried on."""
+    refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
+
+
+def write_tick(file: Path) -> None:
+    """How long a tick takes, with a picture, and some of it in README."""
+    found = read_json(file)
+    refresh(DOCS / "compiled.md", "tick", tick_tables(found))
+    refresh(README, "tick", short_tick_table(found))
+    (DOCS / TICK_PICTURE).write_text(tick_chart(found["rows"]), encoding="utf-8")
+
+
+def write_twin(file: Path) -> None:
+    """The twin beside the simulation; ``runs.parquet`` beside the summary says which seeds differ."""
+    from pyarrow import parquet
+
+    runs = parquet.read_table(file.with_name("runs.parquet")).to_pylist()
+    refresh(DOCS / "bring_up.md", "twin", twin_table(read_json(file)["rows"], runs))
+
+
+class Page(NamedTuple):
+    """A part of the pages: the function that writes it, and the command that makes its files."""
+
+    write: Callable[..., None]
+    command: str = ""
+    files: str = ""
+
+
+STUDIES = "aloft study graphs/studies/"
+PAGES = {
+    "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
+    "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
+    "excerpts": Page(write_excerpts),
+    "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
+    "landing": Page(
+        write_landing,
+        f"{STUDIES}push_polar.yaml and push_polar_12cm.yaml",
+        "results/push_polar/summary.json results/push_polar_12cm/summary.json",
+    ),
+    "results": Page(write_results),
+    "robots": Page(write_robots),
+    "robots_results": Page(
+        write_robots_results, f"{STUDIES}robots.yaml", "results/robots/summary.json"
+    ),
+    "task_parameters": Page(write_task_parameters),
+    "tasks": Page(write_tasks, f"{STUDIES}tasks.yaml", "results/tasks/summary.json"),
+    "tick": Page(write_tick, "aloft bench tick --tsid FOLDER --since COMMIT --json > FILE", "FILE"),
+    "twin": Page(write_twin, f"{STUDIES}twin.yaml", "results/twin/summary.json"),
+}
+
+
+def usage() -> str:
+    """All pages, and how each is made."""
+    lines = []
+    for name, page in PAGES.items():
+        lines.append(f"{name}: {page.write.__doc__}")
+        if page.files:
+            lines += [f"    {page.command}", f"    python docs/refresh.py {name} {page.files}"]
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write what the arguments name. Returns the process's exit code."""
+    if not arguments:
+        for page in PAGES.values():
+            if not page.files:
+                page.write()
+        return 0
+    name, *files = arguments
+    if name not in PAGES or bool(files) != bool(PAGES[name].files):
+        print(usage(), file=sys.stdout if name == "--help" else sys.stderr)
+        return 0 if name == "--help" else 2
+    PAGES[name].write(*map(Path, files))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

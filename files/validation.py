@@ -1,0 +1,320 @@
+"""Reads files into pydantic models; what pydantic refuses is told in the words of the file, each mistake once, at its place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from ..runtime.language.errors import UnitError
+from ..runtime.language.units import parse_quantity
+from .document import read_file
+from .nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
+from .problems import Code, Position, Problems, fix_for_key, listing, nearest
+
+Model = TypeVar("Model", bound=BaseModel)
+Path_ = tuple[str | int, ...]
+
+_KINDS: Mapping[str, str] = {
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "string": "text",
+    "list": "a list",
+    "tuple": "a list",
+    "dict": "a mapping",
+    "mapping": "a mapping",
+    "model": "a mapping",
+    "finite": "a finite number",
+}
+_BOUNDS = {
+    "greater_than": ("gt", "more than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+
+
+def read_model(
+    path: Path, model: type[Model], problems: Problems, kind_of_file: tuple[str, str]
+) -> tuple[Model | None, MapNode | None]:
+    """The model in a file, and the file's tree; ``None`` for what cannot be read, which is reported.
+
+    ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
+    """
+    tree = read_file(path, str(path), problems, kind_of_file)
+    if tree is None:
+        return None, None
+    try:
+        return model.model_validate(plain(tree)), tree
+    except ValidationError as error:
+        for mistake in find_mistakes(error, model, tree):
+            mistake.report(kind_of_file[0], problems)
+    return None, tree
+
+
+def explain(error: Mapping[str, Any], unit: str = "") -> tuple[str, str]:
+    """What was expected where pydantic reports an error, and a reason where there is more to say."""
+    kind = str(error["type"])
+    context = error.get("ctx", {})
+    if kind in _BOUNDS:
+        key, words = _BOUNDS[kind]
+        return f"{words} {context[key]:g} {unit}".strip(), ""
+    if kind in ("too_short", "too_long"):
+        few = kind == "too_short"
+        limit = context["min_length" if few else "max_length"]
+        return f"{'at least' if few else 'at most'} {limit} values", ""
+    if "expected" in context:
+        return str(context["expected"]), "" if kind in ("literal_error", "enum") else str(
+            error["msg"]
+        )
+    if kind in ("value_error", "assertion_error"):
+        return "", str(context.get("error", error["msg"]))
+    if kind == "int_from_float":
+        return "a whole number", ""
+    word = _KINDS.get(kind.partition("_")[0])
+    if word is None:
+        return str(error["msg"]), ""
+    if unit and isinstance(error.get("input"), str):
+        try:
+            parse_quantity(error["input"], unit)
+        except UnitError as reason:
+            return word, str(reason)
+    return word, ""
+
+
+def describe(error: Mapping[str, Any], model: type[BaseModel]) -> str:
+    """One error of pydantic as a line: where it is, what is expected and what was found."""
+    location = tuple(error["loc"])
+    at = path_text(location)
+    if error["type"] == "missing":
+        return f"{at} is missing"
+    if error["type"] == "extra_forbidden":
+        legal = names_at(model, location[:-1])
+        near = nearest(str(location[-1]), legal, 1)
+        return f"there is no {at}" + (f"; did you mean {near[0]}?" if near else "")
+    info = info_at(model, location)
+    expected, reason = explain(error, unit_of(info))
+    if not at:
+        return reason or expected
+    found = text_of(error["input"]) if _is_short(error["input"]) else "this"
+    return f"{at} cannot be {found}: " + (f"expected {expected}" if expected else reason)
+
+
+def _is_short(value: Any) -> bool:
+    return value is None or isinstance(value, (bool, int, float, str))
+
+
+def unit_of(info: FieldInfo | None) -> str:
+    """The unit that a field of a model was declared with, as text."""
+    extra = info.json_schema_extra if info is not None else None
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def path_text(path: Sequence[str | int]) -> str:
+    """``("tabs", 0, "plots")`` -> ``tabs[0].plots``."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return text.removeprefix(".")
+
+
+def info_at(model: type[BaseModel], location: Sequence[str | int]) -> FieldInfo | None:
+    """The field that a location lies in, or the innermost one that is known."""
+    found: FieldInfo | None = None
+    for depth, key in enumerate(location):
+        for owner in _models_at(model, location[:depth]):
+            found = owner.model_fields.get(str(key), found)
+    return found
+
+
+def names_at(model: type[BaseModel], location: Sequence[str | int]) -> tuple[str, ...]:
+    """The keys that are legal in the mapping at a location."""
+    names = [name for owner in _models_at(model, location) for name in owner.model_fields]
+    return tuple(dict.fromkeys(names))
+
+
+def _models_at(model: type[BaseModel], location: Sequence[str | int]) -> list[type[BaseModel]]:
+    """The models that may stand at a location, which may also name members of unions."""
+    types: list[Any] = [model]
+    for key in location:
+        types = _models(types)
+        inner: list[Any] = []
+        for each in types:
+            if isinstance(each, type) and issubclass(each, BaseModel):
+                info = each.model_fields.get(str(key))
+                inner += [info.annotation] if info is not None else []
+            else:
+                inner += [arg for arg in get_args(each)[-1:] if arg is not Ellipsis]
+                inner += [arg for arg in get_args(each)[:1] if get_args(each)[-1] is Ellipsis]
+        types = inner or types  # a member of a union is no step in the file
+    return [t for t in _models(types) if isinstance(t, type) and issubclass(t, BaseModel)]
+
+
+def _models(types: Iterable[Any]) -> list[Any]:
+    """The types with the members of unions in place of the unions."""
+    found: list[Any] = []
+    for each in types:
+        union = get_origin(each) in (Union, UnionType)
+        found += _models(get_args(each)) if union else [each]
+    return found
+
+
+@dataclass
+class Mistake:
+    """All errors of pydantic about one place; there are several where the type is a union."""
+
+    code: Code
+    path: Path_
+    where: Position
+    node: Node | None
+    """The wrong value; ``None`` where there is none, or it is the file as a whole."""
+    key: str = ""
+    """The key that is missing or unknown."""
+    expected: list[str] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    nearest: tuple[str, ...] = ()
+    fix: str = ""
+    location: Path_ = ()
+    """Where pydantic says it is, which also names the members of unions."""
+    kinds: list[str] = field(default_factory=list)
+    """Pydantic's names for the errors."""
+
+    @property
+    def found(self) -> str:
+        """The wrong value as YAML, cut off where it is long."""
+        if self.code is Code.UNKNOWN_PARAMETER:
+            return self.key
+        if self.node is None:
+            return ""
+        text = text_of(plain(self.node))
+        return text if len(text) <= 80 else f"{text[:77]}..."
+
+    def report(self, what: str, problems: Problems) -> None:
+        """Report the mistake in ``what``, such as ``a task``."""
+        at, owner = path_text(self.path), path_text(self.path[:-1]) or what
+        code = self.code
+        if code is Code.MISSING_PARAMETER:
+            code, message = Code.MISSING_KEY, f"{at} is missing"
+        elif code is Code.UNKNOWN_PARAMETER:
+            code, message = Code.UNKNOWN_KEY, f"{self.key!r} is not a key of {owner}"
+        elif self.node is None:
+            code, message = Code.BAD_VALUE, f"{what} contradicts itself"
+        else:
+            code, message = Code.BAD_VALUE, f"{at} cannot be {self.found}"
+        if self.reasons:
+            message = f"{message}: {'; '.join(self.reasons)}"
+        problems.add(
+            code,
+            message,
+            self.where,
+            at=at,
+            expected=" or ".join(self.expected),
+            found=self.found,
+            nearest=self.nearest,
+            fix=self.fix,
+        )
+
+
+def find_mistakes(error: ValidationError, model: type[BaseModel], tree: MapNode) -> list[Mistake]:
+    """What pydantic refused of a tree, each mistake once and without what only follows from another."""
+    found: dict[tuple[Code, Path_], Mistake] = {}
+    for each in error.errors(include_url=False):
+        mistake = _mistake(each, model, tree)
+        known = found.setdefault((mistake.code, mistake.path), mistake)
+        if known is not mistake:
+            known.expected += [text for text in mistake.expected if text not in known.expected]
+            known.reasons += [text for text in mistake.reasons if text not in known.reasons]
+            known.kinds += mistake.kinds
+            known.nearest, known.fix = known.nearest or mistake.nearest, known.fix or mistake.fix
+    everything = list(found.values())
+    return [
+        m for m in everything if not _is_explained(m, everything) and not _is_meant(m, everything)
+    ]
+
+
+def _mistake(error: Any, model: type[BaseModel], tree: MapNode) -> Mistake:
+    """One error of pydantic, at its place in the tree."""
+    kind, location = str(error["type"]), tuple(error["loc"])
+    path, node, entry = locate(tree, location)
+    info = info_at(model, location)
+    if kind == "missing":
+        key = str(location[-1])
+        fix = f"{key}: ..."
+        return Mistake(
+            Code.MISSING_PARAMETER, (*path, key), node.where, None, key, ["a value"], fix=fix,
+            location=location,
+        )  # fmt: skip
+    if kind == "extra_forbidden" and entry is not None:
+        legal = names_at(model, location[:-1])
+        near = nearest(entry.key, legal)
+        value = text_of(plain(entry.value))
+        fix = f"remove {entry.key!r}"
+        if near:
+            fix = fix_for_key(entry.key, value, entry.key_where, near[0])
+        return Mistake(
+            Code.UNKNOWN_PARAMETER, path, entry.key_where, None, entry.key, [listing(legal)],
+            nearest=near, fix=fix, location=location,
+        )  # fmt: skip
+    expected, reason = explain(error, unit_of(info))
+    mistake = Mistake(
+        Code.BAD_PARAMETER,
+        path,
+        node.where,
+        node if path else None,
+        location=location,
+        kinds=[kind],
+    )
+    mistake.expected += [expected] if expected else []
+    mistake.reasons += [reason] if reason else []
+    if isinstance(node, ScalarNode) and isinstance(node.value, str):
+        legal = tuple(word.strip("' ") for word in expected.replace(" or ", ",").split(","))
+        mistake.nearest = nearest(node.value, [word for word in legal if word])
+        if mistake.nearest and path:
+            mistake.fix = f"{path[-1]}: {mistake.nearest[0]}"
+    return mistake
+
+
+def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, Entry | None]:
+    """Follow a location of pydantic as far as the file has it; such a location also names the
+    members of unions, which are no keys of the file.
+
+    Returns:
+        The steps that the file has, the value there, and its entry if it is one of a mapping.
+    """
+    node: Node = root
+    entry = None
+    steps: list[str | int] = []
+    for step in location:
+        if isinstance(node, MapNode) and (found := node.get(str(step))) is not None:
+            entry, node = found, found.value
+            steps.append(str(step))
+        elif isinstance(node, ListNode) and isinstance(step, int) and step < len(node.items):
+            node, entry = node.items[step], None
+            steps.append(step)
+    return tuple(steps), node, entry
+
+
+def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:
+    """Whether a collection was refused only because of elements that other mistakes are about.
+
+    Where the type is a number or a mapping, pydantic reports the wrong element of a mapping, and
+    also that the mapping is not a number; the latter says nothing new.
+    """
+    depth = len(mistake.path)
+    return isinstance(mistake.node, (MapNode, ListNode)) and any(
+        len(other.path) > depth and other.path[:depth] == mistake.path for other in others
+    )
+
+
+def _is_meant(mistake: Mistake, others: Iterable[Mistake]) -> bool:
+    """Whether a missing key is given under a misspelt name."""
+    return mistake.code is Code.MISSING_PARAMETER and any(
+        other.code is Code.UNKNOWN_PARAMETER
+        and other.path[:-1] == mistake.path[:-1]
+        and other.nearest[:1] == (mistake.key,)
+        for other in others
+    )
