@@ -232,7 +232,7 @@ def with_results(translator, function, signature):
     file = f"<wrapped {len(linecache.cache)}>"
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
     scope = {"function": function, "__name__": __name__}
-    exec(compile(text, file, "exec"), scope)
+    exec(compile(text, file, "exec"), scope)  # noqa: S102  # of the text above
     wrapped = scope["wrapped"]
     wrapped.__module__ = __name__
     keep.append(wrapped)

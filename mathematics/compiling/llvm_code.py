@@ -89,7 +89,7 @@ NOTHING = Value(RecordType(tuple, ()), ())
 """What a kernel returns that returns nothing."""
 
 
-def number(value: float | int | bool) -> Value:
+def number(value: float | bool) -> Value:
     """A constant."""
     if isinstance(value, bool | np.bool_):
         return Value(BOOL, ("true" if value else "false",), bool(value))
@@ -124,13 +124,12 @@ def join(a: ArgumentType, b: ArgumentType) -> ArgumentType:
     """
     if a == b:
         return a
-    if isinstance(a, NumberType) and isinstance(b, NumberType):
-        return max(a, b, key=lambda kind: _RANK[kind.kind])
-    if isinstance(a, ArrayType) and isinstance(b, ArrayType):
-        if (a.dtype, a.dimensions) == (b.dtype, b.dimensions):
+    match a, b:
+        case NumberType(), NumberType():
+            return max(a, b, key=lambda kind: _RANK[kind.kind])
+        case ArrayType(), ArrayType() if (a.dtype, a.dimensions) == (b.dtype, b.dimensions):
             return ArrayType(a.dtype, a.dimensions, "A")
-    if isinstance(a, RecordType) and isinstance(b, RecordType):
-        if a.kind is b.kind and len(a.parts) == len(b.parts):
+        case RecordType(), RecordType() if a.kind is b.kind and len(a.parts) == len(b.parts):
             return RecordType(a.kind, tuple(map(join, a.parts, b.parts)))
     raise Refused(f"this is {_described(a)} here and {_described(b)} elsewhere")
 
@@ -437,9 +436,7 @@ class Code:
         if index.constant is not None:
             return Value(INT, (wrapped,))
         below = self.result(f"icmp slt i64 {index.parts[0]}, 0")
-        return Value(
-            INT, (self.result(f"select i1 {below}, i64 {wrapped}, i64 {index.parts[0]}"),)
-        )
+        return Value(INT, (self.result(f"select i1 {below}, i64 {wrapped}, i64 {index.parts[0]}"),))
 
     def element(self, value: Value, indices: Sequence[Value]) -> Value:
         """One element of an array as a number."""

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import ast
 import types as python_types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from collections.abc import Iterator
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from .arguments import ArgumentType, ArrayType, NumberType, RecordType
+from .arguments import ArgumentType, NumberType, RecordType
 from .known_functions import ELEMENTWISE, FUNCTIONS, apply, write_elements, write_product
 from .llvm_code import (
     BOOL,
@@ -130,8 +129,10 @@ class _Function:
         code = self._code
         names = [each.arg for each in self._tree.args.args]
         if len(names) != len(self._signature):
-            self._refuse(self._tree, f"takes {len(names)} arguments, and gets {len(self._signature)}")
-        parameters = []
+            self._refuse(
+                self._tree, f"takes {len(names)} arguments, and gets {len(self._signature)}"
+            )
+        parameters: list[str] = []
         for argument, kind in zip(names, self._signature, strict=True):
             parts = tuple(f"%a{len(parameters) + k}" for k in range(len(leaves(kind))))
             parameters += [f"{leaf} {part}" for leaf, part in zip(leaves(kind), parts, strict=True)]
@@ -335,7 +336,7 @@ class _Function:
 
     def _return(self, node: ast.Return) -> None:
         value = NOTHING if node.value is None else self._value(node.value)
-        if any(isinstance(each, ArrayType | RecordType) and each.parts for each in _parts(value)):
+        if not all(isinstance(each, NumberType) for each in _parts(value)):
             raise Refused("a kernel returns numbers, or a tuple of numbers")
         known = self._types.get(_RESULT, value.type)
         widest = join(known, value.type)
@@ -477,7 +478,9 @@ class _Function:
                 continue
             if part.step is not None:
                 raise Refused("a slice has no step in a kernel")
-            bounds = (None if each is None else self._value(each) for each in (part.lower, part.upper))
+            bounds = (
+                None if each is None else self._value(each) for each in (part.lower, part.upper)
+            )
             made.append(Slice(*bounds))
         return made
 
@@ -548,6 +551,8 @@ class _Function:
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
             raise Refused("a kernel passes arguments by position")
+        if not self._is_outer(node.func):
+            raise Refused(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
         arguments = [self._value(each) for each in node.args]
         if function in FUNCTIONS:
@@ -561,7 +566,7 @@ class _Function:
             return Value(kind, tuple(part for each in arguments for part in each.parts))
         made = self._callee(function, tuple(each.type for each in arguments))
         if made is None:
-            raise Refused(f"{ast.unparse(node.func)} is no kernel, and nothing that kernels may call")
+            raise Refused(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         return self._call_kernel(made, arguments)
 
     def _call_kernel(self, made: Translated, arguments: Sequence[Value]) -> Value:
@@ -594,6 +599,7 @@ class _Function:
         raise CompileError(f"kernel {name} does not compile: {file}:{line}: {text}")
 
 
+_NOT_CALLED = "no kernel, and nothing that kernels may call"
 _RESULT = "<result>"
 """The name under which the type of a function's result stands among those of its variables."""
 
@@ -613,10 +619,14 @@ def _is_flag(node: ast.expr) -> bool:
 def _only_counters(tree: ast.FunctionDef) -> set[str]:
     """The names that only loops assign."""
     counted = {
-        n.target.id for n in ast.walk(tree) if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
+        n.target.id
+        for n in ast.walk(tree)
+        if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
     }
     targets = {
-        id(n.target) for n in ast.walk(tree) if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
+        id(n.target)
+        for n in ast.walk(tree)
+        if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
     }
     others = {
         n.id

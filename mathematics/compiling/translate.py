@@ -7,7 +7,6 @@ reordering of sums and no fused multiply-add, so the machine code rounds as plai
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 from .arguments import HEADER, ArgumentType, ArrayType
@@ -143,8 +142,8 @@ def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...
             "done:",
             "  ret void",
             "}",
-            'attributes #0 = { nounwind }',
-            'attributes #1 = { nounwind willreturn memory(none) }',
+            "attributes #0 = { nounwind }",
+            "attributes #1 = { nounwind willreturn memory(none) }",
             '!0 = !{!"branch_weights", i32 1, i32 4000}',
         )
     )

@@ -53,7 +53,8 @@ def both(function: Callable[..., None], *arguments: Any) -> None:
     function(*plain)
     run(function, *arguments)
     for a, b in zip(arguments, plain, strict=True):
-        np.testing.assert_array_equal(a, b)
+        if isinstance(a, np.ndarray):
+            np.testing.assert_array_equal(a, b)
 
 
 @kernel
@@ -86,7 +87,8 @@ def test_whole_numbers_are_those_of_python(a: int, b: int) -> None:
 
 
 @given(
-    st.floats(-1e6, 1e6), st.floats(-1e3, 1e3).filter(lambda y: abs(y) > 1e-3) | st.sampled_from([0.5, -2.0])
+    st.floats(-1e6, 1e6),
+    st.floats(-1e3, 1e3).filter(lambda y: abs(y) > 1e-3) | st.sampled_from([0.5, -2.0]),
 )
 @settings(max_examples=300)
 def test_numbers_with_a_fraction_are_those_of_python(x: float, y: float) -> None:
@@ -220,9 +222,7 @@ def test_a_division_by_zero_is_pythons_error_and_ends_the_kernel(value: float) -
 
 
 @kernel
-def reads_late(out: Array) -> None:
-    if out[0] > 0.0:
-        late = 1.0
+def reads_unknown(out: Array) -> None:
     out[0] = never  # type: ignore[name-defined]  # noqa: F821
 
 
@@ -269,9 +269,9 @@ def has_list(out: Array) -> None:
 @pytest.mark.parametrize(
     ("function", "arguments", "text", "line"),
     [
-        (reads_late, (np.zeros(1),), "there is no never", 3),
+        (reads_unknown, (np.zeros(1),), "there is no never", 1),
         (mixes, (np.zeros(1),), "this is a number (float) here and an array of 1 dim", 3),
-        (copies, (np.zeros(2),), "out.copy is not known", 1),
+        (copies, (np.zeros(2),), "out.copy is no kernel, and nothing that kernels may call", 1),
         (returns_array, (np.zeros(2),), "a kernel returns numbers, or a tuple of numbers", 1),
         (indexes, (1.0, np.zeros(2)), "an index is a whole number; write int(...)", 1),
         (goes_over, (np.zeros(2), np.zeros(2)), "a loop goes over range(...)", 1),
