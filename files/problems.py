@@ -72,7 +72,7 @@ class Code(StrEnum):
     ROBOT = "robot"
     MACHINE = "machine"
     AGE = "age"
-    MISFIT = "misfit"
+    UNMET_REQUIREMENT = "unmet-requirement"
     OVERRIDE = "override"
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ..runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.signals import Field, Signal
@@ -55,17 +55,17 @@ class UnitBlock(Block):
     memory = State(Remembered, text="what the FMU remembers")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report start values that the FMU does not have."""
         assert isinstance(params, FmuParameters)
         try:
             found = describe(params.file, context.folder, params.outputs)
         except BlockError as error:
-            yield Misfit(str(error), "file")
+            yield UnmetRequirement(str(error), "file")
             return
         for name in params.start:
             if name not in found.settable:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{params.file} has no variable {name!r} that can be given a start value"
                     + nearest(name, found.settable),
                     f"start.{name}",
@@ -122,7 +122,7 @@ class UnitBlock(Block):
             self.request_stop(f"the FMU {self.params.file} asks for the end of the simulation")
         self.memory.steps[()] += 1
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Write the FMU's state into the block's own, where the FMU can give it."""
         if not self.described.kept or self._instance is None:
             return
@@ -137,7 +137,7 @@ class UnitBlock(Block):
         self.memory.data[...] = 0
         self.memory.data.view(np.uint8)[: len(state)] = np.frombuffer(state, np.uint8)
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Give the FMU its state back.
 
         Raises:
@@ -157,7 +157,7 @@ class UnitBlock(Block):
             "its state (canSerializeFMUState); only the start of a run can be gone back to"
         )
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         """Say if snapshots lack the FMU, and what it has warned of."""
         said = []
         if not self.described.kept:
@@ -206,7 +206,7 @@ class CoSimulation(UnitBlock):
     """
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,
@@ -276,7 +276,9 @@ def _class_for(found: Description, direct: bool) -> type[Block]:
     body: dict[str, Any] = {"__doc__": CoSimulation.__doc__, "__module__": CoSimulation.__module__}
     body |= _ports(found.inputs, found.outputs)
     body["described"] = found
-    body["fitted"] = vars(CoSimulation)["fitted"]  # as for every block whose ports are found
+    body["specialize"] = vars(CoSimulation)[
+        "specialize"
+    ]  # as for every block whose ports are found
     made = type("CoSimulation", (CoSimulation if direct else _WithoutFeedthrough,), body)
     _CLASSES.append(((found, direct), made))
     return made

@@ -56,7 +56,7 @@ class Outside(Block):
     params: OutsideParameters
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,

@@ -33,7 +33,7 @@ from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
 from ..robots.transmission import MotorGains, motor_gains
-from ..runtime.language.block import Misfit
+from ..runtime.language.block import UnmetRequirement
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.per_joint import PerJoint
 from ..runtime.language.signals import Field, Signal
@@ -77,7 +77,7 @@ def joint_gains(params: DriveGains, robot: RobotDescription) -> tuple[Array, Arr
     return stiffness, damping
 
 
-def gain_misfits(params: DriveGains, robot: RobotDescription) -> Iterator[Misfit]:
+def gain_requirements(params: DriveGains, robot: RobotDescription) -> Iterator[UnmetRequirement]:
     """Report gains that no drives can give the joints, unless the nearest ones are asked for."""
     if params.gains == "nearest":
         return
@@ -89,7 +89,7 @@ def gain_misfits(params: DriveGains, robot: RobotDescription) -> Iterator[Misfit
             continue
         found = motor_gains(robot, gains, "N m/rad" if name == "stiffness" else "N m s/rad")
         if not found.exact:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"no motor gains give {robot.name}'s joints this {name}, because motors share "
                 f"joints; with the nearest ones {_some(found)}",
                 parameter=name,

@@ -103,7 +103,7 @@ class Robot(Block, ABC):
     command = Input(JointCommand, text="what the drives are to do")
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,
@@ -157,7 +157,7 @@ class Robot(Block, ABC):
         return absent
 
     @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """``delay``: the delay from sensing to torque [s], for the graph to compensate."""
         return {"delay": cls.nominal_delay(params)}
 

@@ -24,7 +24,6 @@ from .arrays import (
     Rows3,
     Vector3,
 )
-from .constants import GRAVITY
 from .kernel import kernel
 from .rotations import rotate_about_axis
 
@@ -192,19 +191,6 @@ class Inertias(NamedTuple):
     turned: Matrix3
 
 
-class MotionTerms(NamedTuple):
-    """The terms of the equations of motion, as in ``DynamicsTerms``; ``com`` is a place."""
-
-    mass_matrix: Array2D
-    nonlinear_effects: Array1D
-    com: Vector3
-    com_velocity: Vector3
-    centroidal_matrix: Array2D
-    centroidal_drift: Array1D
-    linear_momentum: Vector3
-    angular_momentum: Vector3
-
-
 def inertias(n_joints: int) -> Inertias:
     """Memory for the inertias of a tree."""
     n = n_joints + 1
@@ -286,7 +272,7 @@ def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: 
 
 
 @kernel
-def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> None:
+def composite_inertias(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> None:
     """The inertia and the force of every body with all that it carries."""
     n_joints = motion.joint.shape[0]
     for body in range(n_joints + 1):
@@ -303,32 +289,6 @@ def weigh_bodies(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> Non
 
 
 @kernel
-def write_column(
-    column: int, spatial: Array1D, com: Vector3, rotation: Matrix3, scale: float, terms: MotionTerms
-) -> None:
-    """Write one column of the mass matrix's base rows and of the centroidal matrix.
-
-    Args:
-        spatial: the robot's spatial momentum per unit of that generalised velocity, (6,).
-        com: the place of the centre of mass, (3,).
-        rotation: of the base, (3, 3).
-    """
-    a, b, c = spatial[0] * scale, spatial[1] * scale, spatial[2] * scale
-    p, q, r = spatial[3] * scale, spatial[4] * scale, spatial[5] * scale
-    x, y, z = com[0], com[1], com[2]
-    centroidal = terms.centroidal_matrix
-    centroidal[0, column], centroidal[1, column], centroidal[2, column] = a, b, c
-    centroidal[3, column] = p - (y * c - z * b)
-    centroidal[4, column] = q - (z * a - x * c)
-    centroidal[5, column] = r - (x * b - y * a)
-    for k in range(3):
-        u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
-        linear, angular = u * a + v * b + w * c, u * p + v * q + w * r
-        terms.mass_matrix[k, column] = terms.mass_matrix[column, k] = linear
-        terms.mass_matrix[3 + k, column] = terms.mass_matrix[column, 3 + k] = angular
-
-
-@kernel
 def inner(a: Array1D, b: Array1D) -> float:
     """The inner product of two spatial vectors (6,)."""
     total = 0.0
@@ -338,117 +298,39 @@ def inner(a: Array1D, b: Array1D) -> float:
 
 
 @kernel
-def write_matrices(
-    tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array2D, scale: float,
-    terms: MotionTerms,
-) -> None:  # fmt: skip
-    """The mass matrix, with the inertia of the rotors, and the centroidal matrix.
-
-    Args:
-        rotors: the rotors' part of the mass matrix, in the joints' rows and columns.
-        scale: the factor on all masses and inertias but the rotors'.
-    """
-    n, first = motion.joint.shape[0], 6
-    rotation, spatial = motion.rotation[0], composite.spatial
-    base = composite.turned[0]
-    for k in range(3):
-        for row in range(3):
-            base[row] = rotation[row, k]
-        a, b, c = base[0], base[1], base[2]
-        moment, inertia = composite.moment[0], composite.inertia[0]
-        x, y, z = moment[0], moment[1], moment[2]
-        mass = composite.mass[0]
-        spatial[0], spatial[1], spatial[2] = mass * a, mass * b, mass * c
-        spatial[3], spatial[4], spatial[5] = y * c - z * b, z * a - x * c, x * b - y * a
-        write_column(k, spatial, terms.com, rotation, scale, terms)
-        spatial[0], spatial[1], spatial[2] = b * z - c * y, c * x - a * z, a * y - b * x
-        xx, yy, zz = inertia[0], inertia[1], inertia[2]
-        xy, xz, yz = inertia[3], inertia[4], inertia[5]
-        spatial[3] = xx * a + xy * b + xz * c
-        spatial[4] = xy * a + yy * b + yz * c
-        spatial[5] = xz * a + yz * b + zz * c
-        write_column(3 + k, spatial, terms.com, rotation, scale, terms)
-    for i in range(n):
-        for j in range(n):
-            terms.mass_matrix[first + i, first + j] = rotors[i, j]
-    for j in range(n):
-        momentum_of(composite, j + 1, motion.joint[j], spatial)
-        write_column(first + j, spatial, terms.com, rotation, scale, terms)
-        i = j
-        while i >= 0:
-            shared = scale * inner(motion.joint[i], spatial)
-            terms.mass_matrix[first + i, first + j] = rotors[i, j] + shared
-            terms.mass_matrix[first + j, first + i] = rotors[j, i] + shared
-            i = tree.parent[i] - 1
-
-
-@kernel
-def write_forces(motion: BodyMotion, composite: Inertias, scale: float, terms: MotionTerms) -> None:
-    """Bias forces, gravity included, the drift of the momentum, and the momentum itself."""
-    rotation, spatial, force = motion.rotation[0], composite.spatial, composite.force[0]
-    x, y, z = terms.com[0], terms.com[1], terms.com[2]
-    a, b, c = force[0], force[1], force[2]
-    drift = terms.centroidal_drift
-    drift[0], drift[1], drift[2] = scale * a, scale * b, scale * c
-    drift[3] = scale * (force[3] - (y * c - z * b))
-    drift[4] = scale * (force[4] - (z * a - x * c))
-    drift[5] = scale * (force[5] - (x * b - y * a))
-    for body in range(motion.joint.shape[0] + 1):
-        # Weight pulls down, so what carries it pushes up, at the centre of mass.
-        moment, carried = composite.moment[body], composite.force[body]
-        for k in range(6):
-            spatial[k] = carried[k]
-        spatial[2] = spatial[2] + GRAVITY * composite.mass[body]
-        spatial[3] = spatial[3] + GRAVITY * moment[1]
-        spatial[4] = spatial[4] - GRAVITY * moment[0]
-        if body > 0:
-            terms.nonlinear_effects[5 + body] = scale * inner(motion.joint[body - 1], spatial)
-            continue
-        for k in range(3):
-            u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
-            linear = u * spatial[0] + v * spatial[1] + w * spatial[2]
-            angular = u * spatial[3] + v * spatial[4] + w * spatial[5]
-            terms.nonlinear_effects[k] = scale * linear
-            terms.nonlinear_effects[3 + k] = scale * angular
-
-
-@kernel
-def write_momentum(velocity: Array1D, scale: float, mass: float, terms: MotionTerms) -> None:
-    """The momentum about the centre of mass, and its velocity, from the centroidal matrix.
-
-    Args:
-        velocity: the generalised velocity, (n_velocities,).
-        scale, mass: the factor on all masses, and their sum without it [kg].
-    """
-    for k in range(3):
-        linear, angular = 0.0, 0.0
-        for j in range(velocity.shape[0]):
-            linear += terms.centroidal_matrix[k, j] * velocity[j]
-            angular += terms.centroidal_matrix[3 + k, j] * velocity[j]
-        terms.linear_momentum[k], terms.angular_momentum[k] = linear, angular
-        terms.com_velocity[k] = linear / (scale * mass)
-
-
-@kernel
-def equations_of_motion(
-    tree: BodyTree,
-    motion: BodyMotion,
-    composite: Inertias,
-    rotors: Array2D,
-    scale: float,
-    velocity: Array1D,
-    terms: MotionTerms,
+def point_jacobian(
+    tree: BodyTree, motion: BodyMotion, body: int, place: Vector3, out: Array2D
 ) -> None:
-    """All terms of the equations of motion, of bodies that have been placed and moved.
+    """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
+    for row in range(3):
+        out[row, :] = 0.0
+    x, y, z = place[0], place[1], place[2]
+    for k in range(3):
+        a, b, c = (
+            motion.rotation[0, 0, k],
+            motion.rotation[0, 1, k],
+            motion.rotation[0, 2, k],
+        )
+        out[0, k], out[1, k], out[2, k] = a, b, c
+        out[0, 3 + k], out[1, 3 + k], out[2, 3 + k] = b * z - c * y, c * x - a * z, a * y - b * x
+    while body > 0:
+        joint = motion.joint[body - 1]
+        a, b, c = joint[3], joint[4], joint[5]
+        out[0, 5 + body] = joint[0] + (b * z - c * y)
+        out[1, 5 + body] = joint[1] + (c * x - a * z)
+        out[2, 5 + body] = joint[2] + (a * y - b * x)
+        body = tree.parent[body - 1]
 
-    Args:
-        rotors: the rotors' part of the mass matrix (n_joints, n_joints).
-        scale: the factor on all masses and inertias but the rotors'.
-        velocity: the generalised velocity: the base's linear and angular one in its own frame, then
-            the joints', (6 + n_joints,).
-    """
-    weigh_bodies(tree, motion, composite)
-    terms.com[:] = composite.moment[0] / composite.mass[0]
-    write_matrices(tree, motion, composite, rotors, scale, terms)
-    write_forces(motion, composite, scale, terms)
-    write_momentum(velocity, scale, composite.mass[0], terms)
+
+@kernel
+def rotation_jacobian(tree: BodyTree, motion: BodyMotion, body: int, out: Array2D) -> None:
+    """The angular velocity [rad/s, world] of a body for every generalised velocity, (3, n_velocities)."""
+    out[:, :] = 0.0
+    for row in range(3):
+        for k in range(3):
+            out[row, 3 + k] = motion.rotation[0, row, k]
+    carried = body
+    while carried > 0:
+        for row in range(3):
+            out[row, 5 + carried] = motion.joint[carried - 1, 3 + row]
+        carried = int(tree.parent[carried - 1])

@@ -1,4 +1,4 @@
-"""Balance of a standing robot: its stability margin, where it must step when that is lost, and how a foot gets there.
+"""Balance of a standing robot: its stability margin, and where it must step when that is lost.
 
 The linear inverted pendulum of height h has the natural frequency w, w^2 = g / h. Its capture point
 
@@ -18,12 +18,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array1D, Array2D, Flags1D, Indices1D, Vector2
+from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .constants import GRAVITY
 from .kernel import kernel
-
-_SHORTEST = 0.03
-"""The motion of a foot counts on at least this much time [s], which limits its feedback gains."""
 
 
 @kernel
@@ -103,45 +100,6 @@ def farthest_foot(
 
 
 @kernel
-def choose_foothold(
-    capture: Vector2,
-    rate: float,
-    left: float,
-    beyond: float,
-    points: Array2D,
-    foot_of_point: Indices1D,
-    swing: int,
-    n_feet: int,
-    nearest: Vector2,
-    scratch: Vector2,
-    out: Array1D,
-) -> None:
-    """Where the foot ``swing`` should land: at the capture point of that instant, and beyond.
-
-    The force is taken to act where the other feet are nearest to the capture point.
-
-    Args:
-        capture: the capture point now [m], (2,).
-        rate: the pendulum's frequency [1/s].
-        left: time until the foot lands [s].
-        beyond: how far beyond it lands, as a share of the way from the force to the capture point.
-        nearest, scratch: scratch, (2,).
-        out: becomes the foothold; its height stays, (3,).
-    """
-    least = math.inf
-    for foot in range(n_feet):
-        if foot == swing:
-            continue
-        distance = nearest_in_foot(points, foot_of_point, foot, capture, scratch)
-        if distance < least:
-            least = distance
-            nearest[0], nearest[1] = scratch[0], scratch[1]
-    grown = (1.0 + beyond) * math.exp(rate * left)
-    for k in range(2):
-        out[k] = nearest[k] + grown * (capture[k] - nearest[k])
-
-
-@kernel
 def limit_foothold(
     stance: Array1D,
     heading: float,
@@ -196,55 +154,6 @@ def spread_to_feet(stance: Flags1D, foot: Indices1D, n_feet: int, out: Flags1D) 
                 out[i] = stands
         count += 1 if stands else 0
     return count
-
-
-@kernel
-def swing_points(
-    swing: int,
-    foot: Indices1D,
-    offset: Array2D,
-    place: Array1D,
-    heading: float,
-    elapsed: float,
-    duration: float,
-    height: float,
-    position: Array2D,
-    velocity: Array2D,
-    stance: Flags1D,
-    stepping: Flags1D,
-    acceleration: Array2D,
-) -> None:
-    """The acceleration of the points of the foot ``swing`` to its place, with a flat sole.
-
-    In the first half of the step the sole rises by ``height``. In the second it comes down as if the
-    ground were lower by that, so it is still moving when it meets the ground.
-
-    Args:
-        foot: the foot of every point, (n,).
-        offset: of the points from the centre of the sole [m, foot], (n, 3).
-        place, heading: where the centre of the sole goes [m, world], (3,), and its heading [rad].
-        elapsed, duration: of the step [s].
-        position, velocity: of the points [m, m/s, world], (n, 3).
-        stance: becomes false for these points, (n,).
-        stepping: becomes true for them.
-        acceleration: becomes theirs [m/s^2, world], (n, 3).
-    """
-    cosine, sine = math.cos(heading), math.sin(heading)
-    left = max(duration - elapsed, _SHORTEST)
-    rises = elapsed < 0.5 * duration
-    for i in range(foot.shape[0]):
-        if foot[i] != swing:
-            continue
-        stance[i], stepping[i] = False, True
-        x = place[0] + cosine * offset[i, 0] - sine * offset[i, 1]
-        y = place[1] + sine * offset[i, 0] + cosine * offset[i, 1]
-        z, until = place[2] - height, left
-        if rises:
-            z = place[2] + height
-            until = max(0.5 * duration - elapsed, _SHORTEST)
-        acceleration[i, 0] = approach(position[i, 0], velocity[i, 0], x, left)
-        acceleration[i, 1] = approach(position[i, 1], velocity[i, 1], y, left)
-        acceleration[i, 2] = approach(position[i, 2], velocity[i, 2], z, until)
 
 
 @kernel

@@ -53,7 +53,7 @@ def propagate(
 
 
 @kernel
-def turn(orientation: Array1D, x: float, y: float, z: float) -> None:
+def rotate_in_world(orientation: Array1D, x: float, y: float, z: float) -> None:
     """Rotate an orientation by a small rotation vector [rad, world], to second order.
 
     The quaternion is normalised afterwards.
@@ -88,11 +88,11 @@ def correct_tilt_from_gravity(
     size = math.sqrt(x * x + y * y + z * z)
     if size < 1e-3:
         return
-    turn(orientation, gain * y / size, -gain * x / size, 0.0)
+    rotate_in_world(orientation, gain * y / size, -gain * x / size, 0.0)
 
 
 @kernel
-def upright(specific_force: Array1D, orientation: Array1D) -> None:
+def orientation_from_gravity(specific_force: Array1D, orientation: Array1D) -> None:
     """The orientation, with no rotation about the vertical, whose specific force points upwards."""
     x, y, z = specific_force[0], specific_force[1], specific_force[2]
     size = math.sqrt(x * x + y * y + z * z)
@@ -145,7 +145,7 @@ def misalignment(
 
 
 @kernel
-def weigh(
+def weigh_contacts(
     world_rates: Array2D, active: Flags1D, velocity: Array1D, gate: float, weights: Array1D
 ) -> float:
     """Weigh each active point by how likely it stands still; returns the largest weight.
@@ -185,7 +185,7 @@ class StandingPoints(NamedTuple):
 
 
 @kernel
-def stand_on(
+def correct_by_contacts(
     points: StandingPoints,
     velocity_gain: float,
     position_gain: float,

@@ -200,7 +200,7 @@ def remove_contact(point: int, covariance: Array2D) -> None:
 
 
 @kernel
-def place_jacobian(world_jacobian: Array2D, offsets: int, sensitivity: Array2D) -> None:
+def place_jacobian(world_jacobian: Array2D, offsets: int, jacobian: Array2D) -> None:
     """The measurement Jacobian H (3, n) of a point's position by leg kinematics.
 
     The columns of the point itself are left to ``measurement_jacobian``.
@@ -208,20 +208,20 @@ def place_jacobian(world_jacobian: Array2D, offsets: int, sensitivity: Array2D) 
     Args:
         world_jacobian: R J, (3, n_joints).
         offsets: the index of the first encoder offset in the error.
-        sensitivity: becomes H.
+        jacobian: becomes H.
     """
     for i in range(3):
         for k in range(offsets):
-            sensitivity[i, k] = 0.0
-        sensitivity[i, 6 + i] = -1.0
+            jacobian[i, k] = 0.0
+        jacobian[i, 6 + i] = -1.0
         for k in range(world_jacobian.shape[1]):
-            sensitivity[i, offsets + k] = world_jacobian[i, k]
+            jacobian[i, offsets + k] = world_jacobian[i, k]
 
 
 @kernel
 def add_contact(
     point: int,
-    sensitivity: Array2D,
+    jacobian: Array2D,
     noise: Matrix3,
     covariance: Array2D,
     rows: Array2D,
@@ -230,13 +230,13 @@ def add_contact(
     """Add a contact point to the covariance, at the position measured by leg kinematics.
 
     Args:
-        sensitivity: H from ``place_jacobian``; the error of the new point is -H e plus noise.
+        jacobian: H from ``place_jacobian``; the error of the new point is -H e plus noise.
         noise: covariance of the measured position [m^2], (3, 3).
         rows, corner: scratch, (3, n) and (3, 3).
     """
     first = 9 + 3 * point
-    multiply_sparse(sensitivity, covariance, rows)
-    multiply_transposed(rows, sensitivity, corner)
+    multiply_sparse(jacobian, covariance, rows)
+    multiply_transposed(rows, jacobian, corner)
     for i in range(3):
         for k in range(covariance.shape[0]):
             rows[i, k] = -rows[i, k]
@@ -262,18 +262,18 @@ def innovation(point: int, world_point: Vector3, vectors: Rows3, residual: Vecto
 
 
 @kernel
-def measurement_jacobian(point: int, sensitivity: Array2D) -> None:
+def measurement_jacobian(point: int, jacobian: Array2D) -> None:
     """Fill in the point's own columns of the measurement Jacobian from ``place_jacobian``."""
     first = 9 + 3 * point
     for i in range(3):
         for k in range(3):
-            sensitivity[i, first + k] = 1.0 if i == k else 0.0
+            jacobian[i, first + k] = 1.0 if i == k else 0.0
 
 
 @kernel
 def height_row(
     row: int, point: int, reference: int, height: float, vectors: Array2D,
-    sensitivity: Array2D, residual: Array1D,
+    jacobian: Array2D, residual: Array1D,
 ) -> None:  # fmt: skip
     """One row of H and r for the measured height of a point, over another point or the world.
 
@@ -283,21 +283,21 @@ def height_row(
         reference: the index of the other point; negative for the height over the world's origin.
         height: the measured height [m].
     """
-    sensitivity[row, :] = 0.0
+    jacobian[row, :] = 0.0
     x, y = vectors[2 + point, 0], vectors[2 + point, 1]
     z = vectors[2 + point, 2]
-    sensitivity[row, 9 + 3 * point + 2] = 1.0
+    jacobian[row, 9 + 3 * point + 2] = 1.0
     if reference >= 0:
         x -= vectors[2 + reference, 0]
         y -= vectors[2 + reference, 1]
         z -= vectors[2 + reference, 2]
-        sensitivity[row, 9 + 3 * reference + 2] = -1.0
-    sensitivity[row, 0], sensitivity[row, 1] = y, -x
+        jacobian[row, 9 + 3 * reference + 2] = -1.0
+    jacobian[row, 0], jacobian[row, 1] = y, -x
     residual[row] = height - z
 
 
 @kernel
-def world_definition_jacobian(levers: Array2D, vectors: Rows3, sensitivity: Array2D) -> None:
+def world_definition_jacobian(levers: Array2D, vectors: Rows3, jacobian: Array2D) -> None:
     """The measurement Jacobian H (3, n) of the world frame's definition by the feet.
 
     The first two rows put the world's origin at the mean x and y of the points, the third puts its
@@ -310,7 +310,7 @@ def world_definition_jacobian(levers: Array2D, vectors: Rows3, sensitivity: Arra
     """
     n, total = levers.shape[0], 0.0
     for row in range(3):
-        sensitivity[row, :] = 0.0
+        jacobian[row, :] = 0.0
     for point in range(n):
         ahead, aside = levers[point, 0], levers[point, 1]
         total += ahead * ahead + aside * aside
@@ -318,15 +318,15 @@ def world_definition_jacobian(levers: Array2D, vectors: Rows3, sensitivity: Arra
         column = 9 + 3 * point
         x, y = vectors[2 + point, 0], vectors[2 + point, 1]
         # The error of a point's position is xi_d plus the effect of the rotation error about z.
-        sensitivity[0, column] = 1.0 / n
-        sensitivity[0, 2] -= y / n
-        sensitivity[1, column + 1] = 1.0 / n
-        sensitivity[1, 2] += x / n
+        jacobian[0, column] = 1.0 / n
+        jacobian[0, 2] -= y / n
+        jacobian[1, column + 1] = 1.0 / n
+        jacobian[1, 2] += x / n
         if total > 0.0:
             ahead, aside = levers[point, 0] / total, levers[point, 1] / total
-            sensitivity[2, column] = -aside
-            sensitivity[2, column + 1] = ahead
-            sensitivity[2, 2] += x * ahead + y * aside
+            jacobian[2, column] = -aside
+            jacobian[2, column + 1] = ahead
+            jacobian[2, 2] += x * ahead + y * aside
 
 
 @kernel
@@ -367,23 +367,23 @@ def invert(matrix: Array2D, out: Array2D) -> None:
 
 
 @kernel
-def weigh(
-    covariance: Array2D, sensitivity: Array2D, noise: Matrix3, residual: Vector3,
-    seen: Rows3, inverse: Matrix3, spare: Matrix3,
+def squared_distance(
+    covariance: Array2D, jacobian: Array2D, noise: Matrix3, residual: Vector3,
+    cross_covariance: Rows3, inverse: Matrix3, spare: Matrix3,
 ) -> float:  # fmt: skip
     """The squared Mahalanobis distance r' S^-1 r of a residual, with S = H P H' + N.
 
     If the model holds it is chi-squared distributed with three degrees of freedom.
 
     Args:
-        sensitivity: H, (3, n).
+        jacobian: H, (3, n).
         noise: N, (3, 3).
         residual: r, (3,).
-        seen, inverse: become P H' (n, 3) and S^-1 (3, 3), for ``correct``.
+        cross_covariance, inverse: become P H' (n, 3) and S^-1 (3, 3), for ``update_covariance``.
         spare: scratch (3, 3).
     """
-    multiply_transposed(covariance, sensitivity, seen)
-    multiply_sparse(sensitivity, seen, spare)
+    multiply_transposed(covariance, jacobian, cross_covariance)
+    multiply_sparse(jacobian, cross_covariance, spare)
     for i in range(3):
         spare[i, :] += noise[i]
     invert(spare, inverse)
@@ -395,27 +395,27 @@ def weigh(
 
 
 @kernel
-def correct(
-    covariance: Array2D, sensitivity: Array2D, noise: Array2D, residual: Array1D,
-    seen: Array2D, inverse: Array2D, gain: Array2D, correction: Array1D,
+def update_covariance(
+    covariance: Array2D, jacobian: Array2D, noise: Array2D, residual: Array1D,
+    cross_covariance: Array2D, inverse: Array2D, gain: Array2D, correction: Array1D,
 ) -> None:  # fmt: skip
-    """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``weigh``.
+    """Update the covariance in Joseph's form, (I - K H) P (I - K H)' + K N K', after ``squared_distance``.
 
     In this form the result stays positive whatever the rounding errors of K. It is made symmetric
     to the last bit.
 
     Args:
-        seen, inverse: from ``weigh``; the first is overwritten.
+        cross_covariance, inverse: from ``squared_distance``; the first is overwritten.
         gain: becomes K, (n, 3).
         correction: becomes K r, (n,).
     """
-    multiply_matrices(seen, inverse, gain)
+    multiply_matrices(cross_covariance, inverse, gain)
     multiply_vector(gain, residual, correction)
-    add_outer(-1.0, gain, seen, covariance)  # (I - K H) P
-    multiply_transposed(covariance, sensitivity, seen)
-    add_outer(-1.0, seen, gain, covariance)
-    multiply_matrices(gain, noise, seen)
-    add_outer(1.0, seen, gain, covariance)
+    add_outer(-1.0, gain, cross_covariance, covariance)  # (I - K H) P
+    multiply_transposed(covariance, jacobian, cross_covariance)
+    add_outer(-1.0, cross_covariance, gain, covariance)
+    multiply_matrices(gain, noise, cross_covariance)
+    add_outer(1.0, cross_covariance, gain, covariance)
     make_symmetric(covariance)
 
 

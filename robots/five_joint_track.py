@@ -84,7 +84,7 @@ class LegScratch(NamedTuple):
 
 
 class LegSettings(NamedTuple):
-    """Settings that may change during a run, each an array of one element.
+    """Settings that may change during a run, each an array without a dimension.
 
     ``softness`` [m], ``turn_length`` [m] and ``damping`` [m] are those of ``inverse`` and
     ``inverse_velocity``; ``level`` says where the hip's yaw is kept; ``speed_limit`` [rad/s] limits
@@ -92,12 +92,12 @@ class LegSettings(NamedTuple):
     sole first.
     """
 
-    softness: Array1D
-    turn_length: Array1D
-    damping: Array1D
-    level: Array1D
-    speed_limit: Array1D
-    slides: Flags1D
+    softness: Array0D
+    turn_length: Array0D
+    damping: Array0D
+    level: Array0D
+    speed_limit: Array0D
+    slides: Flags0D
 
 
 def leg_geometry(leg: Leg, margin: float) -> LegGeometry:
@@ -110,15 +110,6 @@ def leg_scratch() -> LegScratch:
     """Zero memory for one leg."""
     shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5), (6, 5), (3, 5), (5, 5))
     return LegScratch(*(np.zeros(shape) for shape in shapes))
-
-
-def leg_settings() -> LegSettings:
-    """Settings that are all zero."""
-    numbers = [np.zeros(1) for _ in range(5)]
-    softness, turn_length, damping, level, speed_limit = numbers
-    return LegSettings(
-        softness, turn_length, damping, level, speed_limit, np.zeros(1, dtype=np.bool_)
-    )
 
 
 @kernel
@@ -166,7 +157,7 @@ def follow_foot(
         target: out; only the leg's joints are written.
     """
     angles, speeds, turn, velocity = scratch.angles, scratch.speeds, scratch.turn, scratch.velocity
-    softness, level = settings.softness[0], settings.level[0]
+    softness, level = settings.softness, settings.level
     yaw, yaw_rate = kept[leg.joints[0]], kept_rates[leg.joints[0]]
     inside, share = inverse(
         leg.hip,
@@ -182,7 +173,7 @@ def follow_foot(
     )
     target.reachable[number] = inside
     velocity[:] = min(max(foot.velocity, -_FASTEST), _FASTEST)  # type: ignore[assignment]  # of each element
-    if settings.slides[0] and not inside:
+    if settings.slides and not inside:
         slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, foot.position, foot.rotation, softness, yaw,
             level, scratch.place, angles,
@@ -195,10 +186,10 @@ def follow_foot(
     slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
     yaw_held = 1.0 - yaw_share(math.cos(angles[1]), level)
     inverse_velocity(
-        scratch.jacobian, turn, velocity, scratch.rate, settings.turn_length[0],
-        settings.damping[0], yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
+        scratch.jacobian, turn, velocity, scratch.rate, settings.turn_length,
+        settings.damping, yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
     )  # fmt: skip
-    limit = settings.speed_limit[0]
+    limit = settings.speed_limit
     for i in range(5):
         joint, angle, speed = leg.joints[i], angles[i], speeds[i]
         held = angle <= leg.limits[i, 0] or angle >= leg.limits[i, 1]

@@ -413,14 +413,14 @@ def follow_limb(
         target: out; only the limb's joints are written.
     """
     weights, starts, angles, twist = scratch.weights, scratch.starts, scratch.angles, scratch.twist
-    n, slides = limb.joints.shape[0], bool(settings.slides[0])
+    n, slides = limb.joints.shape[0], settings.slides
     for i in range(n):
         joint = limb.joints[i]
         felt = min(max(measured[joint], -_FASTEST), _FASTEST)
         starts[0, i] = found[joint] if known[()] else felt
         starts[1, i] = felt
         starts[2, i] = limb.standing[i]
-    weights[0], weights[1], weights[2] = 1.0, 1.0, settings.turn_length[0]
+    weights[0], weights[1], weights[2] = 1.0, 1.0, settings.turn_length
     square = reach(
         limb.links, limb.tip, limb.limits, scratch.target, weights, starts, 3, _STEPS,
         scratch.work, angles,
@@ -437,9 +437,9 @@ def follow_limb(
         twist[k] = min(max(foot.velocity[k], -_FASTEST), _FASTEST)
     limb_velocity(
         limb.links, limb.tip, limb.limits, scratch.target, weights, angles, twist,
-        settings.damping[0], scratch.work, scratch.speeds,
+        settings.damping, scratch.work, scratch.speeds,
     )  # fmt: skip
-    limit = settings.speed_limit[0]
+    limit = settings.speed_limit
     for i in range(n):
         joint, speed = limb.joints[i], scratch.speeds[i]
         target.position[joint] = angles[i]

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import field_validator
 
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Context, Misfit
+from ..runtime.language.block import Block, Context, UnmetRequirement
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters, parameter
 from .codec import Codec, MessageType
@@ -76,15 +76,14 @@ class Ros2Block(Block):
     params: Ros2Parameters
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """Neither the domain nor the depth is a dimension."""
         return {}
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a type that is not known, and sizes and texts that do not fit it."""
+        robot = context.robot
         assert isinstance(params, Ros2Parameters)
         sizes = {} if robot is None else dict(robot.dimensions)
         try:
@@ -98,7 +97,7 @@ class Ros2Block(Block):
             if not missing:
                 Codec(found, sizes, texts_of(params, robot, found))
         except BlockError as error:
-            yield Misfit(str(error), parameter="type", found=params.type)
+            yield UnmetRequirement(str(error), parameter="type", found=params.type)
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

@@ -55,7 +55,7 @@ class Publish(Ros2Block):
     message: Signal
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,

@@ -61,7 +61,7 @@ class Subscribe(Ros2Block):
     health = Output(TopicHealth, text="ages and counts")
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,

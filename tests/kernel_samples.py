@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from aloft.blocks.control import followed_plan, frames
+from aloft.blocks.control import frames
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
+from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import RobotTruth
 from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
-from aloft.mathematics.joint_feedback import Feedback, Motion, SoftStops
 from aloft.mathematics.landing_law import LandingCost, flight_map
 from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
@@ -97,7 +97,7 @@ LIMB_GEOMETRY = limb_geometry(find_robot("bruce"), 0, 0.05)
 FOOT = FootMotion(np.array([0.03, -0.07, -0.28]), np.array([0.5, -0.2, 0.9]), np.eye(3))
 FOLLOWING = (
     LegSettings(
-        *np.array([[0.005], [0.3], [3e-4], [0.3], [30.0]]), np.zeros(1, np.bool_)
+        *(np.array(value) for value in (0.005, 0.3, 3e-4, 0.3, 30.0)), np.array(False)
     ),
     limb_memory(5)._replace(target=TARGET.copy(), twist=0.1 * NORMAL(6)),
     LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
@@ -105,28 +105,24 @@ FOLLOWING = (
 DRAW = np.random.default_rng(4).standard_normal
 BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
 ROW = tuple(as_record(each.allocate({"n_feet": 2})) for each in (JumpRecord, JumpSeries))
-FOLLOWED = (
-    followed_plan.Following(*np.array([[0.009], [0.08], [0.005]])),
-    followed_plan.Soles(
-        np.tile(np.eye(3), (2, 1, 1)),
-        np.array([4, 9]),
-        np.array([1.0, -1.0]),
-        -2.0 * np.ones(2),
-        2.0 * np.ones(2),
-    ),
-    followed_plan.PlannedJoints(
-        np.array(3),
-        np.array(1.0),
-        np.array(0.7),
-        np.array(1.05),
-        np.array([0.02, 0.2, -0.03, 0.98]),
-        DRAW(10),
-        DRAW(10),
-        DRAW(10),
-    ),
-)
-FLOWN = followed_plan.Flown(np.array(True), np.array(0.998), *DRAW((3, 10)))
-LEG_TARGETS = LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_))
+FOLLOWED = records(
+    {"rotation": np.tile(np.eye(3), (2, 1, 1))},
+    {
+        "time": 1.0, "lift_off_time": 0.7, "touchdown_time": 1.05, "phase": 3,
+        "orientation": [0.02, 0.2, -0.03, 0.98], "joint_position": DRAW(10),
+        "joint_velocity": DRAW(10), "joint_acceleration": DRAW(10),
+    },
+    {"position": np.zeros(10), "velocity": np.zeros(10), "reachable": np.zeros(2, bool)},
+    {"plan_lead": 0.009, "level_time": 0.08, "late_time": 0.005},
+    {
+        "sole_joint": [4, 9], "sole_axis": [1.0, -1.0], "sole_lowest": [-2.0, -2.0],
+        "sole_highest": [2.0, 2.0],
+    },
+    {
+        "flew": True, "flown_time": 0.998, "flown_position": DRAW(10), "flown_velocity": DRAW(10),
+        "flown_acceleration": DRAW(10),
+    },
+)  # fmt: skip
 FALLING = records(
     {
         "com": [0.1, 0.0, 0.5], "com_velocity": [0.1, 0.0, -0.9], "angular_momentum": [0.0, 0.9, 0.0],
@@ -156,7 +152,7 @@ UNUSED = {
     "aloft.blocks.control.frames.update_frame": (
         MODEL[0], TREE, body_motion(10), 5, np.array([0.1, -0.2, 0.3]), FRAME,
     ),
-    "aloft.blocks.control.frames.write_rotation_jacobian": (
+    "aloft.mathematics.body_dynamics.rotation_jacobian": (
         TREE, body_motion(10), 5, np.zeros((3, 16)),
     ),
     "aloft.blocks.control.tasks.frame_position.FramePosition.error": (
@@ -182,13 +178,17 @@ UNUSED = {
     ),
     "aloft.blocks.jumping.plan_progress.value_at": (*ROTATION[:2], 1.23),
     "aloft.blocks.jumping.plan_progress.turned_beyond": (np.eye(3), np.array([0.0, 0.1, 0.0, 0.99])),
-    "aloft.blocks.control.followed_plan.follow_plan": (*FOLLOWED, FLOWN, LEG_TARGETS),
-    "aloft.blocks.control.followed_plan.keeps_acceleration": (FOLLOWED[0], FOLLOWED[2], FLOWN),
-    "aloft.blocks.control.followed_plan.go_on": (FOLLOWED[0], FOLLOWED[2], FLOWN, LEG_TARGETS),
-    "aloft.blocks.control.followed_plan.share_of_lead": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.planned_pitch": FOLLOWED[2:],
-    "aloft.blocks.control.followed_plan.turned_too_far": (1, FOLLOWED[1], 0.1),
-    "aloft.blocks.control.followed_plan.level_sole": (1, 0.08, *FOLLOWED[1:], 0.1, LEG_TARGETS),
+    "aloft.blocks.control.safety_monitor.first_bad_switch": records({"fault": [0, 0, 2, 0]}),
+    "aloft.blocks.control.leg_inverse_kinematics.follow_plan": FOLLOWED,
+    "aloft.blocks.control.leg_inverse_kinematics.continue_flight": (*FOLLOWED[1:4], FOLLOWED[5]),
+    "aloft.blocks.control.leg_inverse_kinematics.extrapolate": (*DRAW((3, 10)), 0.01, FOLLOWED[2]),
+    "aloft.blocks.control.leg_inverse_kinematics.keeps_acceleration": (
+        FOLLOWED[1], FOLLOWED[3], FOLLOWED[5],
+    ),
+    "aloft.blocks.control.leg_inverse_kinematics.lead_share": FOLLOWED[1:2],
+    "aloft.blocks.control.leg_inverse_kinematics.planned_pitch": (np.array([0.02, 0.2, -0.03, 0.98]),),
+    "aloft.blocks.control.leg_inverse_kinematics.excess_pitch": (np.eye(3), 0.1),
+    "aloft.blocks.control.leg_inverse_kinematics.level_sole": (1, *FOLLOWED[:5], 0.1),
     "aloft.blocks.control.balance_target.correct_place": PLACE,
     "aloft.blocks.jumping.capture_step.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_step.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
@@ -205,13 +205,14 @@ UNUSED = {
     "aloft.mathematics.capture_step.farthest_foot": (
         SOLES, np.array([0, 0, 1, 1]), 2, np.array([0.1, 0.02]), np.zeros(2),
     ),
-    "aloft.mathematics.capture_step.choose_foothold": (
-        np.array([-0.1, 0.02]), 6.0, 0.1, 0.1, SOLES, np.array([0, 0, 1, 1]), 1, 2, np.zeros(2),
-        np.zeros(2), np.zeros(3),
+    "aloft.blocks.jumping.capture_step.choose_foothold": (
+        *STEPPING[:3], STEP_SCRATCH, 1, 6.0, 0.1, np.zeros(3),
     ),
+    "aloft.blocks.jumping.capture_step.swing_points": (*STEPPING, STEP_PHASE, 1),
     "aloft.mathematics.capture_step.limit_foothold": (
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
+    "aloft.blocks.scoring.estimator_score.record_landing": (as_record(EstimatorRecord.allocate()),),
     "aloft.blocks.scoring.footing.unroll": (
         Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
     ),
@@ -233,11 +234,6 @@ UNUSED = {
         ),
     ),
     "aloft.mathematics.capture_step.approach": (0.1, -0.3, 0.2, 0.05),
-    "aloft.mathematics.capture_step.swing_points": (
-        1, np.array([0, 0, 1, 1]), np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2),
-        np.array([-0.1, 0.1, 0.0]), 0.1, 0.03, 0.13, 0.015, SOLES, NORMAL((4, 3)),
-        np.ones(4, bool), np.zeros(4, bool), np.zeros((4, 3)),
-    ),
     "aloft.mathematics.landing_law.map_flight": (
         np.vstack([NORMAL((3, 16)), np.hstack([REGULAR, NORMAL((3, 13))])]), NORMAL((4, 3, 16)),
         np.eye(3), 4.8, 0.5, flight_map(10, 4),
@@ -305,16 +301,22 @@ UNUSED = {
     ),
     "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
     "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
-    "aloft.mathematics.joint_feedback.integrate_accelerations": (
-        0.002, 0.02, np.ones(10), Motion(np.ones(10), np.ones(10)), Motion(np.ones(10), np.ones(10)),
+    "aloft.blocks.control.joint_pd.add_friction": (
+        *records(
+            {"velocity": POSE[0]}, {"torque": np.ones(3)}, {"friction_speed": 0.3},
+            {"friction": np.ones(3), "viscous_friction": POSE[1]},
+        ),
     ),
-    "aloft.mathematics.joint_feedback.add_friction": (
-        np.linspace(-1.0, 1.0, 10), np.full(10, 0.07), np.full(10, 0.01), 0.3, np.ones(10),
-    ),
-    "aloft.mathematics.joint_feedback.add_soft_stops": (
-        np.linspace(-1.0, 1.0, 5),
-        SoftStops(np.tile([-0.8, 0.7], (5, 1)), np.array([0.1]), np.array([2.0]), np.full(5, 60.0), np.full(5, 1.5)),
-        Feedback(*(np.full(5, x) for x in (40.0, 0.2, 1.0, 0.3))),
+    "aloft.blocks.control.joint_pd.add_soft_stops": (
+        *records(
+            {"position": [-1.02, 0.2, 0.99]},
+            {name: np.ones(3) for name in ("stiffness", "position", "damping", "velocity")},
+            {"stop_margin": 0.05, "stop_gain": 2.0},
+            {
+                "limits": np.tile([-1.0, 1.0], (3, 1)), "flight_stiffness": np.ones(3),
+                "flight_damping": np.ones(3),
+            },
+        ),
     ),
     "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),

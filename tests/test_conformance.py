@@ -6,7 +6,7 @@ from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
-from aloft.runtime.testing.conformance import check_block, conformance_cases, misfits
+from aloft.runtime.testing.conformance import check_block, conformance_cases, unmet_messages
 
 OTHERS = [
     pytest.param(name, marks=() if name == "go2" else pytest.mark.long)
@@ -33,10 +33,10 @@ BEYOND = {
 @pytest.mark.parametrize("name", known_names())
 def test_conformance(name: str, case: str) -> None:
     if name in NOT_FOR_BRUCE:
-        assert misfits(find_block(name), robot="bruce")
+        assert unmet_messages(find_block(name), robot="bruce")
         pytest.skip(NOT_FOR_BRUCE[name])
     if name in NEEDS_DRIVES:
-        assert not misfits(find_block(name), robot="bruce")
+        assert not unmet_messages(find_block(name), robot="bruce")
         with pytest.raises(AloftError, match=r"the serial port .* cannot be opened"):
             BlockBench(find_block(name), find_block(name).example_parameters(), robot="bruce")
         pytest.skip(NEEDS_DRIVES[name])
@@ -47,7 +47,7 @@ def test_conformance(name: str, case: str) -> None:
 @pytest.mark.parametrize("name", OF_ROBOTS)
 def test_conformance_with_other_robots(name: str, robot: str) -> None:
     block = find_block(name)
-    reasons = misfits(block, robot=robot)
+    reasons = unmet_messages(block, robot=robot)
     if reasons:
         pytest.skip("; ".join(reasons))
     if (robot, name) in BEYOND:

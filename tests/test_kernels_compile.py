@@ -29,7 +29,7 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
-from aloft.runtime.testing.conformance import misfits, random_inputs
+from aloft.runtime.testing.conformance import random_inputs, unmet_messages
 
 from .hal.sensors.mounting import bruce_with
 from .kernel_samples import UNUSED
@@ -46,7 +46,8 @@ NOT_HOT = {
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "hal.bear.measurement._first_lasting": "of plain numbers, in the driver's own Python",
-    "blocks.estimation.mass_estimator._scratch": "memory, when a block is set up",
+    "mathematics.rotations.matrices_of_quaternions": "of many rows, outside of ticks",
+    "mathematics.rotations.quaternions_of_matrices": "of many rows, outside of ticks",
     "mathematics.linear_algebra.inverse": "before a run, when tables are made",
     "mathematics.linear_algebra.product": "before a run, when tables are made",
     "mathematics.compiling.expressions.cross": "stands for loops in an equation",
@@ -123,7 +124,7 @@ def run_jump(changes=None, duration=None):
 def run_alone(name, robot):
     """Some ticks of a block on a bench, with its example parameters and inputs."""
     block = find_block(name)
-    if misfits(block, robot=robot):
+    if unmet_messages(block, robot=robot):
         return
     bench = BlockBench(block, block.example_parameters(), robot=robot, plain=True)
     random = np.random.default_rng(0)
@@ -167,7 +168,10 @@ def calls():
         function = getattr(function, "kernel", function)
         return used.get(id(function)) or find_names(function)
 
-    find_names = steps.names_used
+    def called(block, function):
+        return call_of(block, getattr(function, "kernel", function))
+
+    find_names, call_of = steps.names_used, steps.call_of
     for function in functions.values():  # before its calls of other kernels are replaced
         expand(function)
         used[id(function)] = find_names(function)
@@ -176,7 +180,9 @@ def calls():
         patch.setattr(steps, "names_used", names_used)
         for module in [m for name, m in sys.modules.items() if name.startswith("aloft.")]:
             for key, value in list(vars(module).items()):
-                if id(value) in name_of:
+                if value is call_of:
+                    patch.setattr(module, key, called)
+                elif id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
         run_jump()
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}

@@ -1,48 +1,70 @@
-"""The whole-body model at the present state, evaluated once a tick for all controllers."""
+"""The equations of motion, evaluated once a tick for all controllers, and the torques against gravity."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-from ...mathematics.arrays import (
-    Array0D,
-    Array1D,
-    Array2D,
-    Array3D,
-    Indices1D,
-    Matrix3,
-    Rows3,
-    Vector3,
-)
+from ...mathematics.arrays import Array1D, Array2D, Matrix3, Vector3
 from ...mathematics.body_dynamics import (
     BodyMotion,
     BodyTree,
     Inertias,
-    MotionTerms,
     acceleration_at,
     body_motion,
-    equations_of_motion,
+    composite_inertias,
     inertias,
+    inner,
+    momentum_of,
     move_bodies,
     place_bodies,
     place_of,
+    point_jacobian,
     velocity_at,
 )
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.equations import cross
+from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.kinematics import ball_feet, body_tree
-from ...runtime.language.block import Input, Output
-from ...runtime.language.kernel_block import KernelBlock
-from ..signals import BaseState, DynamicsTerms, JointState, MassEstimate
+from ...robots.pinocchio_model import build_pinocchio_model
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
+from ...runtime.language.parameters import Parameters
+from ...runtime.language.signals import Field, Signal
+from ..signals import BaseState, DynamicsTerms, JointState, JointTorque, MassEstimate
 
 LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
 """The steps in which the model's mass (as a share) and its torso's CoM [m] change."""
 
 
-class Dynamics(KernelBlock):
+class DynamicsConstants(Signal):
+    """The robot's feet, rotors and mass."""
+
+    foot_body = Field("n_feet", dtype="int64", text="the body of each foot")
+    sole = Field(("n_feet", 3), unit="m", text="centre of its sole, in the foot's frame")
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    point = Field(("n_contacts", 3), unit="m", text="the contact point in its foot's frame")
+    radius = Field("n_contacts", unit="m", text="of a foot that is a ball; -1 of others")
+    centre = Field(("n_contacts", 3), unit="m", text="the ball's centre in its foot's frame")
+    rotors = Field(("n_joints", "n_joints"), text="the rotors' part of the mass matrix")
+    mass = Field(unit="kg", text="the mass by the description")
+    torso_com = Field(3, unit="m", frame="body", text="the torso's centre of mass by it")
+
+
+class DynamicsScratch(Signal):
+    """Room for a step of ``Dynamics``."""
+
+    orientation = Field(4, text="unit quaternion of the base")
+    offset = Field(3, text="of the torso's centre of mass, in least steps")
+    point = Field(3, unit="m", text="a contact point in its foot's frame")
+    sole = Field(("n_feet", 3), unit="m", text="centres of the soles in their frames")
+    place = Field(3, unit="m", frame="world", text="a point relative to the base")
+    centre = Field(3, unit="m", frame="world", text="a ball's centre relative to the base")
+
+
+class Dynamics(Block):
     """Inertia, contact Jacobians, momentum and their drifts (paper, II-B and V).
 
     With generalised velocity v (base linear and angular in the body frame, then joints), contact
@@ -70,7 +92,10 @@ class Dynamics(KernelBlock):
     of the feet, loaded or not.
     """
 
+    Constants = DynamicsConstants
+    Scratch = DynamicsScratch
     needs = ("floating base",)
+    constants: DynamicsConstants
 
     base = Input(BaseState, text="pose and velocity of the base")
     joints = Input(JointState, text="joint angles and velocities")
@@ -78,164 +103,281 @@ class Dynamics(KernelBlock):
     terms = Output(DynamicsTerms, text="the model's terms")
 
     def setup(self) -> None:
-        robot, base, joints, mass, terms = (
-            self.robot, self.base, self.joints, self.mass, self.terms,
-        )  # fmt: skip
-        n_joints = len(robot.joints)
-        tree = body_tree(robot)
+        robot, constants = self.robot, self.constants
+        self.tree, n_joints = body_tree(robot), len(robot.joints)
+        self.motion, self.inertias = body_motion(n_joints), inertias(n_joints)
         bodies = {joint.child: k + 1 for k, joint in enumerate(robot.joints)} | {robot.base: 0}
-        balls = {ball.point: ball for ball in ball_feet(robot)}
-        owners = robot.foot_of_contact()
-        feet = Feet(
-            np.array([bodies[foot.link] for foot in robot.feet], dtype=np.int64),
-            np.array([foot.sole for foot in robot.feet], dtype=np.float64).reshape(-1, 3),
-            np.array(owners, dtype=np.int64),
-            np.array([contact.position for contact in robot.contacts]).reshape(-1, 3),
-            np.array([balls[k].radius if k in balls else -1.0 for k in range(len(owners))]),
-            np.array(
-                [balls[k].centre if k in balls else np.zeros(3) for k in range(len(owners))]
-            ).reshape(-1, 3),
-        )
-        evaluation = KernelCall(
-            evaluate,
-            BaseAndJoints(
-                base.position, base.orientation, base.linear_velocity, base.angular_velocity,
-                joints.position, joints.velocity,
-            ),
-            Weighing(
-                mass.mass, mass.com_offset, robot.total_mass, tree.com[0].copy(), np.zeros(3)
-            ),
-            tree,
-            Scratch(body_motion(n_joints), inertias(n_joints), np.zeros(4), np.zeros((3, 3))),
-            np.ascontiguousarray(robot.rotor_matrix),
-            feet,
-            MotionTerms(*(getattr(terms, name) for name in MotionTerms._fields)),
-            FootTerms(*(getattr(terms, name) for name in FootTerms._fields)),
-        )  # fmt: skip
-        self.kernel_calls = (evaluation,)
+        for number, foot in enumerate(robot.feet):
+            constants.foot_body[number], constants.sole[number] = bodies[foot.link], foot.sole
+        constants.foot_of_point[:] = robot.foot_of_contact()
+        constants.radius[:] = -1.0
+        for k, contact in enumerate(robot.contacts):
+            constants.point[k] = contact.position
+        for ball in ball_feet(robot):
+            constants.radius[ball.point], constants.centre[ball.point] = ball.radius, ball.centre
+        constants.rotors[:] = robot.rotor_matrix
+        constants.mass, constants.torso_com[:] = robot.total_mass, self.tree.com[0]
+
+    @kernel
+    @staticmethod
+    def step(
+        base: BaseState,
+        joints: JointState,
+        mass: MassEstimate,
+        terms: DynamicsTerms,
+        tree: BodyTree,
+        motion: BodyMotion,
+        inertias: Inertias,
+        constants: DynamicsConstants,
+        scratch: DynamicsScratch,
+    ) -> None:
+        scale = apply_payload(mass, tree, constants, scratch)
+        set_base(base, joints, terms, motion, scratch)
+        place_bodies(tree, joints.position, motion)
+        move_bodies(tree, joints.velocity, motion)
+        equations_of_motion(tree, motion, inertias, constants.rotors, scale, terms)
+        write_contacts(tree, motion, terms, constants, scratch)
+        write_soles(motion, terms, constants, scratch)
+        terms.com[:] = terms.com + base.position
 
 
-class BaseAndJoints(NamedTuple):
-    """The pose and velocity of the base, as in ``BaseState``, and the joints' motion."""
+class GravityCompensation(Block):
+    """The joint torques g(q) that balance gravity at the measured joint positions, by Pinocchio.
 
-    position: Vector3
-    orientation: Array1D
-    linear_velocity: Vector3
-    angular_velocity: Vector3
-    joint_position: Array1D
-    joint_velocity: Array1D
+    With these torques alone a robot at rest stays at rest. For a slide the torque is the force
+    along its axis. It is computed also for joints without a motor, whose drives cannot produce it.
+    The block compensates neither friction nor a load that the robot carries; add a load as a link
+    to the robot's description.
 
-
-class Weighing(NamedTuple):
-    """The mass to use [kg], without a dimension (zero: the ``nominal`` one), and the offset of the
-    torso's centre of mass from the ``described`` one [m], (3,); ``offset`` (3,) is scratch."""
-
-    mass: Array0D
-    com_offset: Vector3
-    nominal: float
-    described: Vector3
-    offset: Vector3
-
-
-class Feet(NamedTuple):
-    """The feet and their contact points.
-
-    ``body`` and ``sole`` (n_feet, 3) are a foot's body and the centre of its sole [m, body]; ``foot`` and
-    ``point`` (n_contacts, 3) are a contact's foot and its place [m, body]. Where the foot is a ball,
-    ``radius`` [m] is not negative, and ``centre`` (n_contacts, 3) [m, body] is the ball's.
+    It needs a fixed base: the torques that hold up a robot with a floating base depend on its
+    contacts, and the whole-body controller computes them.
     """
 
-    body: Indices1D
-    sole: Rows3
-    foot: Indices1D
-    point: Rows3
-    radius: Array1D
-    centre: Rows3
+    needs = ("robot",)
+
+    joints = Input(JointState, text="measured joint positions")
+    torque = Output(JointTorque, text="torques that hold the robot still")
+
+    @classmethod
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a base that is not fixed."""
+        robot = context.robot
+        if robot is not None and robot.base_joint != "fixed":
+            yield UnmetRequirement(
+                f"it needs a robot on a fixed base; {robot.name} has a {robot.base_joint} one",
+                fix="use: blocks.WholeBodyController",
+            )
+
+    def setup(self) -> None:
+        """Build the model."""
+        import pinocchio
+
+        self._model: Any = build_pinocchio_model(self.robot).model
+        self._data: Any = self._model.createData()
+        self._evaluate: Any = pinocchio.computeAllTerms
+        self._position = np.array(pinocchio.neutral(self._model))
+        self._still = np.zeros(self._model.nv)
+        self._gravity = self._data.nle  # Pinocchio's own memory, written in every evaluation
+
+    def step(self) -> None:
+        """Evaluate the model at rest in the measured position."""
+        self._position[:] = self.joints.position
+        # The function for gravity alone returns it as a new array.
+        self._evaluate(self._model, self._data, self._position, self._still)
+        self.torque.torque[:] = self._gravity
 
 
-class Scratch(NamedTuple):
-    """Memory: the bodies' motion and inertias, a unit quaternion, and three places (3, 3)."""
-
-    motion: BodyMotion
-    inertias: Inertias
-    orientation: Array1D
-    places: Matrix3
-
-
-class FootTerms(NamedTuple):
-    """The fields of ``DynamicsTerms`` that the kernel of the feet writes."""
-
-    velocity: Array1D
-    base_position: Vector3
-    base_rotation: Matrix3
-    foot_position: Rows3
-    foot_rotation: Array3D
-    contact_position: Rows3
-    contact_velocity: Rows3
-    contact_jacobian: Array3D
-    contact_drift: Rows3
+# The state
 
 
 @kernel
-def weigh_torso(weighing: Weighing, tree: BodyTree) -> float:
-    """Put the centre of mass of the torso where it is now; returns the factor on all masses.
+def apply_payload(
+    mass: MassEstimate, tree: BodyTree, constants: DynamicsConstants, scratch: DynamicsScratch
+) -> float:
+    """Move the torso's centre of mass by the estimated offset; returns the factor on all masses.
 
     In small steps, so that the model is a function of the input and rarely changes. All masses scale
     alike, so the terms do; rotors do not.
     """
-    offset, mass = weighing.offset, float(weighing.mass[()])
-    np.divide(weighing.com_offset, LEAST_OFFSET, offset)
-    np.rint(offset, offset)
-    tree.com[0, :] = weighing.described + offset * LEAST_OFFSET
-    if mass > 0.0:
-        return round(mass / weighing.nominal / LEAST_SCALE) * LEAST_SCALE
+    np.divide(mass.com_offset, LEAST_OFFSET, scratch.offset)
+    np.rint(scratch.offset, scratch.offset)
+    tree.com[0, :] = constants.torso_com + scratch.offset * LEAST_OFFSET
+    if mass.mass > 0.0:
+        return float(round(mass.mass / constants.mass / LEAST_SCALE) * LEAST_SCALE)
     return 1.0
 
 
 @kernel
-def set_state(state: BaseAndJoints, scratch: Scratch, terms: FootTerms) -> None:
+def set_base(
+    base: BaseState,
+    joints: JointState,
+    terms: DynamicsTerms,
+    motion: BodyMotion,
+    scratch: DynamicsScratch,
+) -> None:
     """Give the base its rotation and velocity, and write the generalised velocity."""
-    motion, v, orientation = scratch.motion, terms.velocity, scratch.orientation
-    normalise(state.orientation, orientation)
+    v, orientation = terms.velocity, scratch.orientation
+    normalise(base.orientation, orientation)
     to_matrix(orientation, terms.base_rotation)
-    rotate_back(orientation, state.linear_velocity, v[0:3])
-    for row in range(3):
-        v[3 + row] = state.angular_velocity[row]
-        motion.velocity[0, row] = state.linear_velocity[row]
-        spin = 0.0
-        for column in range(3):
-            turn = terms.base_rotation[row, column]
-            motion.rotation[0, row, column] = turn
-            spin += turn * state.angular_velocity[column]
-        motion.velocity[0, 3 + row] = spin
-        terms.base_position[row] = state.position[row]
-    for k in range(state.joint_velocity.shape[0]):
-        v[6 + k] = state.joint_velocity[k]
+    rotate_back(orientation, base.linear_velocity, v[0:3])
+    v[3:6] = base.angular_velocity
+    v[6 : v.shape[0]] = joints.velocity
+    terms.base_position[:] = base.position
+    motion.rotation[0, :, :] = terms.base_rotation
+    motion.velocity[0, 0:3] = base.linear_velocity
+    motion.velocity[0, 3:6] = terms.base_rotation @ base.angular_velocity
+
+
+# The equations of motion
 
 
 @kernel
-def write_jacobian(
-    tree: BodyTree, motion: BodyMotion, body: int, place: Vector3, out: Array2D
+def write_column(
+    column: int,
+    spatial: Array1D,
+    com: Vector3,
+    rotation: Matrix3,
+    scale: float,
+    terms: DynamicsTerms,
 ) -> None:
-    """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
-    for row in range(3):
-        out[row, :] = 0.0
-    x, y, z = place[0], place[1], place[2]
+    """Write one column of the mass matrix's base rows and of the centroidal matrix.
+
+    Args:
+        spatial: the robot's spatial momentum per unit of that generalised velocity, (6,).
+        com: the place of the centre of mass, (3,).
+        rotation: of the base, (3, 3).
+    """
+    a, b, c = spatial[0] * scale, spatial[1] * scale, spatial[2] * scale
+    p, q, r = spatial[3] * scale, spatial[4] * scale, spatial[5] * scale
+    x, y, z = com[0], com[1], com[2]
+    centroidal = terms.centroidal_matrix
+    centroidal[0, column], centroidal[1, column], centroidal[2, column] = a, b, c
+    centroidal[3, column] = p - (y * c - z * b)
+    centroidal[4, column] = q - (z * a - x * c)
+    centroidal[5, column] = r - (x * b - y * a)
     for k in range(3):
-        a, b, c = (
-            motion.rotation[0, 0, k],
-            motion.rotation[0, 1, k],
-            motion.rotation[0, 2, k],
-        )
-        out[0, k], out[1, k], out[2, k] = a, b, c
-        out[0, 3 + k], out[1, 3 + k], out[2, 3 + k] = b * z - c * y, c * x - a * z, a * y - b * x
-    while body > 0:
-        joint = motion.joint[body - 1]
-        a, b, c = joint[3], joint[4], joint[5]
-        out[0, 5 + body] = joint[0] + (b * z - c * y)
-        out[1, 5 + body] = joint[1] + (c * x - a * z)
-        out[2, 5 + body] = joint[2] + (a * y - b * x)
-        body = tree.parent[body - 1]
+        u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
+        linear, angular = u * a + v * b + w * c, u * p + v * q + w * r
+        terms.mass_matrix[k, column] = terms.mass_matrix[column, k] = linear
+        terms.mass_matrix[3 + k, column] = terms.mass_matrix[column, 3 + k] = angular
+
+
+@kernel
+def write_matrices(
+    tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array2D, scale: float,
+    terms: DynamicsTerms,
+) -> None:  # fmt: skip
+    """The mass matrix, with the inertia of the rotors, and the centroidal matrix.
+
+    Args:
+        rotors: the rotors' part of the mass matrix, in the joints' rows and columns.
+        scale: the factor on all masses and inertias but the rotors'.
+    """
+    n, first = motion.joint.shape[0], 6
+    rotation, spatial = motion.rotation[0], composite.spatial
+    base = composite.turned[0]
+    for k in range(3):
+        for row in range(3):
+            base[row] = rotation[row, k]
+        a, b, c = base[0], base[1], base[2]
+        moment, inertia = composite.moment[0], composite.inertia[0]
+        x, y, z = moment[0], moment[1], moment[2]
+        mass = composite.mass[0]
+        spatial[0], spatial[1], spatial[2] = mass * a, mass * b, mass * c
+        spatial[3], spatial[4], spatial[5] = y * c - z * b, z * a - x * c, x * b - y * a
+        write_column(k, spatial, terms.com, rotation, scale, terms)
+        spatial[0], spatial[1], spatial[2] = b * z - c * y, c * x - a * z, a * y - b * x
+        xx, yy, zz = inertia[0], inertia[1], inertia[2]
+        xy, xz, yz = inertia[3], inertia[4], inertia[5]
+        spatial[3] = xx * a + xy * b + xz * c
+        spatial[4] = xy * a + yy * b + yz * c
+        spatial[5] = xz * a + yz * b + zz * c
+        write_column(3 + k, spatial, terms.com, rotation, scale, terms)
+    for i in range(n):
+        for j in range(n):
+            terms.mass_matrix[first + i, first + j] = rotors[i, j]
+    for j in range(n):
+        momentum_of(composite, j + 1, motion.joint[j], spatial)
+        write_column(first + j, spatial, terms.com, rotation, scale, terms)
+        i = j
+        while i >= 0:
+            shared = scale * inner(motion.joint[i], spatial)
+            terms.mass_matrix[first + i, first + j] = rotors[i, j] + shared
+            terms.mass_matrix[first + j, first + i] = rotors[j, i] + shared
+            i = tree.parent[i] - 1
+
+
+@kernel
+def write_forces(
+    motion: BodyMotion, composite: Inertias, scale: float, terms: DynamicsTerms
+) -> None:
+    """Bias forces, gravity included, the drift of the momentum, and the momentum itself."""
+    rotation, spatial, force = motion.rotation[0], composite.spatial, composite.force[0]
+    x, y, z = terms.com[0], terms.com[1], terms.com[2]
+    a, b, c = force[0], force[1], force[2]
+    drift = terms.centroidal_drift
+    drift[0], drift[1], drift[2] = scale * a, scale * b, scale * c
+    drift[3] = scale * (force[3] - (y * c - z * b))
+    drift[4] = scale * (force[4] - (z * a - x * c))
+    drift[5] = scale * (force[5] - (x * b - y * a))
+    for body in range(motion.joint.shape[0] + 1):
+        # Weight pulls down, so what carries it pushes up, at the centre of mass.
+        moment, carried = composite.moment[body], composite.force[body]
+        for k in range(6):
+            spatial[k] = carried[k]
+        spatial[2] = spatial[2] + GRAVITY * composite.mass[body]
+        spatial[3] = spatial[3] + GRAVITY * moment[1]
+        spatial[4] = spatial[4] - GRAVITY * moment[0]
+        if body > 0:
+            terms.nonlinear_effects[5 + body] = scale * inner(motion.joint[body - 1], spatial)
+            continue
+        for k in range(3):
+            u, v, w = rotation[0, k], rotation[1, k], rotation[2, k]
+            linear = u * spatial[0] + v * spatial[1] + w * spatial[2]
+            angular = u * spatial[3] + v * spatial[4] + w * spatial[5]
+            terms.nonlinear_effects[k] = scale * linear
+            terms.nonlinear_effects[3 + k] = scale * angular
+
+
+@kernel
+def write_momentum(scale: float, mass: float, terms: DynamicsTerms) -> None:
+    """The momentum about the centre of mass, and its velocity, from the centroidal matrix.
+
+    Args:
+        scale, mass: the factor on all masses, and their sum without it [kg].
+    """
+    for k in range(3):
+        linear, angular = 0.0, 0.0
+        for j in range(terms.velocity.shape[0]):
+            linear += terms.centroidal_matrix[k, j] * terms.velocity[j]
+            angular += terms.centroidal_matrix[3 + k, j] * terms.velocity[j]
+        terms.linear_momentum[k], terms.angular_momentum[k] = linear, angular
+        terms.com_velocity[k] = linear / (scale * mass)
+
+
+@kernel
+def equations_of_motion(
+    tree: BodyTree,
+    motion: BodyMotion,
+    composite: Inertias,
+    rotors: Array2D,
+    scale: float,
+    terms: DynamicsTerms,
+) -> None:
+    """All terms of the equations of motion, of bodies that have been placed and moved.
+
+    Args:
+        rotors: the rotors' part of the mass matrix (n_joints, n_joints).
+        scale: the factor on all masses and inertias but the rotors'.
+    """
+    composite_inertias(tree, motion, composite)
+    terms.com[:] = composite.moment[0] / composite.mass[0]
+    write_matrices(tree, motion, composite, rotors, scale, terms)
+    write_forces(motion, composite, scale, terms)
+    write_momentum(scale, composite.mass[0], terms)
+
+
+# Feet
 
 
 @kernel
@@ -252,7 +394,7 @@ def lowest_point(centre: Vector3, radius: float, rotation: Matrix3, out: Vector3
 
 @kernel
 def rolling_drift(
-    motion: BodyMotion, body: int, centre: Array1D, lowest: Array1D, out: Array1D
+    motion: BodyMotion, body: int, centre: Vector3, lowest: Vector3, out: Vector3
 ) -> None:
     """The rate of change (3,) of the velocity of a ball's lowest point, while v' = 0.
 
@@ -264,64 +406,48 @@ def rolling_drift(
         centre, lowest: the places of the ball's centre and of its lowest point [m], (3,).
     """
     acceleration_at(motion, body, centre, out)
-    x = lowest[0] - centre[0]
-    y = lowest[1] - centre[1]
-    z = lowest[2] - centre[2]
-    spatial = motion.acceleration[body]
-    a, b, c = spatial[3], spatial[4], spatial[5]
-    out[0] = out[0] + (b * z - c * y)
-    out[1] = out[1] + (c * x - a * z)
-    out[2] = out[2] + (a * y - b * x)
+    angular = motion.acceleration[body, 3:6]
+    out[:] = out + cross(angular, lowest - centre)
 
 
 @kernel
-def write_contacts(tree: BodyTree, scratch: Scratch, feet: Feet, terms: FootTerms) -> None:
-    """Where the contact points are, how they move, and their Jacobians and drifts."""
-    motion, place, centre = scratch.motion, scratch.places[0], scratch.places[1]
-    for point in range(feet.foot.shape[0]):
-        foot = feet.foot[point]
-        body = feet.body[foot]
-        if feet.radius[point] >= 0.0:
-            lowest_point(
-                feet.centre[point], feet.radius[point], motion.rotation[body],
-                feet.point[point],
-            )  # fmt: skip
-            feet.sole[foot, :] = feet.point[point]
-        place_of(motion, body, feet.point[point], place)
+def write_contacts(
+    tree: BodyTree,
+    motion: BodyMotion,
+    terms: DynamicsTerms,
+    constants: DynamicsConstants,
+    scratch: DynamicsScratch,
+) -> None:
+    """The contact points with their motion, Jacobians and drifts; the sole of a ball is its lowest point."""
+    local, place, centre = scratch.point, scratch.place, scratch.centre
+    scratch.sole[:, :] = constants.sole
+    for point in range(constants.foot_of_point.shape[0]):
+        foot, radius = constants.foot_of_point[point], constants.radius[point]
+        body = constants.foot_body[foot]
+        local[:] = constants.point[point]
+        if radius >= 0.0:
+            lowest_point(constants.centre[point], radius, motion.rotation[body], local)
+            scratch.sole[foot, :] = local
+        place_of(motion, body, local, place)
         velocity_at(motion, body, place, terms.contact_velocity[point])
         acceleration_at(motion, body, place, terms.contact_drift[point])
-        if feet.radius[point] >= 0.0:
-            place_of(motion, body, feet.centre[point], centre)
+        if radius >= 0.0:
+            place_of(motion, body, constants.centre[point], centre)
             rolling_drift(motion, body, centre, place, terms.contact_drift[point])
-        write_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
+        point_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
         terms.contact_position[point, :] = terms.base_position + place
 
 
 @kernel
-def evaluate(
-    state: BaseAndJoints,
-    weighing: Weighing,
-    tree: BodyTree,
-    scratch: Scratch,
-    rotors: Array2D,
-    feet: Feet,
-    terms: MotionTerms,
-    foot_terms: FootTerms,
+def write_soles(
+    motion: BodyMotion,
+    terms: DynamicsTerms,
+    constants: DynamicsConstants,
+    scratch: DynamicsScratch,
 ) -> None:
-    """All terms of the model at a state. ``rotors`` are the rotors' part of the mass matrix."""
-    motion, place = scratch.motion, scratch.places[0]
-    scale = weigh_torso(weighing, tree)
-    set_state(state, scratch, foot_terms)
-    place_bodies(tree, state.joint_position, motion)
-    move_bodies(tree, state.joint_velocity, motion)
-    equations_of_motion(tree, motion, scratch.inertias, rotors, scale, foot_terms.velocity, terms)
-    write_contacts(tree, scratch, feet, foot_terms)
-    for foot in range(feet.body.shape[0]):
-        body = feet.body[foot]
-        place_of(motion, body, feet.sole[foot], place)
-        for row in range(3):
-            foot_terms.foot_position[foot, row] = state.position[row] + place[row]
-            for column in range(3):
-                turn = motion.rotation[body, row, column]
-                foot_terms.foot_rotation[foot, row, column] = turn
-    terms.com[:] = terms.com + state.position
+    """The places and rotations of the soles."""
+    for foot in range(constants.foot_body.shape[0]):
+        body = constants.foot_body[foot]
+        place_of(motion, body, scratch.sole[foot], scratch.place)
+        terms.foot_position[foot, :] = terms.base_position + scratch.place
+        terms.foot_rotation[foot, :, :] = motion.rotation[body]

@@ -15,6 +15,8 @@ from ...mathematics.body_dynamics import (
     move_bodies,
     place_bodies,
     place_of,
+    point_jacobian,
+    rotation_jacobian,
     velocity_at,
 )
 from ...mathematics.compiling.kernel_call import KernelCall
@@ -23,7 +25,6 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import body_tree
 from ...runtime.language.steps import signal_call
 from ..signals import DynamicsTerms, JointState
-from .dynamics import write_jacobian
 
 Vector = tuple[float, float, float]
 
@@ -122,25 +123,11 @@ def update_frame(
     place_of(motion, body, local, place)
     velocity_at(motion, body, place, frame.velocity[0:3])
     acceleration_at(motion, body, place, frame.drift[0:3])
-    write_jacobian(tree, motion, body, place, frame.jacobian[0:3, :])
-    write_rotation_jacobian(tree, motion, body, frame.jacobian[3:6, :])
+    point_jacobian(tree, motion, body, place, frame.jacobian[0:3, :])
+    rotation_jacobian(tree, motion, body, frame.jacobian[3:6, :])
     for row in range(3):
         frame.velocity[3 + row] = motion.velocity[body, 3 + row]
         frame.drift[3 + row] = motion.acceleration[body, 3 + row]
         place[row] = place[row] + terms.base_position[row]
         for column in range(3):
             frame.rotation[row, column] = motion.rotation[body, row, column]
-
-
-@kernel
-def write_rotation_jacobian(tree: BodyTree, motion: BodyMotion, body: int, out: Array2D) -> None:
-    """The angular velocity [rad/s, world] of a body for every generalised velocity, (3, n_velocities)."""
-    out[:, :] = 0.0
-    for row in range(3):
-        for k in range(3):
-            out[row, 3 + k] = motion.rotation[0, row, k]
-    carried = body
-    while carried > 0:
-        for row in range(3):
-            out[row, 5 + carried] = motion.joint[carried - 1, 3 + row]
-        carried = int(tree.parent[carried - 1])

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from fnmatch import fnmatchcase
 from typing import Literal
 
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
-from ...mathematics.joint_feedback import (
-    Feedback,
-    Motion,
-    SoftStops,
-    add_friction,
-    add_soft_stops,
-    blend_feedback,
-    integrate_accelerations,
-)
 from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import product
@@ -45,38 +37,7 @@ SATURATION_ERROR = 0.2
 """The joint error [rad] at which the default stiffness may at most ask for the peak torque."""
 
 
-class JointFollower(Signal):
-    """Each leg's blend between the gains of stance and flight, and the stance targets."""
-
-    airborne = Field("n_feet", unit="", text="0: stance gains, 1: flight gains")
-    position = Field("n_joints", unit="rad", text="integrated stance targets")
-    velocity = Field("n_joints", unit="rad/s", text="their velocities")
-    started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
-
-
-class JointPDConstants(Signal):
-    """What follows from the parameters and the robot."""
-
-    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
-    foot_of_joint = Field(
-        "n_joints", dtype="int64", text="the foot of each joint; -1: it is held, or in no leg"
-    )
-    held = Field("n_joints", dtype="bool", text="whether each joint is held")
-    held_angle = Field("n_joints", unit="rad", text="the angle at which it is held")
-    free = Field("n_joints", dtype="bool", text="whether it is neither held nor in a leg")
-    blend_rate = Field(text="the largest change of a leg's weight in a tick")
-    friction = Field("n_joints", unit="N m", text="friction to compensate")
-    viscous_friction = Field("n_joints", unit="N m s/rad", text="damping to compensate")
-    compensates = Field(dtype="bool", text="whether there is any of the two")
-
-
-class JointWeights(Signal):
-    """Room for a step of ``JointPD``."""
-
-    airborne = Field("n_joints", text="weight of the flight gains of each joint")
-
-
-class JointPDParameters(Parameters):
+class JointPDParams(Parameters):
     """The parameters of ``JointPD``."""
 
     flight_stiffness: PerJoint | None = live_parameter(
@@ -124,6 +85,48 @@ class JointPDParameters(Parameters):
     )
 
 
+class JointFollower(Signal):
+    """Each leg's blend between the gains of stance and flight, and the stance targets."""
+
+    airborne = Field("n_feet", unit="", text="0: stance gains, 1: flight gains")
+    position = Field("n_joints", unit="rad", text="integrated stance targets")
+    velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
+
+
+class JointPDConstants(Signal):
+    """What follows from the parameters and the robot."""
+
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    foot_of_joint = Field(
+        "n_joints", dtype="int64", text="the foot of each joint; -1: it is held, or in no leg"
+    )
+    held = Field("n_joints", dtype="bool", text="whether each joint is held")
+    held_angle = Field("n_joints", unit="rad", text="the angle at which it is held")
+    free = Field("n_joints", dtype="bool", text="whether it is neither held nor in a leg")
+    standing = Field("n_joints", unit="rad", text="the standing pose")
+    planned = Field(dtype="bool", text="whether a plan is wired")
+    limits = Field(("n_joints", 2), unit="rad", text="the joints' limits")
+    flight_stiffness = Field("n_joints", unit="N m/rad", text="gains in the air")
+    flight_damping = Field("n_joints", unit="N m s/rad", text="gains in the air")
+    stance_stiffness = Field("n_joints", unit="N m/rad", text="gains on the ground")
+    stance_damping = Field("n_joints", unit="N m s/rad", text="gains on the ground")
+    blend_rate = Field(text="the largest change of a leg's weight in a tick")
+    friction = Field("n_joints", unit="N m", text="friction to compensate")
+    viscous_friction = Field("n_joints", unit="N m s/rad", text="damping to compensate")
+    compensates = Field(dtype="bool", text="whether there is any of the two")
+
+
+class JointPDScratch(Signal):
+    """Room for a step of ``JointPD``."""
+
+    airborne = Field("n_joints", text="weight of the flight gains of each joint")
+    flight_position = Field("n_joints", unit="rad", text="targets of the flight gains")
+    flight_velocity = Field("n_joints", unit="rad/s", text="their velocities")
+    stance_position = Field("n_joints", unit="rad", text="targets of the stance gains")
+    stance_velocity = Field("n_joints", unit="rad/s", text="their velocities")
+
+
 class JointPD(Block):
     """The joint command of every tick: feedforward plus joint feedback (paper, V, first equation)::
 
@@ -163,11 +166,12 @@ class JointPD(Block):
     and the whole-body controller should.
     """
 
-    needs = ("robot",)
-    Params = JointPDParameters
+    Params = JointPDParams
     Constants = JointPDConstants
-    Scratch = JointWeights
-    params: JointPDParameters
+    Scratch = JointPDScratch
+    needs = ("robot",)
+    params: JointPDParams
+    constants: JointPDConstants
 
     wbc = Input(WholeBodyCommand, text="feedforward torques and accelerations")
     legs = Input(JointTarget, text="joint targets of the legs, by default for those in the air")
@@ -178,28 +182,18 @@ class JointPD(Block):
     follower = State(JointFollower, text="blending and stance targets")
 
     def setup(self) -> None:
-        robot, n = self.robot, len(self.robot.joints)
+        robot, constants = self.robot, self.constants
         self._default_gains = default_gains(robot)
+        constants.foot_of_point[:] = robot.foot_of_contact()
+        constants.standing[:], constants.limits[:] = robot.standing_position, robot.joint_limits
+        constants.planned = "reference" in self.context.wired
         self._find_legs()
-        reference, command, follower = self.reference, self.command, self.follower
-        self.measured = Motion(self.joints.position, self.joints.velocity)
-        self.planned = Motion(reference.joint_position, reference.joint_velocity)
-        if "reference" not in self.context.wired:
-            self.planned = Motion(robot.standing_position.copy(), np.zeros(n))
-        self.integrated = Motion(follower.position, follower.velocity)
-        self.flight, self.stance = Feedback(*np.zeros((4, n))), Feedback(*np.zeros((4, n)))
-        self.feedback = Feedback(
-            command.stiffness, command.position, command.damping, command.velocity
-        )
-        self.stops = SoftStops(
-            robot.joint_limits, np.zeros(1), np.zeros(1), self.flight.stiffness, self.flight.damping
-        )
 
     def _find_legs(self) -> None:
         """Find which joint belongs to which leg, is held, or is free."""
         robot, released, constants = self.robot, self.params.released, self.constants
         in_leg = np.zeros(len(robot.joints), np.bool_)
-        constants.foot_of_joint[:], constants.foot_of_point[:] = -1, robot.foot_of_contact()
+        constants.foot_of_joint[:] = -1
         for k, joint in enumerate(robot.joints):
             if joint.name in robot.held and not any(fnmatchcase(joint.name, p) for p in released):
                 constants.held[k], constants.held_angle[k] = True, robot.held[joint.name]
@@ -212,18 +206,18 @@ class JointPD(Block):
     def prepare(self) -> None:
         p, robot, constants = self.params, self.robot, self.constants
         stiffness, damping = self._default_gains
-        flight, stance, held = self.flight, self.stance, constants.held
-        given = p.flight_stiffness, p.flight_damping
-        flight.stiffness[:] = stiffness if given[0] is None else given[0].resolve(robot)
-        flight.damping[:] = damping if given[1] is None else given[1].resolve(robot)
-        stance.stiffness[:] = np.where(held, flight.stiffness, p.stance_stiffness.resolve(robot))
-        stance.damping[:] = np.where(held, flight.damping, p.stance_damping.resolve(robot))
-        motors = robot.motors
+        if p.flight_stiffness is not None:
+            stiffness = p.flight_stiffness.resolve(robot)
+        if p.flight_damping is not None:
+            damping = p.flight_damping.resolve(robot)
+        held, motors = constants.held, robot.motors
+        constants.flight_stiffness[:], constants.flight_damping[:] = stiffness, damping
+        constants.stance_stiffness[:] = np.where(held, stiffness, p.stance_stiffness.resolve(robot))
+        constants.stance_damping[:] = np.where(held, damping, p.stance_damping.resolve(robot))
         constants.friction[:] = p.friction.resolve(robot) + p.friction_share * motors.friction
         constants.viscous_friction[:] = p.friction_share * motors.damping
         constants.compensates = bool(constants.friction.any() or constants.viscous_friction.any())
         constants.blend_rate = self.period / p.blend if p.blend > self.period else 1.0
-        self.stops.margin[0], self.stops.gain[0] = p.stop_margin, p.stop_gain
 
     @kernel
     @staticmethod
@@ -231,27 +225,22 @@ class JointPD(Block):
         wbc: WholeBodyCommand,
         legs: JointTarget,
         phase: PhaseState,
+        joints: JointState,
         reference: JumpReference,
-        measured: Motion,
-        planned: Motion,
-        integrated: Motion,
-        flight: Feedback,
-        stance: Feedback,
-        stops: SoftStops,
-        feedback: Feedback,
         command: JointCommand,
         follower: JointFollower,
+        params: JointPDParams,
         constants: JointPDConstants,
-        scratch: JointWeights,
-        params: JointPDParameters,
+        scratch: JointPDScratch,
         period: float,
     ) -> None:
         blend_legs(phase, follower, constants, scratch.airborne)
         if params.stance_targets == "acceleration":
-            joints = wbc.acceleration[wbc.acceleration.shape[0] - wbc.torque.shape[0] :]
-            integrate_stance_targets(joints, measured, follower, integrated, params.leak, period)
-        find_stance_targets(legs, measured, integrated, constants, params, stance)
-        find_flight_targets(legs, planned, constants, flight)
+            n = wbc.torque.shape[0]
+            acceleration = wbc.acceleration[wbc.acceleration.shape[0] - n :]
+            integrate_accelerations(acceleration, joints, follower, params.leak, period)
+        find_stance_targets(legs, joints, follower, params, constants, scratch)
+        find_flight_targets(legs, reference, constants, scratch)
         command.mode = CommandMode.ACTIVE
         flies = phase.phase == Phase.FLIGHT and reference.phase == Phase.FLIGHT
         for i in range(command.torque.shape[0]):
@@ -261,13 +250,13 @@ class JointPD(Block):
                 expected = airborne * reference.joint_torque[i] * params.flight_feedforward
                 command.torque[i] = command.torque[i] + expected
         if constants.compensates:
-            add_friction(
-                measured.velocity, constants.friction, constants.viscous_friction,
-                params.friction_speed, command.torque,
-            )  # fmt: skip
-        blend_feedback(scratch.airborne, flight, stance, measured, feedback)
+            add_friction(joints, command, params, constants)
+        blend_feedback(joints, command, constants, scratch)
         if params.stop_gain > 0.0:
-            add_soft_stops(measured.position, stops, feedback)
+            add_soft_stops(joints, command, params, constants)
+
+
+# Which gains act
 
 
 @kernel
@@ -299,56 +288,173 @@ def blend_legs(
 
 
 @kernel
-def integrate_stance_targets(
-    acceleration: Array1D,
-    measured: Motion,
-    follower: JointFollower,
-    integrated: Motion,
-    leak: float,
-    period: float,
+def blend_feedback(
+    joints: JointState,
+    command: JointCommand,
+    constants: JointPDConstants,
+    scratch: JointPDScratch,
 ) -> None:
-    """Integrate the accelerations, from the measured joints on."""
+    """Blend flight and stance feedback into one, whose torque is the weighted mean of both torques."""
+    blend_gains(
+        scratch.airborne, constants.flight_stiffness, scratch.flight_position,
+        constants.stance_stiffness, scratch.stance_position, joints.position,
+        command.stiffness, command.position,
+    )  # fmt: skip
+    blend_gains(
+        scratch.airborne, constants.flight_damping, scratch.flight_velocity,
+        constants.stance_damping, scratch.stance_velocity, joints.velocity,
+        command.damping, command.velocity,
+    )  # fmt: skip
+
+
+@kernel
+def blend_gains(
+    weight: Array1D,
+    first_gain: Array1D,
+    first_target: Array1D,
+    second_gain: Array1D,
+    second_target: Array1D,
+    measured: Array1D,
+    gain: Array1D,
+    target: Array1D,
+) -> None:
+    """Blend two gains, stiffness or damping, and the targets they act towards.
+
+    With the weights w (n,) of the first one the gain is K = w K1 + (1 - w) K2 and the target
+    (w K1 x1 + (1 - w) K2 x2) / K. Where K = 0 the target is the measured value.
+    """
+    for i in range(gain.shape[0]):
+        first = weight[i] * first_gain[i]
+        second = (1.0 - weight[i]) * second_gain[i]
+        total = first + second
+        gain[i] = total
+        if total > 0.0:
+            share = first / total
+            target[i] = share * first_target[i] + (1.0 - share) * second_target[i]
+        else:
+            target[i] = measured[i]
+
+
+# Targets
+
+
+@kernel
+def integrate_accelerations(
+    acceleration: Array1D, joints: JointState, follower: JointFollower, leak: float, period: float
+) -> None:
+    """Integrate accelerations [rad/s^2] (n,) to targets that leak towards the measured joints.
+
+    x' = v + (q - x) / leak and v' = a + (q' - v) / leak, from the measured joints on. Below the
+    corner frequency 1/leak the targets follow the measured joints, so the feedback vanishes; above
+    it they follow the integrated accelerations.
+    """
     if not follower.started:
-        integrated.position[:] = measured.position
-        integrated.velocity[:] = measured.velocity
+        follower.position[:] = joints.position
+        follower.velocity[:] = joints.velocity
         follower.started = True
-    integrate_accelerations(period, leak, acceleration, measured, integrated)
+    share = min(period / leak, 1.0)
+    for i in range(acceleration.shape[0]):
+        speed = follower.velocity[i]
+        x = follower.position[i] + period * speed
+        follower.velocity[i] = (
+            speed + period * acceleration[i] + share * (joints.velocity[i] - speed)
+        )
+        follower.position[i] = x + share * (joints.position[i] - x)
 
 
 @kernel
 def find_stance_targets(
     legs: JointTarget,
-    measured: Motion,
-    integrated: Motion,
+    joints: JointState,
+    follower: JointFollower,
+    params: JointPDParams,
     constants: JointPDConstants,
-    params: JointPDParameters,
-    stance: Feedback,
+    scratch: JointPDScratch,
 ) -> None:
     """The measured joints at rest, the legs' targets, or integrated accelerations."""
+    position, velocity = scratch.stance_position, scratch.stance_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i]:
-            stance.position[i], stance.velocity[i] = constants.held_angle[i], 0.0
+            position[i], velocity[i] = constants.held_angle[i], 0.0
         elif params.stance_targets == "measured":
-            stance.position[i], stance.velocity[i] = measured.position[i], 0.0
+            position[i], velocity[i] = joints.position[i], 0.0
         elif params.stance_targets == "legs":
-            stance.position[i], stance.velocity[i] = legs.position[i], legs.velocity[i]
+            position[i], velocity[i] = legs.position[i], legs.velocity[i]
         else:
-            stance.position[i] = integrated.position[i]
-            stance.velocity[i] = integrated.velocity[i]
+            position[i], velocity[i] = follower.position[i], follower.velocity[i]
 
 
 @kernel
 def find_flight_targets(
-    legs: JointTarget, planned: Motion, constants: JointPDConstants, flight: Feedback
+    legs: JointTarget,
+    reference: JumpReference,
+    constants: JointPDConstants,
+    scratch: JointPDScratch,
 ) -> None:
-    """The legs' targets, the held angles, and the plan for joints that belong to no leg."""
+    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg."""
+    position, velocity = scratch.flight_position, scratch.flight_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i]:
-            flight.position[i], flight.velocity[i] = constants.held_angle[i], 0.0
-        elif constants.free[i]:
-            flight.position[i], flight.velocity[i] = planned.position[i], planned.velocity[i]
+            position[i], velocity[i] = constants.held_angle[i], 0.0
+        elif not constants.free[i]:
+            position[i], velocity[i] = legs.position[i], legs.velocity[i]
+        elif constants.planned:
+            position[i], velocity[i] = reference.joint_position[i], reference.joint_velocity[i]
         else:
-            flight.position[i], flight.velocity[i] = legs.position[i], legs.velocity[i]
+            position[i], velocity[i] = constants.standing[i], 0.0
+
+
+# Friction and soft stops
+
+
+@kernel
+def add_friction(
+    joints: JointState,
+    command: JointCommand,
+    params: JointPDParams,
+    constants: JointPDConstants,
+) -> None:
+    """Add the torque that compensates joint friction: Coulomb friction tanh(q' / speed), and viscous.
+
+    The first term is zero at rest and has three quarters of its full value at ``friction_speed``.
+    """
+    torque, speed = command.torque, params.friction_speed
+    torque[:] = torque + math.tanh(joints.velocity / speed) * constants.friction
+    torque[:] = torque + joints.velocity * constants.viscous_friction
+
+
+@kernel
+def add_soft_stops(
+    joints: JointState,
+    command: JointCommand,
+    params: JointPDParams,
+    constants: JointPDConstants,
+) -> None:
+    """Add springs and dampers that begin ``stop_margin`` inside the joints' limits.
+
+    The springs have ``stop_gain`` times the flight stiffness. The damping grows linearly from zero at
+    the margin to ``stop_gain`` times the flight damping at the limit.
+    """
+    margin, gain = params.stop_margin, params.stop_gain
+    for i in range(joints.position.shape[0]):
+        angle = joints.position[i]
+        edge = min(max(angle, constants.limits[i, 0] + margin), constants.limits[i, 1] - margin)
+        depth = abs(angle - edge) / margin
+        if depth > 0.0:
+            spring = gain * constants.flight_stiffness[i]
+            total = spring + command.stiffness[i]
+            if total > 0.0:
+                moment = spring * edge + command.stiffness[i] * command.position[i]
+                command.position[i] = moment / total
+            command.stiffness[i] = total
+            damper = gain * min(depth, 1.0) * constants.flight_damping[i]
+            total = damper + command.damping[i]
+            if total > 0.0:
+                command.velocity[i] = command.damping[i] * command.velocity[i] / total
+            command.damping[i] = total
+
+
+# Default gains
 
 
 def default_gains(robot: RobotDescription) -> tuple[Array, Array]:

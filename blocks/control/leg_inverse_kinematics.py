@@ -7,32 +7,82 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Literal
 
-import numpy as np
-
+from ...mathematics.arrays import Array1D, Matrix3, Vector4
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...robots.description import RobotDescription
+from ...mathematics.interpolation import minimum_jerk
+from ...mathematics.kernel import kernel
 from ...robots.five_joint_leg import Leg, find_leg
 from ...robots.five_joint_track import (
     FootMotion,
-    LegTargets,
+    LegSettings,
     follow_foot,
     leg_geometry,
     leg_scratch,
-    leg_settings,
     watch_line,
 )
 from ...robots.limb import chain_to
 from ...robots.limb_inverse import follow_limb, limb_geometry, limb_memory, watch_foot
-from ...runtime.language.block import Input, Misfit, Output, State
+from ...runtime.language.block import Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import FootTarget, JointState, JointTarget, JumpReference
-from .followed_plan import Flown, Following, PlannedJoints, Soles
-from .leg_targets import begin_targets, end_targets
+from ...runtime.language.steps import call_of, parameter_record, signal_call
+from ..signals import FootTarget, JointState, JointTarget, JumpReference, Phase
 
 LATERAL = 0.9
 """Component along the base's y axis from which on a joint's axis is taken for lateral."""
+LOOKAHEAD = 0.006
+"""The plan's accelerations are read this far [s] ahead, so just before touchdown they are the landing's."""
+
+
+class LegParams(Parameters):
+    """The parameters of ``LegInverseKinematics``."""
+
+    method: Literal["auto", "least_squares"] = parameter(
+        "auto", text="the closed form where it applies, or always the damped least squares"
+    )
+    margin: float = parameter(
+        0.05, unit="rad", ge=0.0, le=0.2, text="distance kept from joint limits"
+    )
+    damping: float = live_parameter(
+        3e-4, unit="m", gt=0.0, text="damping of the least squares for velocity"
+    )
+    turn_length: float = live_parameter(
+        0.3, unit="m", gt=0.0, text="the distance that a foot's rotation by 1 rad is equal to"
+    )
+    speed_limit: float = live_parameter(30.0, unit="rad/s", gt=0.0, text="largest joint velocity")
+    softness: float = live_parameter(
+        0.005,
+        unit="m",
+        ge=0.0,
+        le=0.05,
+        text="distance from full stretch over which a leg slows down",
+    )
+    level: float = live_parameter(
+        0.3, ge=0.001, le=1.0,
+        text="cosine of the hip's pitch below which the hip's yaw goes over to the plan's",
+    )  # fmt: skip
+    follow: Literal["feet", "pitch", "plan"] = parameter(
+        "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
+        "joints as long as the plan flies"
+    )  # fmt: skip
+    plan_lead: float = live_parameter(
+        0.0, unit="s", ge=0.0, le=0.03,
+        text="by how much the joints are ahead of the plan's that they follow, from the middle of "
+        "the flight on",
+    )  # fmt: skip
+    level_time: float = live_parameter(
+        0.0, unit="s", ge=0.0, le=0.2,
+        text="how long before touchdown the soles of a plan that is followed begin to become "
+        "level; never with 0",
+    )  # fmt: skip
+    late_time: float = live_parameter(
+        0.0, unit="s", ge=0.0, le=0.03,
+        text="how long after the planned touchdown legs that follow a plan go on as in its flight",
+    )  # fmt: skip
+    beyond: Literal["turn", "slide"] = live_parameter(
+        "turn", text="where errors are allowed first for a target out of reach"
+    )
 
 
 class LegMemory(Signal):
@@ -47,6 +97,23 @@ class LegMemory(Signal):
     flown_position = Field("n_joints", unit="rad", text="the joints' targets then")
     flown_velocity = Field("n_joints", unit="rad/s", text="their velocities")
     flown_acceleration = Field("n_joints", unit="rad/s^2", text="their planned accelerations")
+
+
+class LegConstants(Signal):
+    """Held joints, and for each foot the joint that levels its sole."""
+
+    held = Field("n_joints", dtype="bool", text="whether the description holds the joint")
+    held_position = Field("n_joints", unit="rad", text="the position at which it is held")
+    sole_joint = Field("n_feet", dtype="int64", text="the last joint about the lateral axis")
+    sole_axis = Field("n_feet", unit="", text="the sign of its axis along y; 0: no such joint")
+    sole_lowest = Field("n_feet", unit="rad", text="its lowest position")
+    sole_highest = Field("n_feet", unit="rad", text="its highest position")
+
+
+class LegScratch(Signal):
+    """Room for a step of ``LegInverseKinematics``."""
+
+    slides = Field(dtype="bool", text="whether a foot out of reach slides in its sole's plane")
 
 
 class LegInverseKinematics(KernelBlock):
@@ -107,57 +174,13 @@ class LegInverseKinematics(KernelBlock):
     legs. The load report names every joint that carries two feet and is not held.
     """
 
-    class Params(Parameters):
-        method: Literal["auto", "least_squares"] = parameter(
-            "auto", text="the closed form where it applies, or always the damped least squares"
-        )
-        margin: float = parameter(
-            0.05, unit="rad", ge=0.0, le=0.2, text="distance kept from joint limits"
-        )
-        damping: float = live_parameter(
-            3e-4, unit="m", gt=0.0, text="damping of the least squares for velocity"
-        )
-        turn_length: float = live_parameter(
-            0.3, unit="m", gt=0.0, text="the distance that a foot's rotation by 1 rad is equal to"
-        )
-        speed_limit: float = live_parameter(
-            30.0, unit="rad/s", gt=0.0, text="largest joint velocity"
-        )
-        softness: float = live_parameter(
-            0.005,
-            unit="m",
-            ge=0.0,
-            le=0.05,
-            text="distance from full stretch over which a leg slows down",
-        )
-        level: float = live_parameter(
-            0.3, ge=0.001, le=1.0,
-            text="cosine of the hip's pitch below which the hip's yaw goes over to the plan's",
-        )  # fmt: skip
-        follow: Literal["feet", "pitch", "plan"] = parameter(
-            "feet", text="the feet's targets; those with the soles' planned pitch; or the plan's "
-            "joints as long as the plan flies"
-        )  # fmt: skip
-        plan_lead: float = live_parameter(
-            0.0, unit="s", ge=0.0, le=0.03,
-            text="by how much the joints are ahead of the plan's that they follow, from the middle of "
-            "the flight on",
-        )  # fmt: skip
-        level_time: float = live_parameter(
-            0.0, unit="s", ge=0.0, le=0.2,
-            text="how long before touchdown the soles of a plan that is followed begin to become "
-            "level; never with 0",
-        )  # fmt: skip
-        late_time: float = live_parameter(
-            0.0, unit="s", ge=0.0, le=0.03,
-            text="how long after the planned touchdown legs that follow a plan go on as in its flight",
-        )  # fmt: skip
-        beyond: Literal["turn", "slide"] = live_parameter(
-            "turn", text="where errors are allowed first for a target out of reach"
-        )
-
+    Params = LegParams
+    Constants = LegConstants
+    Scratch = LegScratch
     needs = ("feet",)
-    params: Params
+    params: LegParams
+    constants: LegConstants
+    scratch: LegScratch
 
     feet = Input(FootTarget, text="where the feet should be, relative to the base")
     joints = Input(JointState, text="measured joints, where the least squares begin")
@@ -169,77 +192,52 @@ class LegInverseKinematics(KernelBlock):
     memory = State(LegMemory, text="the last targets and the last solution")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report joints that two legs share."""
+        robot = context.robot
         assert robot is not None
         uses = Counter(joint for foot in robot.feet for joint in chain_to(robot, foot.link))
         for joint, count in uses.items():
             name = robot.joints[joint].name
             if count > 1 and name not in robot.held:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"joint {name} of {robot.name} carries {count} feet; the inverse kinematics "
                     "solves every leg by itself, so it can only hold such a joint",
                     fix=f"in the robot's description: held: {{{name}: 0.0}}",
                 )
 
     def setup(self) -> None:
-        robot, p, memory = self.robot, self.params, self.memory
-        self._settings, self._may_slide = leg_settings(), np.zeros(1, np.bool_)
-        self._following = Following(*(np.zeros(1) for _ in Following._fields))
-        self.on_parameters()
-        self._target = LegTargets(*(getattr(self.target, name) for name in LegTargets._fields))
-        held = {
-            k: robot.held[joint.name]
-            for k, joint in enumerate(robot.joints)
-            if joint.name in robot.held
-        }
-        begin = KernelCall(
-            begin_targets, self.joints.position, np.array(list(held), np.int64),
-            np.array(list(held.values()), np.float64), self._may_slide,
-            self.reference.toes_first, self._settings.slides, self._target,
+        robot, constants = self.robot, self.constants
+        for k, joint in enumerate(robot.joints):
+            if joint.name in robot.held:
+                constants.held[k], constants.held_position[k] = True, robot.held[joint.name]
+        self._find_sole_joints()
+        live = parameter_record(
+            self, {"softness", "turn_length", "damping", "level", "speed_limit"}
+        )
+        self._settings = LegSettings(
+            live.softness, live.turn_length, live.damping, live.level, live.speed_limit,
+            self.scratch.slides,
         )  # fmt: skip
         legs: list[KernelCall] = []
         for foot in range(len(robot.feet)):
-            leg = find_leg(robot, foot) if p.method == "auto" else None
+            leg = find_leg(robot, foot) if self.params.method == "auto" else None
             legs += self._least_squares(foot) if leg is None else self._closed_form(foot, leg)
-        plan = PlannedJoints(*(getattr(self.reference, name) for name in PlannedJoints._fields))
-        end = KernelCall(
-            end_targets, p.follow == "plan", self._following, self._soles(), plan,
-            Flown(
-                memory.flew, memory.flown_time, memory.flown_position, memory.flown_velocity,
-                memory.flown_acceleration,
-            ),
-            self._target, memory.known, memory.position,
-        )  # fmt: skip
-        self.kernel_calls = (begin, *legs, end)
+        self.kernel_calls = (call_of(self, begin_targets), *legs, call_of(self, finish_targets))
 
-    def on_parameters(self) -> None:
-        p, settings = self.params, self._settings
-        settings.softness[0], settings.turn_length[0] = p.softness, p.turn_length
-        settings.damping[0], settings.speed_limit[0] = p.damping, p.speed_limit
-        settings.level[0] = p.level
-        self._may_slide[0] = p.beyond == "slide"
-        for name in Following._fields:
-            getattr(self._following, name)[0] = getattr(p, name)
-
-    def _soles(self) -> Soles:
-        """The last joint of every leg that turns a sole with an extent about the lateral axis."""
-        robot, margin = self.robot, self.params.margin
-        joints, axes = [], []
-        for number, foot in enumerate(robot.feet):
-            chain = chain_to(robot, foot.link)
-            turning = [joint for joint in chain if abs(robot.joints[joint].axis[1]) > LATERAL]
-            if robot.foot_of_contact().count(number) < 2 or not turning:
-                turning, axis = [chain[-1]], 0.0
-            else:
-                axis = math.copysign(1.0, robot.joints[turning[-1]].axis[1])
-            joints.append(turning[-1])
-            axes.append(axis)
-        limits = robot.joint_limits[joints]
-        return Soles(
-            self.feet.rotation, np.array(joints, np.int64), np.array(axes), limits[:, 0] + margin,
-            limits[:, 1] - margin,
-        )  # fmt: skip
+    def _find_sole_joints(self) -> None:
+        """Find the last joint of each leg about the lateral axis, where the sole has an extent."""
+        robot, margin, constants = self.robot, self.params.margin, self.constants
+        for foot in range(len(robot.feet)):
+            chain = chain_to(robot, robot.feet[foot].link)
+            lateral = [joint for joint in chain if abs(robot.joints[joint].axis[1]) > LATERAL]
+            joint = lateral[-1] if lateral else chain[-1]
+            if lateral and robot.foot_of_contact().count(foot) > 1:
+                constants.sole_axis[foot] = math.copysign(1.0, robot.joints[joint].axis[1])
+            constants.sole_joint[foot] = joint
+            lowest, highest = robot.joint_limits[joint]
+            constants.sole_lowest[foot] = lowest + margin
+            constants.sole_highest[foot] = highest - margin
 
     def _closed_form(self, foot: int, leg: Leg) -> tuple[KernelCall, KernelCall]:
         """The calls for a five-joint leg."""
@@ -249,10 +247,10 @@ class LegInverseKinematics(KernelBlock):
             self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, self.memory.known,
             self.memory.direction[foot], scratch,
         )  # fmt: skip
-        follow = KernelCall(
+        follow = signal_call(
             follow_foot, leg_geometry(leg, self.params.margin), foot, motion,
             self.reference.joint_position, self.reference.joint_velocity, self._settings, scratch,
-            self._target,
+            self.target,
         )  # fmt: skip
         return watch, follow
 
@@ -265,9 +263,9 @@ class LegInverseKinematics(KernelBlock):
             self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, memory.known,
             memory.target[foot], scratch,
         )  # fmt: skip
-        follow = KernelCall(
+        follow = signal_call(
             follow_limb, limb, foot, motion, self.joints.position, memory.known, memory.position,
-            self._settings, scratch, self._target,
+            self._settings, scratch, self.target,
         )  # fmt: skip
         return watch, follow
 
@@ -275,3 +273,164 @@ class LegInverseKinematics(KernelBlock):
         """The target of one foot."""
         feet = self.feet
         return FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot])
+
+
+# Before and after the legs
+
+
+@kernel
+def begin_targets(
+    joints: JointState,
+    reference: JumpReference,
+    target: JointTarget,
+    params: LegParams,
+    constants: LegConstants,
+    scratch: LegScratch,
+) -> None:
+    """Set held joints to their position and all others to the measured one.
+
+    Where the plan lands on the toes first no foot slides: a sole laid flat would land on all its points.
+    """
+    scratch.slides = params.beyond == "slide" and not reference.toes_first
+    target.position[:] = joints.position
+    target.velocity[:] = 0.0
+    for joint in range(constants.held.shape[0]):
+        if constants.held[joint]:
+            target.position[joint] = constants.held_position[joint]
+
+
+@kernel
+def finish_targets(
+    feet: FootTarget,
+    reference: JumpReference,
+    target: JointTarget,
+    params: LegParams,
+    constants: LegConstants,
+    memory: LegMemory,
+) -> None:
+    """Replace the solution by the plan's joints where they are followed, and remember it."""
+    if params.follow == "plan":
+        if reference.phase == Phase.FLIGHT:
+            follow_plan(feet, reference, target, params, constants, memory)
+        else:
+            continue_flight(reference, target, params, memory)
+    memory.position[:] = target.position
+    memory.known = True
+
+
+# Following the plan's joints
+
+
+@kernel
+def follow_plan(
+    feet: FootTarget,
+    reference: JumpReference,
+    target: JointTarget,
+    params: LegParams,
+    constants: LegConstants,
+    memory: LegMemory,
+) -> None:
+    """Set the plan's joints, ahead of time and with level soles, and remember them for a late landing."""
+    ahead = params.plan_lead * lead_share(reference)
+    pitch = planned_pitch(reference.orientation)
+    if not keeps_acceleration(reference, params, memory):
+        memory.flown_acceleration[:] = reference.joint_acceleration
+    extrapolate(
+        reference.joint_position, reference.joint_velocity, memory.flown_acceleration, ahead, target
+    )
+    for foot in range(target.reachable.shape[0]):
+        target.reachable[foot] = True
+        if params.level_time > 0.0 and constants.sole_axis[foot] != 0.0:
+            level_sole(foot, feet, reference, target, params, constants, pitch)
+    memory.flew = True
+    memory.flown_time = reference.time
+    memory.flown_position[:] = target.position
+    memory.flown_velocity[:] = target.velocity
+
+
+@kernel
+def continue_flight(
+    reference: JumpReference, target: JointTarget, params: LegParams, memory: LegMemory
+) -> None:
+    """Let the joints move on as in the plan's flight for ``late_time`` after the planned touchdown.
+
+    So the feet of a robot that lands late keep slowing down.
+    """
+    since = reference.time - memory.flown_time
+    if memory.flew and since < params.late_time:
+        extrapolate(
+            memory.flown_position, memory.flown_velocity, memory.flown_acceleration, since, target
+        )
+
+
+@kernel
+def extrapolate(
+    position: Array1D, velocity: Array1D, acceleration: Array1D, duration: float, out: JointTarget
+) -> None:
+    """Joint positions and velocities after ``duration`` [s] with constant acceleration."""
+    for joint in range(position.shape[0]):
+        change = acceleration[joint] * duration
+        out.position[joint] = position[joint] + duration * (velocity[joint] + 0.5 * change)
+        out.velocity[joint] = velocity[joint] + change
+
+
+@kernel
+def keeps_acceleration(reference: JumpReference, params: LegParams, memory: LegMemory) -> bool:
+    """Whether the last accelerations stay, because the plan's may be the landing's already.
+
+    A ``touchdown_time`` that has long passed is that of the flight before.
+    """
+    if params.late_time == 0.0 or not memory.flew:
+        return False
+    return bool(abs(reference.touchdown_time - reference.time) <= LOOKAHEAD)
+
+
+@kernel
+def lead_share(reference: JumpReference) -> float:
+    """The share of the lead that counts: it grows from 0 at lift-off to 1 in the middle of the flight.
+
+    From its middle on the plan may name the times of the next flight already.
+    """
+    since = reference.time - reference.lift_off_time
+    duration = reference.touchdown_time - reference.lift_off_time
+    if since < 0.0 or duration <= 0.0:
+        return 1.0
+    return float(min(2.0 * since / duration, 1.0))
+
+
+@kernel
+def planned_pitch(orientation: Vector4) -> float:
+    """The angle [rad] about its y axis by which a quaternion x, y, z, w turns the base."""
+    x, y, z, w = orientation[0], orientation[1], orientation[2], orientation[3]
+    return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+@kernel
+def excess_pitch(level: Matrix3, pitch: float) -> float:
+    """By how much [rad] the base has turned further about its y axis than the plan's ``pitch`` [rad].
+
+    Args:
+        level: the rotation of a level sole in the base's axes.
+    """
+    error = math.atan2(level[2, 0], level[0, 0]) - pitch
+    return math.atan2(math.sin(error), math.cos(error))
+
+
+@kernel
+def level_sole(
+    foot: int,
+    feet: FootTarget,
+    reference: JumpReference,
+    target: JointTarget,
+    params: LegParams,
+    constants: LegConstants,
+    pitch: float,
+) -> None:
+    """Turn a sole against the base's excess pitch, by the last joint of its leg."""
+    since = reference.time - reference.touchdown_time + params.level_time
+    share, _, _ = minimum_jerk(2.0 * since / params.level_time)
+    joint, error = constants.sole_joint[foot], excess_pitch(feet.rotation[foot], pitch)
+    angle = target.position[joint] - share * constants.sole_axis[foot] * error
+    target.position[joint] = min(
+        max(angle, constants.sole_lowest[foot]), constants.sole_highest[foot]
+    )

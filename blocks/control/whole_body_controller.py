@@ -35,7 +35,7 @@ from ...mathematics.whole_body_solution import (
     solve_whole_body,
 )
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
@@ -205,45 +205,44 @@ class WholeBodyController(KernelBlock):
     memory = State(SolverMemory, text="used when the solver fails")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Report a solver that is not installed, and feet that can carry no load."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a solver that is not installed, feet that can carry no load, and wrong tasks."""
+        robot = context.robot
         assert isinstance(params, cls.Params) and robot is not None
         if not robot.contacts:
-            yield Misfit(f"{robot.name} has no contact points, so its feet can carry no load")
+            yield UnmetRequirement(
+                f"{robot.name} has no contact points, so its feet can carry no load"
+            )
         try:
             if params.solver != OWN_SOLVER:
                 QuadraticProgramSolver.check_name(params.solver)
         except LookupError as error:
-            yield Misfit(
+            yield UnmetRequirement(
                 str(error), parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}"
             )
         if params.cones == "round" and params.solver not in (OWN_SOLVER, "clarabel"):
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{params.solver} cannot solve a program with round cones; {OWN_SOLVER} and clarabel can",
                 parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}",
             )  # fmt: skip
         for foot in robot.feet:
             if foot.link == robot.base:
-                yield Misfit(f"foot {foot.name} of {robot.name} is part of the base, not of a leg")
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report unknown tasks, and gains that a task does not have or that misfit the robot."""
-        assert isinstance(params, cls.Params)
+                yield UnmetRequirement(
+                    f"foot {foot.name} of {robot.name} is part of the base, not of a leg"
+                )
         try:
             for chosen in choose_tasks(params.tasks, (context.graph_folder, context.folder)):
                 found: dict[str, None] = {}
                 for kind in PHASE_KINDS:
                     gains = chosen.params(kind, getattr(params, kind))
-                    if context.robot is not None:
-                        found.update(dict.fromkeys(chosen.kind.misfits(gains, context.robot)))
+                    found.update(dict.fromkeys(chosen.kind.unmet_requirements(gains, robot)))
                 for reason in found:
-                    yield Misfit(f"task {chosen.entry.task}: {reason}", parameter="tasks")
+                    yield UnmetRequirement(f"task {chosen.entry.task}: {reason}", parameter="tasks")
         except TaskChoiceError as error:
-            yield Misfit(str(error), parameter="tasks")
+            yield UnmetRequirement(str(error), parameter="tasks")
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,

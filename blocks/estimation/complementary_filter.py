@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.inertial_filter import correct_tilt_from_gravity
 from ...mathematics.kernel import kernel
-from .base_filter import (
-    Estimator,
+from ..signals import BaseState, ImuReading, JointState
+from .inertial_estimator import (
+    BaseEstimate,
+    BiasSamples,
+    InertialConstants,
+    InertialEstimator,
+    InertialParameters,
+    InertialScratch,
+    LegKinematics,
     count_standing,
     forget_samples,
     is_unaccelerated,
@@ -15,28 +21,6 @@ from .base_filter import (
     predict,
     use_contacts,
 )
-from .inertial_estimator import InertialEstimator
-
-
-@kernel
-def filter_tick(estimator: Estimator) -> None:
-    """A tick of the paper's filter; every point in contact has the weight one."""
-    estimate, sample, learning = estimator.filter, estimator.sample, estimator.learning
-    points = estimator.legs.points
-    fastest = predict(estimator)
-    if fastest < estimator.settings.still_rate[0]:
-        learning.filling_sum[:] += sample.gyro
-        learn_bias(learning, estimator.fixed.block, estimate.gyro_bias, 10.0)
-    else:
-        forget_samples(learning)
-    if is_unaccelerated(sample.force) and count_standing(points.active) > 0:
-        correct_tilt_from_gravity(
-            estimate.orientation, sample.force, estimator.settings.tilt_gain[0],
-            estimator.scratch.spare,
-        )  # fmt: skip
-    place_points(estimator)
-    points.weights[:] = 1.0 if points.active else 0.0
-    use_contacts(estimator, 1.0, 1.0)
 
 
 class ComplementaryFilter(InertialEstimator):
@@ -59,5 +43,30 @@ class ComplementaryFilter(InertialEstimator):
 
     starts_level = False
 
-    def make_call(self, estimator: Estimator) -> KernelCall:
-        return KernelCall(filter_tick, estimator)
+    @kernel
+    @staticmethod
+    def step(
+        imu: ImuReading,
+        joints: JointState,
+        base: BaseState,
+        estimate: BaseEstimate,
+        learning: BiasSamples,
+        legs: LegKinematics,
+        params: InertialParameters,
+        constants: InertialConstants,
+        scratch: InertialScratch,
+    ) -> None:
+        points = legs.points
+        fastest = predict(imu, joints, estimate, legs, constants, scratch)
+        if fastest < params.still_rate:
+            learning.filling_sum[:] += scratch.gyro
+            learn_bias(learning, constants.block_size, estimate.gyro_bias, 10.0)
+        else:
+            forget_samples(learning)
+        if is_unaccelerated(scratch.force) and count_standing(points.active) > 0:
+            correct_tilt_from_gravity(
+                estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
+            )
+        place_points(estimate, legs)
+        points.weights[:] = 1.0 if points.active else 0.0
+        use_contacts(estimate, legs, base, params, constants, scratch, 1.0, 1.0)

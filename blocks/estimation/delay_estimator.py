@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array1D
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, JointCommand, JointState
-from .delay_sums import LAGS, Memory, follow_delay, give_delay
+
+LAGS = 12
+"""Delays up to this many periods less one can be measured."""
+_SOLVE_EVERY = 25
+"""Ticks between two solutions."""
 
 
 class DelayMemory(Signal):
@@ -27,6 +32,48 @@ class DelayMemory(Signal):
     ticks = Field(dtype="int64", text="ticks so far")
     delay = Field(unit="s", text="measured; negative while it is not known")
     matched = Field(unit="", text="share of the measured changes that this delay explains")
+
+
+class DelayEstimatorParameters(Parameters):
+    """The parameters of ``DelayEstimator``."""
+
+    told: float = parameter(0.002, unit="s", ge=0.0, le=0.02, text="the delay that the graph says")
+    follow: Literal["measured", "told"] = parameter("measured", text="which of both is the output")
+    duration: float = parameter(
+        0.6, unit="s", gt=0.0, text="the first part of a run, in which it is measured"
+    )
+    least_time: float = parameter(
+        0.1, unit="s", gt=0.0, text="time after which the measurement may count"
+    )
+    least_match: float = parameter(
+        0.8, gt=0.0, le=1.0, text="share of the torques' changes that it must explain"
+    )
+    usual: float = parameter(
+        0.00075, unit="s", ge=0.0, text="jitter and sampling, which nobody tells"
+    )
+    tolerated: float = parameter(
+        0.002,
+        unit="s",
+        ge=0.0,
+        le=0.02,
+        text="the delay that the feedback bears, and that is not predicted",
+    )
+    tolerance: float = parameter(
+        0.001, unit="s", gt=0.0, text="difference of both without a warning"
+    )
+
+
+class DelayConstants(Signal):
+    """When the delay is measured, in ticks."""
+
+    first_tick = Field(dtype="int64", text="tick from which on the measurement may count")
+    last_tick = Field(dtype="int64", text="tick in which it ends")
+
+
+class DelayScratch(Signal):
+    """Room for a tick of ``DelayEstimator``."""
+
+    torque_change = Field("n_joints", unit="N m", text="change of the measured torques")
 
 
 class DelayEstimator(Block):
@@ -47,7 +94,7 @@ class DelayEstimator(Block):
     simulator says. With ``follow: measured`` the output is the measured delay as soon as it counts,
     less ``usual``, by which it is longer than what is told where that is right, and at first and
     otherwise what is told. With ``follow: told`` it is always that. The result of a run has a
-    caution where both differ by more than ``tolerance``.
+    warning where both differ by more than ``tolerance``.
 
     **Ahead.** Feedback bears a short delay, a long one takes its phase margin. Of a task with the gains
     Kp and Kd the open loop is (Kd s + Kp) exp(-s d) / s^2, so its crossover frequency w and its phase
@@ -64,64 +111,62 @@ class DelayEstimator(Block):
     It is a Moore block, so the plan that leads by its output may be what the command follows from.
     """
 
-    class Params(Parameters):
-        told: float = parameter(
-            0.002, unit="s", ge=0.0, le=0.02, text="the delay that the graph says"
-        )
-        follow: Literal["measured", "told"] = parameter(
-            "measured", text="which of both is the output"
-        )
-        duration: float = parameter(
-            0.6, unit="s", gt=0.0, text="the first part of a run, in which it is measured"
-        )
-        least_time: float = parameter(
-            0.1, unit="s", gt=0.0, text="time after which the measurement may count"
-        )
-        least_match: float = parameter(
-            0.8, gt=0.0, le=1.0, text="share of the torques' changes that it must explain"
-        )
-        usual: float = parameter(
-            0.00075, unit="s", ge=0.0, text="jitter and sampling, which nobody tells"
-        )
-        tolerated: float = parameter(
-            0.002,
-            unit="s",
-            ge=0.0,
-            le=0.02,
-            text="the delay that the feedback bears, and that is not predicted",
-        )
-        tolerance: float = parameter(
-            0.001, unit="s", gt=0.0, text="difference of both without a caution"
-        )
-
+    Params = DelayEstimatorParameters
+    Constants = DelayConstants
+    Scratch = DelayScratch
     needs = ("robot",)
-    params: Params
+    params: DelayEstimatorParameters
+    constants: DelayConstants
     command = Input(JointCommand, text="what the drives were sent")
     joints = Input(JointState, text="the torques that they report")
     estimate = Output(DelayEstimate, text="the delay to compensate")
     memory = State(DelayMemory, text="sums over the run so far")
 
-    def setup(self) -> None:
-        p, estimate = self.params, self.estimate
-        memory = Memory(*(getattr(self.memory, name) for name in Memory._fields))
-        self._give = KernelCall(
-            give_delay, p.told, p.usual, p.follow == "measured", memory, p.tolerated,
-            estimate.measured, estimate.known, estimate.delay, estimate.ahead,
-        )  # fmt: skip
-        self._follow = KernelCall(
-            follow_delay, self.command.torque, self.joints.torque,
-            round(p.least_time / self.period), round(p.duration / self.period), p.least_match,
-            self.period, memory,
-        )  # fmt: skip
+    def prepare(self) -> None:
+        self.constants.first_tick = round(self.params.least_time / self.period)
+        self.constants.last_tick = round(self.params.duration / self.period)
 
     def start(self) -> None:
-        self.memory.delay[()] = -1.0
+        self.memory.delay = -1.0
 
-    def emit(self) -> None:
-        self._give.run()
+    @kernel
+    @staticmethod
+    def emit(
+        memory: DelayMemory, estimate: DelayEstimate, params: DelayEstimatorParameters
+    ) -> None:
+        estimate.measured = max(memory.delay, 0.0)
+        estimate.known = memory.delay >= 0.0
+        estimate.delay = params.told
+        if estimate.known and params.follow == "measured":
+            estimate.delay = max(memory.delay - params.usual, 0.0)
+        estimate.ahead = max(estimate.delay - params.tolerated, 0.0)
 
-    def update(self) -> None:
-        self._follow.run()
+    @kernel
+    @staticmethod
+    def update(
+        command: JointCommand,
+        joints: JointState,
+        memory: DelayMemory,
+        params: DelayEstimatorParameters,
+        constants: DelayConstants,
+        scratch: DelayScratch,
+        period: float,
+    ) -> None:
+        ticks = memory.ticks
+        if ticks > constants.last_tick:
+            return
+        if ticks > LAGS + 1:  # before, some changes are those from nothing to the first command
+            scratch.torque_change[:] = joints.torque - memory.torque
+            correlate_changes(scratch.torque_change, memory)
+        for lag in range(LAGS - 1, 0, -1):
+            memory.changes[lag, :] = memory.changes[lag - 1]
+        memory.changes[0, :] = command.torque - memory.command
+        memory.command[:] = command.torque
+        memory.torque[:] = joints.torque
+        memory.ticks = ticks + 1
+        due = ticks % _SOLVE_EVERY == 0 or ticks == constants.last_tick
+        if due and ticks >= constants.first_tick:
+            solve_delay(memory, params, period)
 
     def metrics(self) -> Mapping[str, Metric]:
         """What was told and measured."""
@@ -130,7 +175,7 @@ class DelayEstimator(Block):
             values["delay_measured_ms"] = 1e3 * float(self.memory.delay)
         return values
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         """Say where the measured delay is not the one that was told."""
         p, measured = self.params, float(self.memory.delay)
         if measured < 0.0 or abs(measured - p.usual - p.told) <= p.tolerance:
@@ -142,3 +187,35 @@ class DelayEstimator(Block):
                 f"{followed}, and {1e3 * p.told:g} ms as told; correct `told` or the robot's delay"
             ),
         )
+
+
+@kernel
+def correlate_changes(torque_change: Array1D, memory: DelayMemory) -> None:
+    """Add the products of this tick's changes to the sums."""
+    memory.energy += torque_change @ torque_change
+    memory.product[:] += memory.changes @ torque_change
+    memory.square[:] += memory.changes @ memory.changes.T
+
+
+@kernel
+def solve_delay(memory: DelayMemory, params: DelayEstimatorParameters, period: float) -> None:
+    """Find the delay, a number of periods and a share of one, that leaves the least unexplained."""
+    energy, square, product = memory.energy, memory.square, memory.product
+    if energy <= 0.0:
+        return
+    least, delay = energy, -1.0
+    for j in range(LAGS - 1):
+        newer, both, older = square[j, j], square[j, j + 1], square[j + 1, j + 1]
+        curvature = newer - 2.0 * both + older
+        if curvature <= 0.0:
+            continue
+        share = (product[j + 1] - product[j] - both + newer) / curvature
+        share = min(max(share, 0.0), 1.0)
+        rest = 1.0 - share
+        error = energy - 2.0 * (rest * product[j] + share * product[j + 1])
+        error += rest * rest * newer + 2.0 * share * rest * both
+        error += share * share * older
+        if error < least:
+            least, delay = error, (j + share) * period
+    memory.matched = 1.0 - least / energy
+    memory.delay = delay if memory.matched >= params.least_match else -1.0

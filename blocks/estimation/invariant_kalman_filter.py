@@ -4,28 +4,70 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.invariant_filter import error_transition
+from ...mathematics.inertial_filter import (
+    misalignment,
+    orientation_from_gravity,
+    propagate,
+    rotate_in_world,
+)
+from ...mathematics.invariant_filter import (
+    add_contact_noise,
+    error_transition,
+    input_jacobian,
+    propagate_covariance,
+    sample_deviations,
+    vector_deviation,
+)
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import rotate, to_matrix
 from ...robots.contact_kinematics import (
     ContactKinematics,
+    ContactMotion,
+    Contacts,
     Measured,
+    Rigid,
     contact_motion,
     differentiate_contacts,
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters
 from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
-from .invariant_estimate import InvariantEstimate, InvariantFilterParameters
-from .invariant_records import Base, Estimate, Health, Points, Samples, Tuning, Work
-from .invariant_steps import take_samples, use_contacts
+from .invariant_update import (
+    InvariantConstants,
+    InvariantEstimate,
+    InvariantFilterParameters,
+    InvariantScratch,
+    add_contacts,
+    define_world,
+    use_contacts,
+    use_ground,
+)
+
+_FASTEST_TURN = 100.0
+_STRONGEST_FORCE = 1000.0
+"""Sensor values are limited to these [rad/s, m/s^2], so that nothing can overflow."""
+_START_TURN = 0.05
+_START_SPEED = 0.01
+_START_PLACE = 0.02
+"""Standard deviations at the start [rad, m/s, m], before the feet have been used."""
+
+
+class TrackedContacts(NamedTuple):
+    """Where the contact points are: see ``ContactKinematics``. ``tracked`` are those of the filter."""
+
+    rigid: Rigid
+    contacts: Contacts
+    tracked: Contacts
+    measured: Measured
+    motion: ContactMotion
 
 
 def tracked_points(robot: RobotDescription) -> tuple[Array, Array]:
@@ -45,7 +87,7 @@ def tracked_points(robot: RobotDescription) -> tuple[Array, Array]:
     return points, heights
 
 
-class InvariantKalmanFilter(KernelBlock):
+class InvariantKalmanFilter(Block):
     """A contact-aided right-invariant extended Kalman filter (Hartley et al. 2020).
 
     Same ports as ``StateEstimator``: ``set: {estimator.use: blocks.InvariantKalmanFilter}``.
@@ -56,7 +98,7 @@ class InvariantKalmanFilter(KernelBlock):
     offsets are larger than its encoder noise. The error is xi = log(X_est X^-1).
 
     **Prediction.** The state is propagated by the IMU, as in ``StateEstimator``, and the covariance
-    by a transition that does not depend on the trajectory (``invariant_propagation``). In flight
+    by a transition that does not depend on the trajectory (``mathematics/invariant_filter``). In flight
     there is only the prediction.
 
     **Contacts.** A point that is reported active, while the IMU measures support, is added to the
@@ -84,8 +126,12 @@ class InvariantKalmanFilter(KernelBlock):
     """
 
     Params = InvariantFilterParameters
+    Constants = InvariantConstants
+    Scratch = InvariantScratch
     needs = ("floating base", "imu", "feet")
     params: InvariantFilterParameters
+    constants: InvariantConstants
+    scratch: InvariantScratch
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
     joints = Input(JointState, text="joint angles and velocities")
@@ -104,67 +150,192 @@ class InvariantKalmanFilter(KernelBlock):
         return {"n_vectors": 2 + n, "n_errors": 15 + 3 * n + len(robot.joints)}
 
     def setup(self) -> None:
-        """The robot's kinematics, constant matrices and scratch memory."""
-        robot, estimate = (
-            self.robot,
-            Estimate(*(getattr(self.estimate, name) for name in Estimate._fields)),
-        )
-        seen, points = ContactKinematics(robot), len(robot.contacts)
-        joints, size = len(robot.joints), self.estimate.covariance.shape[0]
-        tuning, work = self._tuning(), self._work(points, size, joints)
-        foot = np.array(robot.foot_of_contact(), np.int64)
-        samples = Samples(*(np.zeros(n) for n in (3, 3, 6, joints, joints)))
-        health = Health(*(getattr(self.health, name) for name in Health._fields))
-        tracked, radius = tracked_points(robot)
-        rolling = seen.contacts._replace(centre=tracked)
-        self.kernel_calls = (
-            KernelCall(
-                take_samples, self.imu.angular_velocity, self.imu.specific_force,
-                self.joints.position, foot, estimate, tuning, samples, work, health,
+        robot, constants, scratch = self.robot, self.constants, self.scratch
+        kinematics = ContactKinematics(robot)
+        points, constants.height[:] = tracked_points(robot)
+        constants.foot[:] = robot.foot_of_contact()
+        constants.heading_levers[:] = kinematics.heading_levers
+        self.legs = TrackedContacts(
+            kinematics.rigid,
+            kinematics.contacts,
+            kinematics.contacts._replace(centre=points),
+            Measured(
+                self.estimate.orientation, self.estimate.angular_velocity, scratch.angles,
+                np.zeros(len(robot.joints)),
             ),
-            KernelCall(
-                contact_motion, seen.rigid, seen.contacts,
-                Measured(
-                    estimate.orientation, estimate.angular_velocity, samples.angles,
-                    np.zeros(joints),
-                ),
-                seen.seen,
-            ),
-            KernelCall(
-                differentiate_contacts, seen.rigid, rolling, seen.centres, seen.jacobians
-            ),
-            KernelCall(
-                use_contacts, self.contacts.active, estimate, tuning, samples,
-                Points(
-                    foot, radius, seen.points, seen.centres, seen.jacobians, seen.soles,
-                    seen.forward, seen.heading_levers,
-                ),
-                work, health, Base(*(getattr(self.base, name) for name in Base._fields)),
-            ),
+            kinematics.seen,
         )  # fmt: skip
-        self.seen = seen
-        """What the legs' kinematics see, between the third call and the last."""
 
-    def _tuning(self) -> Tuning:
-        """The parameters as kernels take them."""
-        params = self.params
-        given = {name: getattr(params, name, None) for name in Tuning._fields[:-3]}
-        numbers = [math.inf if value is None else float(value) for value in given.values()]
-        ground = params.ground
-        return Tuning._make([*numbers, ground == "level", ground == "flat", self.period])
+    def prepare(self) -> None:
+        params, constants = self.params, self.constants
+        constants.place_noise[:] = params.kinematics_noise**2 * np.eye(3)
+        constants.gyro_range = math.inf if params.gyro_range is None else params.gyro_range
+        limit = params.accelerometer_range
+        constants.accelerometer_range = math.inf if limit is None else limit
+        error_transition(GRAVITY, self.period, constants.transition)
 
-    def _work(self, points: int, size: int, joints: int) -> Work:
-        """The constant transition, and scratch memory."""
-        transition = np.zeros((size, size))
-        error_transition(GRAVITY, self.period, transition)
-        shapes: tuple[tuple[int, ...], ...] = (
-            (size, 6), (size, 6), (size, size), (size,), (3, size), (3, size), (size, 3),
-            (size, 3), (3, 3), (3, 3), (3,), (3, 3), (3, 3), (3, 3), (2 + points, 3), (3, joints),
-            (3,), (3,), (3,), (4,), (4,), (3,), (joints,),
-        )  # fmt: skip
-        work = Work._make([
-            transition, *(np.zeros(shape) for shape in shapes), np.zeros(points, np.bool_),
-            np.zeros(points, np.int64),
-        ])  # fmt: skip
-        work.place_noise[...] = self.params.kinematics_noise**2 * np.eye(3)
-        return work
+    @kernel
+    @staticmethod
+    def step(
+        imu: ImuReading,
+        joints: JointState,
+        contacts: ContactState,
+        base: BaseState,
+        health: EstimatorHealth,
+        estimate: InvariantEstimate,
+        legs: TrackedContacts,
+        params: InvariantFilterParameters,
+        constants: InvariantConstants,
+        scratch: InvariantScratch,
+        period: float,
+    ) -> None:
+        take_samples(imu, estimate, params, constants, scratch, health)
+        if estimate.started:
+            predict(estimate, params, constants, scratch, period)
+        else:
+            orientation_from_gravity(scratch.force, estimate.orientation)
+        scratch.used_offset[:] = estimate.encoder_offset
+        scratch.angles[:] = joints.position - scratch.used_offset
+        contact_motion(legs.rigid, legs.contacts, legs.measured, legs.motion)
+        differentiate_contacts(legs.rigid, legs.tracked, scratch.centres, scratch.centre_jacobians)
+        to_matrix(estimate.orientation, scratch.rotation)
+        if not estimate.started:
+            start(estimate, legs.motion, params, constants, scratch)
+        use_contacts(contacts, estimate, params, constants, scratch, health, period)
+        if params.ground != "unknown":
+            use_ground(estimate, params, constants, scratch, health, period)
+        publish(estimate, scratch, health, base)
+
+
+@kernel
+def take_samples(
+    imu: ImuReading,
+    estimate: InvariantEstimate,
+    params: InvariantFilterParameters,
+    constants: InvariantConstants,
+    scratch: InvariantScratch,
+    health: EstimatorHealth,
+) -> None:
+    """The IMU's sample without biases, and its noise for each axis, by whether it is saturated."""
+    rate, force, noise = scratch.rate, scratch.force, scratch.noise
+    rate[:] = min(max(imu.angular_velocity, -_FASTEST_TURN), _FASTEST_TURN)
+    force[:] = min(max(imu.specific_force, -_STRONGEST_FORCE), _STRONGEST_FORCE)
+    health.gyro_saturated = sample_deviations(
+        rate, constants.gyro_range, params.gyro_noise, params.saturated_rate,
+        estimate.saturated_run[:3], noise[:3],
+    )  # fmt: skip
+    health.accelerometer_saturated = sample_deviations(
+        force, constants.accelerometer_range, params.accelerometer_noise, params.saturated_force,
+        estimate.saturated_run[3:], noise[3:],
+    )  # fmt: skip
+    if health.gyro_saturated or health.accelerometer_saturated:
+        estimate.saturated_ticks += 1
+    health.saturated_ticks = estimate.saturated_ticks
+    scratch.last_rate[:] = estimate.angular_velocity
+    estimate.angular_velocity[:] = rate - estimate.gyro_bias
+    for k in range(3):
+        aliased = params.gyro_aliasing * (estimate.angular_velocity[k] - scratch.last_rate[k])
+        noise[k] = math.sqrt(noise[k] * noise[k] + aliased * aliased)
+    force[:] -= estimate.accelerometer_bias
+
+
+@kernel
+def predict(
+    estimate: InvariantEstimate,
+    params: InvariantFilterParameters,
+    constants: InvariantConstants,
+    scratch: InvariantScratch,
+    period: float,
+) -> None:
+    """Propagate the state and the covariance over the period before this tick."""
+    covariance, vectors = estimate.covariance, scratch.middle_vectors
+    propagate(
+        estimate.orientation, estimate.vectors[1], estimate.vectors[0], scratch.last_rate,
+        estimate.angular_velocity, scratch.force, period, scratch.middle, scratch.acceleration,
+    )  # fmt: skip
+    to_matrix(scratch.middle, scratch.rotation)
+    vectors[:] = estimate.vectors
+    vectors[0, :] -= 0.5 * period * scratch.acceleration
+    vectors[1, :] -= 0.5 * period * vectors[0]
+    input_jacobian(
+        scratch.rotation, vectors, estimate.present, GRAVITY, period, scratch.input_jacobian
+    )
+    bias = 3 + 3 * vectors.shape[0]
+    propagate_covariance(
+        constants.transition, scratch.input_jacobian, bias, scratch.noise, covariance,
+        scratch.scaled, scratch.product,
+    )  # fmt: skip
+    x, y, z = scratch.force[0], scratch.force[1], scratch.force[2]
+    pressed = params.impact_slide * max(math.sqrt(x * x + y * y + z * z) - GRAVITY, 0.0)
+    slide = math.sqrt(params.slide_noise * params.slide_noise + pressed * pressed)
+    add_contact_noise(
+        constants.foot, estimate.present, params.contact_noise, slide, period, covariance
+    )
+    gyro_walk, accelerometer_walk = params.gyro_bias_walk, params.accelerometer_bias_walk
+    for k in range(bias, bias + 3):
+        covariance[k, k] += gyro_walk * gyro_walk * period
+        covariance[k + 3, k + 3] += accelerometer_walk * accelerometer_walk * period
+
+
+@kernel
+def start(
+    estimate: InvariantEstimate,
+    motion: ContactMotion,
+    params: InvariantFilterParameters,
+    constants: InvariantConstants,
+    scratch: InvariantScratch,
+) -> None:
+    """Start with the robot standing on level ground at the origin, its feet heading along x."""
+    error, place, vector = scratch.residual, estimate.vectors[1], scratch.vector
+    for _ in range(20):
+        misalignment(estimate.orientation, motion.points, motion.forward, error, vector)
+        error[:] = min(max(error, -0.2), 0.2)
+        rotate_in_world(estimate.orientation, error[0], error[1], error[2])
+    to_matrix(estimate.orientation, scratch.rotation)
+    soles, count = motion.soles.shape[0], constants.foot.shape[0]
+    for sole in range(soles):
+        rotate(estimate.orientation, motion.soles[sole], vector)
+        place[:2] -= vector[:2] / soles
+    for point in range(count):
+        rotate(estimate.orientation, scratch.centres[point], vector)
+        place[2] += (constants.height[point] - vector[2]) / count
+    start_covariance(estimate, params)
+    estimate.started = True
+    scratch.believed[:] = True
+    add_contacts(estimate, constants, scratch)
+    define_world(estimate, params, constants, scratch)
+
+
+@kernel
+def start_covariance(estimate: InvariantEstimate, params: InvariantFilterParameters) -> None:
+    """The variances before the feet have been used; no contact point is in the state."""
+    bias = 9 + 3 * estimate.present.shape[0]
+    for k in range(estimate.covariance.shape[0]):
+        deviation = params.encoder_offset
+        if k < 9:
+            deviation = _START_TURN if k < 3 else (_START_SPEED if k < 6 else _START_PLACE)
+        elif k < bias:
+            deviation = 0.0
+        elif k < bias + 6:
+            deviation = params.gyro_bias if k < bias + 3 else params.accelerometer_bias
+        estimate.covariance[k, k] = deviation * deviation
+
+
+@kernel
+def publish(
+    estimate: InvariantEstimate,
+    scratch: InvariantScratch,
+    health: EstimatorHealth,
+    base: BaseState,
+) -> None:
+    """Write the estimate and how far it is to be trusted."""
+    covariance, vectors = estimate.covariance, estimate.vectors
+    estimate.angular_velocity[:] = scratch.rate - estimate.gyro_bias
+    base.angular_velocity[:] = estimate.angular_velocity
+    base.position[:] = vectors[1]
+    base.linear_velocity[:] = vectors[0]
+    base.orientation[:] = estimate.orientation
+    health.velocity_std = vector_deviation(covariance, 3, vectors[0])
+    health.position_std = vector_deviation(covariance, 6, vectors[1])
+    health.tilt_std = math.sqrt(max(covariance[0, 0] + covariance[1, 1], 0.0))
+    health.yaw_std = math.sqrt(max(covariance[2, 2], 0.0))

@@ -1,4 +1,16 @@
-"""Estimates what the robot weighs, and where its torso's centre of mass is, while it stands."""
+"""Estimates what the robot weighs, and where its torso's centre of mass is, while it stands.
+
+With base rows b and joint rows j of the equations of motion, and the forces f of the feet,
+
+    M_b a + n_b = J_b' f,        M_j a + n_j = tau - c + J_j' f,
+
+where c is the joints' friction. If the torques of the legs' joints determine the wrench of each
+foot, f can be eliminated by the map G = J_b' (J_j')^+ from joint torques to forces on the base:
+
+    (M_b a + n_b) - G (M_j a + n_j) + G (tau - c) = 0,
+
+six equations that are linear in the masses. A Kalman filter solves them for the unknowns.
+"""
 
 from __future__ import annotations
 
@@ -7,28 +19,23 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.constants import GRAVITY
-from ...mathematics.mass_filter import BaseForceScratch
+from ...mathematics.kernel import kernel
+from ...mathematics.linear_algebra import multiply_vector, solve_rows
+from ...mathematics.rotations import skew
 from ...robots.description import RobotDescription
 from ...robots.limb import chain_to
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, JointState, MassEstimate, PhaseState
-from .mass_equations import (
-    COM,
-    FRICTION,
-    SCALE,
-    TILT,
-    Measured,
-    Memory,
-    Model,
-    Scratch,
-    Settings,
-    follow_mass,
-    publish_mass,
-)
+from ..signals import DynamicsTerms, JointState, MassEstimate, Phase, PhaseState
+
+SCALE, COM, TILT, FRICTION = 0, 1, 4, 6
+"""Where the unknowns begin: the factor on all masses; the offset of the torso's CoM [m] (3); the
+error of the estimated tilt [rad] (2); by joint its unknown friction, as a share of its friction."""
+_DAMPING = 1e-8
+"""Added to the squared lever arms [m^2] of the joints, so that a straight leg has a finite inverse."""
 
 
 class MassMemory(Signal):
@@ -43,6 +50,101 @@ class MassMemory(Signal):
     over = Field(dtype="bool", text="whether the robot has thrust, so that the estimate stays")
 
 
+class MassParameters(Parameters):
+    """The parameters of ``MassEstimator``."""
+
+    mass: float | None = parameter(
+        None, unit="kg", gt=0.0, text="the robot's mass before; none: the description's"
+    )
+    com_offset: list[float] = parameter(
+        [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3,
+        text="offset of the torso's CoM before",
+    )  # fmt: skip
+    mass_spread: float = parameter(
+        0.1, gt=0.0, le=1.0, text="standard deviation of the mass before, as a share"
+    )
+    com_spread: float = parameter(
+        0.01, unit="m", gt=0.0, text="standard deviation of the torso's CoM before, per axis"
+    )
+    friction_share: float = parameter(
+        0.65,
+        ge=0.0,
+        le=1.0,
+        text="standard deviation of a resting joint's friction, as a share",
+    )
+    friction_left: float = parameter(
+        0.5, ge=0.0, le=1.0, text="share of friction that stays unknown in a moving joint"
+    )
+    friction_speed: float = parameter(
+        0.05, unit="rad/s", gt=0.0, text="speed above which a joint moves"
+    )
+    friction_time: float = parameter(
+        0.3, unit="s", gt=0.0, text="correlation time of the unknown friction"
+    )
+    tilt_std: float = parameter(
+        0.003, unit="rad", ge=0.0, text="standard deviation of the estimated tilt"
+    )
+    force_noise: float = parameter(
+        0.08, gt=0.0, text="standard deviation of an equation's force, in weights of the robot"
+    )
+    moment_noise: float = parameter(
+        0.003, unit="m", gt=0.0, text="the same of its moment, in weights of the robot"
+    )
+    gyro_noise: float = parameter(
+        0.02, unit="rad/s", ge=0.0,
+        text="standard deviation of the gyroscope's noise; 0: ``moment_noise`` covers its effect",
+    )  # fmt: skip
+    gate: float = parameter(
+        4.0, gt=0.0, text="standard deviations beyond which an equation is not used"
+    )
+    interval: float = parameter(0.01, unit="s", gt=0.0, text="time between two measurements")
+    filter_time: float = parameter(
+        0.006, unit="s", gt=0.0, text="time constant of the filters of velocity and torque"
+    )
+    settle_time: float = parameter(0.05, unit="s", ge=0.0, text="time before the first measurement")
+    smoothing: float = parameter(
+        0.05, unit="s", ge=0.0, text="time constant with which the outputs follow the estimate"
+    )
+
+
+class MassConstants(Signal):
+    """What the robot's description and the parameters say."""
+
+    mass = Field(unit="kg", text="of the robot")
+    torso_mass = Field(unit="kg", text="of the torso")
+    friction = Field("n_joints", unit="N m", text="friction of the joints")
+    damping = Field("n_joints", unit="N m s/rad", text="their damping")
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    leg_joints = Field(
+        ("n_feet", "n_leg_joints"), dtype="int64", text="joints of each foot's leg, then -1"
+    )
+    interval = Field(dtype="int64", text="ticks between two corrections")
+    settling = Field(dtype="int64", text="ticks before the first one")
+    filtering = Field(unit="", text="share of a change that the filters take over in a tick")
+    following = Field(unit="", text="share of a change that the outputs take over in a tick")
+    persistence = Field(unit="", text="correlation of the unknown friction over an interval")
+    noise = Field(6, text="standard deviations of the equations [N, N m]")
+    rotation_noise = Field(unit="rad/s^2", text="of the base's filtered angular acceleration")
+
+
+class MassScratch(Signal):
+    """What a tick of ``MassEstimator`` computes on its way."""
+
+    acceleration = Field("n_velocities", text="derivative of the filtered velocity")
+    force = Field("n_velocities", text="generalised force that the acceleration and gravity need")
+    friction = Field("n_joints", unit="N m", text="known friction")
+    unknown_friction = Field("n_joints", unit="N m", text="friction that stays unknown")
+    torque = Field("n_joints", unit="N m", text="torque that is left for the ground")
+    normal = Field(("n_leg_joints", "n_leg_joints"), text="J_j J_j' of a leg, damped")
+    coupling = Field((6, "n_leg_joints"), text="J_b' J_j of a leg")
+    force_map = Field((6, "n_joints"), text="G")
+    rows = Field((6, "n_unknowns"), text="derivative of the equations by the unknowns")
+    residual = Field(6, text="of the equations [N, N m]")
+    difference = Field("n_unknowns", text="unknowns minus those that are published")
+    gain = Field("n_unknowns", text="covariance of the unknowns with one equation")
+    weight = Field(3, unit="N", text="of the torso, downwards, in axes of the base")
+
+
 class MassEstimator(Block):
     """Mass and centre of mass from the torques that carry them, by a Kalman filter.
 
@@ -52,20 +154,15 @@ class MassEstimator(Block):
 
         (M_b a + n_b) - G (M_j a + n_j) + G (tau - c) = 0,
 
-    six equations every ``interval`` (``mathematics/mass_filter``). Unknown are a factor s on all
-    masses and inertias, the offset d of the torso's centre of mass, and the friction c. The
-    acceleration a is the derivative of the generalised velocity, filtered as the torques are.
+    six equations every ``interval``. Unknown are a factor s on all masses and inertias, the offset
+    d of the torso's centre of mass, and the friction c. The acceleration a is the derivative of the
+    generalised velocity, filtered as the torques are.
 
-    **Friction** is what limits the accuracy: a joint at rest holds any torque up to its static
-    friction. In a joint that moves it is known but for the share ``friction_left``, so the squat
-    tells more than standing still. The unknown part of each joint is a process of the standard
-    deviation ``friction_share`` times the joint's friction that is forgotten within
-    ``friction_time``. An error ``tilt_std`` of the estimated tilt cannot be told from an offset, so
-    it is an unknown too: the offset that is found then is the one for which the robot balances.
-    The height of the torso's centre of mass is hardly observable while the torso is level. The
-    acceleration is as noisy as the gyroscope, ``gyro_noise``. What this does to the moments grows
-    with the robot's inertia: a filter that does not count with it finds the centre of mass of a
-    robot of 87 kg 3 cm off. In a robot as small as BRUCE ``moment_noise`` covers it.
+    Friction limits the accuracy (``docs/estimation.md``). The unknown part of each joint is a process of
+    the standard deviation ``friction_share`` times the joint's friction that is forgotten within
+    ``friction_time``; in a joint that moves only the share ``friction_left`` of it is left. An error
+    ``tilt_std`` of the estimated tilt cannot be told from an offset, so it is an unknown too: the
+    offset that is found is the one for which the robot balances.
 
     Before anything is measured the estimate is ``mass`` and ``com_offset``, by default the
     description's, with the standard deviations ``mass_spread`` and ``com_spread``. Equations further
@@ -78,64 +175,12 @@ class MassEstimator(Block):
     block: ``Dynamics`` reads its output, and its terms come back here.
     """
 
-    class Params(Parameters):
-        mass: float | None = parameter(
-            None, unit="kg", gt=0.0, text="the robot's mass before; none: the description's"
-        )
-        com_offset: list[float] = parameter(
-            [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3,
-            text="offset of the torso's CoM before",
-        )  # fmt: skip
-        mass_spread: float = parameter(
-            0.1, gt=0.0, le=1.0, text="standard deviation of the mass before, as a share"
-        )
-        com_spread: float = parameter(
-            0.01, unit="m", gt=0.0, text="standard deviation of the torso's CoM before, per axis"
-        )
-        friction_share: float = parameter(
-            0.65,
-            ge=0.0,
-            le=1.0,
-            text="standard deviation of a resting joint's friction, as a share",
-        )
-        friction_left: float = parameter(
-            0.5, ge=0.0, le=1.0, text="share of friction that stays unknown in a moving joint"
-        )
-        friction_speed: float = parameter(
-            0.05, unit="rad/s", gt=0.0, text="speed above which a joint moves"
-        )
-        friction_time: float = parameter(
-            0.3, unit="s", gt=0.0, text="correlation time of the unknown friction"
-        )
-        tilt_std: float = parameter(
-            0.003, unit="rad", ge=0.0, text="standard deviation of the estimated tilt"
-        )
-        force_noise: float = parameter(
-            0.08, gt=0.0, text="standard deviation of an equation's force, in weights of the robot"
-        )
-        moment_noise: float = parameter(
-            0.003, unit="m", gt=0.0, text="the same of its moment, in weights of the robot"
-        )
-        gyro_noise: float = parameter(
-            0.02, unit="rad/s", ge=0.0,
-            text="standard deviation of the gyroscope's noise; 0: ``moment_noise`` covers its effect",
-        )  # fmt: skip
-        gate: float = parameter(
-            4.0, gt=0.0, text="standard deviations beyond which an equation is not used"
-        )
-        interval: float = parameter(0.01, unit="s", gt=0.0, text="time between two measurements")
-        filter_time: float = parameter(
-            0.006, unit="s", gt=0.0, text="time constant of the filters of velocity and torque"
-        )
-        settle_time: float = parameter(
-            0.05, unit="s", ge=0.0, text="time before the first measurement"
-        )
-        smoothing: float = parameter(
-            0.05, unit="s", ge=0.0, text="time constant with which the outputs follow the estimate"
-        )
-
+    Params = MassParameters
+    Constants = MassConstants
+    Scratch = MassScratch
     needs = ("floating base", "feet")
-    params: Params
+    params: MassParameters
+    constants: MassConstants
     terms = Input(DynamicsTerms, text="the model's terms, at the published estimate")
     joints = Input(JointState, text="measured torques")
     phase = Input(PhaseState, text="the phase and the points that carry load")
@@ -146,41 +191,37 @@ class MassEstimator(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The number of unknowns."""
+        """The number of unknowns, and of the joints of the longest leg."""
         assert robot is not None
-        return {"n_unknowns": FRICTION + len(robot.joints)}
+        longest = max(len(chain_to(robot, foot.link)) for foot in robot.feet)
+        return {"n_unknowns": FRICTION + len(robot.joints), "n_leg_joints": longest}
 
     def setup(self) -> None:
-        robot, p, n = self.robot, self.params, len(self.robot.joints)
-        self._mass = robot.total_mass
-        memory = Memory(*(getattr(self.memory, name) for name in Memory._fields))
-        every = max(1, round(p.interval / self.period))
-        weight = self._mass * GRAVITY
-        share = min(1.0, self.period / p.filter_time)
-        settings = Settings(
-            self.period, every, math.ceil(p.settle_time / self.period - 1e-9), share,
-            min(1.0, self.period / p.smoothing) if p.smoothing else 1.0,
-            math.exp(-every * self.period / p.friction_time), float(p.friction_share),
-            p.friction_speed, float(p.friction_left), p.gate,
-            np.array([p.force_noise * weight] * 3 + [p.moment_noise * weight] * 3),
-            # of the derivative of white noise behind a low-pass filter of the first order
-            p.gyro_noise * share / self.period * math.sqrt(2.0 / (2.0 - share)),
-        )  # fmt: skip
-        terms, phase, out = self.terms, self.phase, self.estimate
-        measured = Measured(
-            phase.phase, phase.stance, terms.velocity, self.joints.torque, terms.mass_matrix,
-            terms.nonlinear_effects, terms.contact_jacobian, terms.base_rotation, terms.com,
-            terms.foot_position,
-        )  # fmt: skip
-        legs = [chain_to(robot, foot.link) for foot in robot.feet]
-        self._follow = KernelCall(
-            follow_mass, measured, memory, _model(robot, legs), settings,
-            _scratch(n, FRICTION + n, max(map(len, legs))),
-        )  # fmt: skip
-        self._publish = KernelCall(
-            publish_mass, self._mass, memory, out.mass, out.mass_std, out.com_offset,
-            out.com_offset_std,
-        )  # fmt: skip
+        robot, constants = self.robot, self.constants
+        constants.mass = robot.total_mass
+        constants.torso_mass = next(x.mass for x in robot.links if x.name == robot.base)
+        constants.friction[:] = robot.motors.friction
+        constants.damping[:] = robot.motors.damping
+        constants.foot_of_point[:] = robot.foot_of_contact()
+        constants.leg_joints[:] = -1
+        for foot, joints in zip(robot.feet, constants.leg_joints, strict=True):
+            chain = chain_to(robot, foot.link)
+            joints[: len(chain)] = chain
+
+    def prepare(self) -> None:
+        p, constants, period = self.params, self.constants, self.period
+        weight = self.robot.total_mass * GRAVITY
+        interval = max(1, round(p.interval / period))
+        share = min(1.0, period / p.filter_time)
+        constants.interval = interval
+        constants.settling = math.ceil(p.settle_time / period - 1e-9)
+        constants.filtering = share
+        constants.following = min(1.0, period / p.smoothing) if p.smoothing else 1.0
+        constants.persistence = math.exp(-interval * period / p.friction_time)
+        constants.noise[:3] = p.force_noise * weight
+        constants.noise[3:] = p.moment_noise * weight
+        # of the derivative of white noise behind a low-pass filter of the first order
+        constants.rotation_noise = p.gyro_noise * share / period * math.sqrt(2.0 / (2.0 - share))
 
     def start(self) -> None:
         """Begin with what was known before, and its uncertainty."""
@@ -189,43 +230,205 @@ class MassEstimator(Block):
         deviations[SCALE], deviations[COM:TILT] = p.mass_spread, p.com_spread
         deviations[TILT:FRICTION], deviations[FRICTION:] = p.tilt_std, p.friction_share
         memory.covariance[...] = np.diag(deviations**2)
-        scale = 1.0 if p.mass is None else p.mass / self._mass
+        scale = 1.0 if p.mass is None else p.mass / self.robot.total_mass
         memory.unknowns[SCALE] = memory.published[0] = scale
         memory.unknowns[COM:TILT] = memory.published[1:] = p.com_offset
 
-    def emit(self) -> None:
-        self._publish.run()
+    @kernel
+    @staticmethod
+    def emit(memory: MassMemory, estimate: MassEstimate, constants: MassConstants) -> None:
+        # Rounding may leave a variance that is all but zero just below it.
+        variance = memory.covariance[SCALE, SCALE]
+        estimate.mass = constants.mass * memory.published[0]
+        estimate.mass_std = constants.mass * math.sqrt(max(variance, 0.0))
+        estimate.com_offset[:] = memory.published[1:]
+        for k in range(3):
+            variance = memory.covariance[COM + k, COM + k]
+            estimate.com_offset_std[k] = math.sqrt(max(variance, 0.0))
 
-    def update(self) -> None:
-        self._follow.run()
+    @kernel
+    @staticmethod
+    def update(
+        terms: DynamicsTerms,
+        joints: JointState,
+        phase: PhaseState,
+        memory: MassMemory,
+        params: MassParameters,
+        constants: MassConstants,
+        scratch: MassScratch,
+        period: float,
+    ) -> None:
+        if memory.ticks == 0:
+            memory.velocity[:] = terms.velocity
+            memory.torque[:] = joints.torque
+        if phase.phase > Phase.SQUAT:
+            memory.over = True
+        if not memory.over:
+            memory.ticks += 1
+            scratch.acceleration[:] = (terms.velocity - memory.velocity) * constants.filtering
+            memory.velocity[:] += scratch.acceleration
+            scratch.acceleration[:] /= period
+            memory.torque[:] += (joints.torque - memory.torque) * constants.filtering
+            due = memory.ticks % constants.interval == 0 and memory.ticks >= constants.settling
+            if due and any_stance(phase):
+                forget_friction(memory, params, constants)
+                form_equations(terms, phase, memory, params, constants, scratch)
+                for k in range(6):
+                    correct_by_equation(k, terms, memory, params, constants, scratch)
+        memory.published[:] += (memory.unknowns[:4] - memory.published) * constants.following
 
     def metrics(self) -> Mapping[str, Metric]:
         """The estimate at the end."""
         memory = self.memory
         x, y, z = (1e3 * value for value in memory.unknowns[COM:TILT].tolist())
         return {
-            "felt_mass_kg": self._mass * memory.unknowns.item(SCALE),
-            "felt_mass_std_kg": self._mass * math.sqrt(memory.covariance.item(SCALE, SCALE)),
+            "felt_mass_kg": self.robot.total_mass * memory.unknowns.item(SCALE),
+            "felt_mass_std_kg": self.robot.total_mass
+            * math.sqrt(memory.covariance.item(SCALE, SCALE)),
             "felt_com_offset_x_mm": x,
             "felt_com_offset_y_mm": y,
             "felt_com_offset_z_mm": z,
         }
 
 
-def _model(robot: RobotDescription, legs: list[tuple[int, ...]]) -> Model:
-    """What the equations take from the robot's description; ``legs`` are the joints of each foot's."""
-    chains = np.full((len(legs), max(map(len, legs))), -1)
-    for foot, leg in enumerate(legs):
-        chains[foot, : len(leg)] = leg
-    torso = next(link.mass for link in robot.links if link.name == robot.base)
-    return Model(
-        robot.total_mass, torso, robot.motors.friction, robot.motors.damping,
-        np.array(robot.foot_of_contact(), np.int64), chains,
-    )  # fmt: skip
+@kernel
+def any_stance(phase: PhaseState) -> bool:
+    """Whether any point carries load."""
+    loaded = False
+    for point in range(phase.stance.shape[0]):
+        loaded = loaded or bool(phase.stance[point])
+    return loaded
 
 
-def _scratch(n: int, size: int, longest: int) -> Scratch:
-    """Memory for ``n`` joints, ``size`` unknowns and legs of up to ``longest`` joints."""
-    leg = BaseForceScratch(np.zeros((longest, longest)), np.zeros((6, longest)))
-    shapes = (6, n), (6, size), 6 + n, 6 + n, n, n, n, 6, 6, size
-    return Scratch(leg, *(np.zeros(shape) for shape in shapes))
+@kernel
+def forget_friction(memory: MassMemory, params: MassParameters, constants: MassConstants) -> None:
+    """One interval of the processes that the joints' unknown friction follows."""
+    unknowns, covariance, factor = memory.unknowns, memory.covariance, constants.persistence
+    variance = params.friction_share * params.friction_share
+    for i in range(FRICTION, unknowns.shape[0]):
+        unknowns[i] *= factor
+        covariance[i, :] *= factor
+        covariance[:, i] *= factor
+        covariance[i, i] += (1.0 - factor * factor) * variance
+
+
+@kernel
+def form_equations(
+    terms: DynamicsTerms,
+    phase: PhaseState,
+    memory: MassMemory,
+    params: MassParameters,
+    constants: MassConstants,
+    scratch: MassScratch,
+) -> None:
+    """The equations' residual at the published estimate without the unknown parts of tilt and
+    friction, and its derivative by the unknowns.
+
+    The derivatives are those at rest: noise of the acceleration in them would bias the result.
+    """
+    force, force_map, rows = scratch.force, scratch.force_map, scratch.rows
+    nonlinear, scale = terms.nonlinear_effects, memory.published[0]
+    map_torques_to_base(terms, phase, constants, scratch)
+    split_friction(memory, params, constants, scratch)
+    force[:] = terms.mass_matrix @ scratch.acceleration + nonlinear
+    scratch.torque[:] = memory.torque - scratch.friction - force[6:]
+    scratch.residual[:] = force_map @ scratch.torque + force[:6]
+    rows[:, SCALE] = (nonlinear[:6] - force_map @ nonlinear[6:]) / scale
+    # At rest the torso's weight w at d needs the moment -w x d.
+    scratch.weight[:] = -(scale * constants.torso_mass * GRAVITY * terms.base_rotation[2])
+    skew(scratch.weight, rows[3:, COM:TILT])
+    lowest = terms.foot_position[0, 2]
+    for foot in range(1, terms.foot_position.shape[0]):
+        lowest = min(lowest, terms.foot_position[foot, 2])
+    moment = scale * constants.mass * GRAVITY * (terms.com[2] - lowest)
+    rows[3, TILT], rows[4, TILT + 1] = moment, moment
+    rows[:, FRICTION:] = -(force_map * scratch.unknown_friction)
+
+
+@kernel
+def map_torques_to_base(
+    terms: DynamicsTerms, phase: PhaseState, constants: MassConstants, scratch: MassScratch
+) -> None:
+    """The map G from joint torques to the generalised force on the base, leg by leg."""
+    normal, coupling = scratch.normal, scratch.coupling
+    scratch.force_map[:] = 0.0
+    for foot in range(constants.leg_joints.shape[0]):
+        joints, loaded = constants.leg_joints[foot], False
+        normal[:] = 0.0
+        coupling[:] = 0.0
+        for point in range(constants.foot_of_point.shape[0]):
+            if constants.foot_of_point[point] == foot and phase.stance[point]:
+                loaded = True
+                for axis in range(3):
+                    add_jacobian_row(terms.contact_jacobian[point, axis], joints, scratch)
+        if not loaded:
+            continue
+        for i in range(normal.shape[0]):
+            normal[i, i] += _DAMPING
+        solve_rows(normal, coupling)
+        for i in range(joints.shape[0]):
+            if joints[i] >= 0:
+                scratch.force_map[:, joints[i]] = coupling[:, i]
+
+
+@kernel
+def add_jacobian_row(row: Array1D, joints: Indices1D, scratch: MassScratch) -> None:
+    """Add a row of a point's Jacobian to the products J_j J_j' and J_b' J_j of its leg."""
+    for i in range(joints.shape[0]):
+        if joints[i] >= 0:
+            lever_arm = row[6 + joints[i]]
+            for k in range(i + 1):
+                scratch.normal[i, k] += lever_arm * row[6 + joints[k]]
+            scratch.coupling[:, i] += lever_arm * row[:6]
+
+
+@kernel
+def split_friction(
+    memory: MassMemory, params: MassParameters, constants: MassConstants, scratch: MassScratch
+) -> None:
+    """The part of the joints' friction that their speed tells, and what stays unknown."""
+    for i in range(constants.friction.shape[0]):
+        speed = memory.velocity[6 + i]
+        known_share = math.tanh(speed / params.friction_speed)
+        scratch.friction[i] = constants.friction[i] * known_share + constants.damping[i] * speed
+        unknown_share = 1.0 - (1.0 - params.friction_left) * abs(known_share)
+        scratch.unknown_friction[i] = unknown_share * constants.friction[i]
+
+
+@kernel
+def correct_by_equation(
+    k: int,
+    terms: DynamicsTerms,
+    memory: MassMemory,
+    params: MassParameters,
+    constants: MassConstants,
+    scratch: MassScratch,
+) -> None:
+    """Correct the estimate by one of the six equations, unless it is an outlier."""
+    row, gain, difference = scratch.rows[k], scratch.gain, scratch.difference
+    difference[:] = memory.unknowns
+    difference[:TILT] -= memory.published
+    residual = -scratch.residual[k] - difference @ row
+    noise = equation_noise(k, terms, constants)
+    variance = noise * noise
+    multiply_vector(memory.covariance, row, gain)
+    for i in range(row.shape[0]):
+        variance += row[i] * gain[i]
+    if residual * residual > params.gate * params.gate * variance:
+        return
+    memory.unknowns[:] += gain * residual / variance
+    for i in range(row.shape[0]):
+        memory.covariance[i, :] -= gain[i] * gain / variance
+
+
+@kernel
+def equation_noise(k: int, terms: DynamicsTerms, constants: MassConstants) -> float:
+    """The standard deviation of an equation's error [N, N m].
+
+    The gyroscope's noise adds the inertia times the noise of the angular acceleration.
+    """
+    variance = constants.noise[k] * constants.noise[k]
+    for j in range(3, 6):
+        inertial = terms.mass_matrix[k, j] * constants.rotation_noise
+        variance += inertial * inertial
+    return math.sqrt(variance)

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
-from ...mathematics.arrays import Array0D, Array1D, Flags0D, Indices0D
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.inertial_filter import correct_tilt_from_gravity, misalignment, turn, weigh
+from ...mathematics.inertial_filter import (
+    correct_tilt_from_gravity,
+    misalignment,
+    rotate_in_world,
+    weigh_contacts,
+)
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, rotate_back, wrap
 from ...runtime.language.block import State
 from ...runtime.language.parameters import live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from .base_filter import (
-    Estimator,
+from ..signals import BaseState, ImuReading, JointState
+from .inertial_estimator import (
+    BaseEstimate,
+    BiasSamples,
+    InertialConstants,
+    InertialEstimator,
+    InertialParameters,
+    InertialScratch,
+    LegKinematics,
     count_standing,
     forget_samples,
     is_unaccelerated,
@@ -26,7 +32,6 @@ from .base_filter import (
     predict,
     use_contacts,
 )
-from .inertial_estimator import InertialEstimator, InertialParameters
 
 
 class GroundTrust(Signal):
@@ -39,126 +44,24 @@ class GroundTrust(Signal):
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
 
 
-class Trust(NamedTuple):
-    """The fields of ``GroundTrust``."""
+class StateEstimatorParameters(InertialParameters):
+    """The parameters of ``StateEstimator``."""
 
-    gate: Array0D
-    flown: Flags0D
-    facing: Flags0D
-    heading: Array0D
-    aligned: Indices0D
-
-
-class GroundSettings(NamedTuple):
-    """Parameters that may change during a run, each (1,)."""
-
-    gate: Array1D
-    gate_growth: Array1D
-    support: Array1D
-    slow_rate: Array1D
-
-
-@kernel
-def align_with_ground(estimator: Estimator, trust: Trust) -> None:
-    """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
-    estimate, seen, scratch = estimator.filter, estimator.legs.seen, estimator.scratch
-    error, spare = scratch.error, scratch.spare
-    # Least squares over all ticks so far, then over the last 250: angle and its drift.
-    ticks = min(trust.aligned[()] + 1, 250)
-    trust.aligned[()] = ticks
-    n = max(ticks, 30)
-    angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
-    misalignment(estimate.orientation, seen.points, seen.forward, error, spare)
-    if not trust.facing[()]:
-        trust.heading[()] = -error[2]
-        trust.facing[()] = True
-    error[2] = wrap(error[2] + trust.heading[()])
-    limit(error, 0.05, error)
-    rotate_back(estimate.orientation, error, spare)
-    estimate.gyro_bias[:] -= spare * (drift_gain / estimator.fixed.period)
-    error[:] *= angle_gain
-    turn(estimate.orientation, error[0], error[1], error[2])
-
-
-@kernel
-def learn_accelerometer_bias(estimator: Estimator, still: bool) -> None:
-    """While the robot stands still, learn the mean of the accelerometer minus gravity."""
-    estimate, learning, scratch = estimator.filter, estimator.learning, estimator.scratch
-    if not still:
-        forget_samples(learning)
-        return
-    bias, up, weight = estimate.accelerometer_bias, scratch.error, scratch.spare
-    up[0] = up[1] = 0.0
-    up[2] = GRAVITY
-    rotate_back(estimate.orientation, up, weight)
-    learning.filling_sum[:] = learning.filling_sum + estimator.sample.force + bias - weight
-    learn_bias(learning, estimator.fixed.block, bias, 3.0)
-
-
-@kernel
-def correct_orientation(
-    estimator: Estimator, trust: Trust, settings: GroundSettings, level_ground: bool, fastest: float
-) -> None:
-    """Correct the orientation and learn biases.
-
-    Args:
-        fastest: the largest low-passed rate of base and joints [rad/s]; infinite unless all
-            points stand.
-    """
-    if trust.gate[()] == 0.0:  # the first tick: the feet point along x
-        trust.gate[()] = settings.gate[0]
-        trust.facing[()] = True
-    flown, still = bool(trust.flown[()]), fastest < estimator.settings.still_rate[0]
-    if not flown:
-        learn_accelerometer_bias(estimator, still)
-    if not is_unaccelerated(estimator.sample.force):
-        return
-    if fastest < settings.slow_rate[0] and (level_ground or not flown):
-        align_with_ground(estimator, trust)
-    elif still:
-        correct_tilt_from_gravity(
-            estimator.filter.orientation, estimator.sample.force,
-            estimator.settings.tilt_gain[0], estimator.scratch.spare,
-        )  # fmt: skip
-
-
-@kernel
-def trust_points(
-    estimator: Estimator, trust: Trust, settings: GroundSettings
-) -> tuple[float, float]:
-    """Write the weight of every point.
-
-    Returns the largest weight, and a factor from 0 to 1 on all corrections by contacts.
-    """
-    estimate, points, up = estimator.filter, estimator.legs.points, estimator.scratch.spare
-    gate, growth = trust.gate[()], settings.gate_growth[0]
-    trusted = weigh(points.rates, points.active, estimate.velocity, gate, points.weights)
-    rotate(estimate.orientation, estimator.sample.force, up)
-    support = min(max(up[2] / settings.support[0], 0.0), 1.0)
-    if count_standing(points.active) == 0:
-        gate += 0.05 * growth * estimator.fixed.period
-    elif trusted < 0.25:
-        gate += growth * estimator.fixed.period
-    else:
-        gate += 0.1 * (settings.gate[0] - gate)
-    trust.gate[()] = min(gate, 10.0)
-    return trusted, support
-
-
-@kernel
-def estimate_tick(
-    estimator: Estimator, trust: Trust, settings: GroundSettings, level_ground: bool
-) -> None:
-    """A tick of the filter: predict, correct the orientation, weigh the points, use them."""
-    watching = bool(estimator.filter.started[()])
-    fastest = predict(estimator)
-    if watching and count_standing(estimator.legs.points.active) == 0 and trust.aligned[()] > 0:
-        trust.flown[()] = True
-        trust.facing[()] = False
-    correct_orientation(estimator, trust, settings, level_ground, fastest)
-    place_points(estimator)
-    trusted, support = trust_points(estimator, trust, settings)
-    use_contacts(estimator, trusted, support)
+    gate: float = live_parameter(
+        0.08, unit="m/s", gt=0.0, text="speed at which a point is trusted by a quarter"
+    )
+    gate_growth: float = live_parameter(
+        2.0, unit="m/s^2", ge=0.0, text="growth rate of the gate while all points are rejected"
+    )
+    support: float = live_parameter(
+        4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
+    )
+    level_ground: bool = parameter(
+        True, text="all points are at one height whenever all are in contact"
+    )
+    slow_rate: float = live_parameter(
+        1.5, unit="rad/s", gt=0.0, text="rate of base and joints below which feet are flat"
+    )
 
 
 class StateEstimator(InertialEstimator):
@@ -204,38 +107,116 @@ class StateEstimator(InertialEstimator):
     errors in a run.
     """
 
-    class Params(InertialParameters):
-        gate: float = live_parameter(
-            0.08, unit="m/s", gt=0.0, text="speed at which a point is trusted by a quarter"
-        )
-        gate_growth: float = live_parameter(
-            2.0, unit="m/s^2", ge=0.0, text="growth rate of the gate while all points are rejected"
-        )
-        support: float = live_parameter(
-            4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
-        )
-        level_ground: bool = parameter(
-            True, text="all points are at one height whenever all are in contact"
-        )
-        slow_rate: float = live_parameter(
-            1.5, unit="rad/s", gt=0.0, text="rate of base and joints below which feet are flat"
-        )
-
+    Params = StateEstimatorParameters
     starts_level = True
-    params: Params
+    params: StateEstimatorParameters
     trust = State(GroundTrust, text="how far points and ground are trusted")
 
-    def setup(self) -> None:
-        self.ground_settings = GroundSettings(*(np.zeros(1) for _ in GroundSettings._fields))
-        super().setup()
+    @kernel
+    @staticmethod
+    def step(
+        imu: ImuReading,
+        joints: JointState,
+        base: BaseState,
+        estimate: BaseEstimate,
+        learning: BiasSamples,
+        trust: GroundTrust,
+        legs: LegKinematics,
+        params: StateEstimatorParameters,
+        constants: InertialConstants,
+        scratch: InertialScratch,
+    ) -> None:
+        airborne = estimate.started and count_standing(legs.points.active) == 0
+        fastest = predict(imu, joints, estimate, legs, constants, scratch)
+        if airborne and trust.aligned > 0:
+            trust.flown = True
+            trust.facing = False
+        if trust.gate == 0.0:  # the first tick: the feet point along x
+            trust.gate = params.gate
+            trust.facing = True
+        still = fastest < params.still_rate
+        if not trust.flown:
+            learn_accelerometer_bias(estimate, learning, constants, scratch, still)
+        if is_unaccelerated(scratch.force):
+            if fastest < params.slow_rate and (params.level_ground or not trust.flown):
+                align_with_ground(estimate, trust, legs, constants, scratch)
+            elif still:
+                correct_tilt_from_gravity(
+                    estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
+                )
+        place_points(estimate, legs)
+        trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
+        use_contacts(estimate, legs, base, params, constants, scratch, trusted, support)
 
-    def on_parameters(self) -> None:
-        super().on_parameters()
-        for name, value in zip(GroundSettings._fields, self.ground_settings, strict=True):
-            value[0] = getattr(self.params, name)
 
-    def make_call(self, estimator: Estimator) -> KernelCall:
-        trust = Trust(*(getattr(self.trust, name) for name in Trust._fields))
-        return KernelCall(
-            estimate_tick, estimator, trust, self.ground_settings, self.params.level_ground
-        )
+@kernel
+def learn_accelerometer_bias(
+    estimate: BaseEstimate,
+    learning: BiasSamples,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+    still: bool,
+) -> None:
+    """While the robot stands still, learn the mean of the accelerometer minus gravity."""
+    if not still:
+        forget_samples(learning)
+        return
+    bias, gravity = estimate.accelerometer_bias, scratch.vector
+    gravity[0], gravity[1], gravity[2] = 0.0, 0.0, GRAVITY
+    rotate_back(estimate.orientation, gravity, gravity)
+    learning.filling_sum[:] = learning.filling_sum + scratch.force + bias - gravity
+    learn_bias(learning, constants.block_size, bias, 3.0)
+
+
+@kernel
+def align_with_ground(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    legs: LegKinematics,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+) -> None:
+    """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
+    motion, error, drift = legs.motion, scratch.error, scratch.vector
+    # Least squares over all ticks so far, then over the last 250: angle and its drift.
+    trust.aligned = min(trust.aligned + 1, 250)
+    n = max(trust.aligned, 30)
+    angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
+    misalignment(estimate.orientation, motion.points, motion.forward, error, drift)
+    if not trust.facing:
+        trust.heading = -error[2]
+        trust.facing = True
+    error[2] = wrap(error[2] + trust.heading)
+    limit(error, 0.05, error)
+    rotate_back(estimate.orientation, error, drift)
+    estimate.gyro_bias[:] -= drift * (drift_gain / constants.period)
+    error[:] *= angle_gain
+    rotate_in_world(estimate.orientation, error[0], error[1], error[2])
+
+
+@kernel
+def trust_points(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    legs: LegKinematics,
+    params: StateEstimatorParameters,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+) -> tuple[float, float]:
+    """Write the weight of every point.
+
+    Returns the largest weight, and a factor from 0 to 1 on all corrections by contacts.
+    """
+    points, force, growth = legs.points, scratch.vector, params.gate_growth
+    gate = trust.gate
+    trusted = weigh_contacts(points.rates, points.active, estimate.velocity, gate, points.weights)
+    rotate(estimate.orientation, scratch.force, force)
+    support = min(max(force[2] / params.support, 0.0), 1.0)
+    if count_standing(points.active) == 0:
+        gate += 0.05 * growth * constants.period
+    elif trusted < 0.25:
+        gate += growth * constants.period
+    else:
+        gate += 0.1 * (params.gate - gate)
+    trust.gate = min(gate, 10.0)
+    return trusted, support

@@ -2,41 +2,36 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
-from ...mathematics.arrays import (
-    Array0D,
-    Array1D,
-    Array2D,
-    Flags1D,
-    Indices0D,
-    Vector3,
-)
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.expressions import cross
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import cross, exponential, multiply, rotate, rotate_back
-from ...runtime.language.block import Input, Output, State
-from ...runtime.language.kernel_block import KernelBlock
+from ...mathematics.rotations import exponential, multiply, rotate, rotate_back
+from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, DelayEstimate, JointState, Phase, PhaseState, WholeBodyCommand
 
-KEPT = 24
+COMMANDS = 24
 """The number of commands that are remembered."""
-
-_FLIGHT = int(Phase.FLIGHT)
 
 
 class CommandMemory(Signal):
     """The state of ``StatePredictor``."""
 
-    acceleration = Field((KEPT, "n_velocities"), text="of the last commands, newest first")
-    loaded = Field(KEPT, dtype="bool", text="whether a point was in stance in these ticks")
+    acceleration = Field((COMMANDS, "n_velocities"), text="of the last commands, newest first")
+    loaded = Field(COMMANDS, dtype="bool", text="whether a point was in stance in these ticks")
 
 
-class StatePredictor(KernelBlock):
+class StatePredictorScratch(Signal):
+    """What a tick of ``StatePredictor`` computes on its way."""
+
+    fall = Field(3, unit="m/s^2", frame="body", text="acceleration of the base in free fall")
+    velocity_change = Field("n_velocities", text="change of the velocity within ``ahead``")
+    position_change = Field("n_velocities", text="change of the position, in axes of the base")
+    vector = Field(3, text="a vector")
+    turn = Field(4, text="quaternion of the base's rotation within ``ahead``")
+
+
+class StatePredictor(Block):
     """The state when the command of this tick takes effect, by the commands that are on their way.
 
     The commands that are computed from t - d on act at t and later, d being the delay from sensing
@@ -56,6 +51,7 @@ class StatePredictor(KernelBlock):
     of a velocity adds a times itself to a position. With ``ahead`` 0 the output is the input.
     """
 
+    Scratch = StatePredictorScratch
     needs = ("floating base",)
 
     measured_base = Input(BaseState, text="pose and velocity of the base")
@@ -67,153 +63,102 @@ class StatePredictor(KernelBlock):
     joints = Output(JointState, text="the joints then; torques as measured")
     memory = State(CommandMemory, text="the commands on their way")
 
-    def setup(self) -> None:
-        n = len(self.robot.joints)
-        predicting = KernelCall(
-            predict_state, Sent(self.command.acceleration, self.phase.phase, self.phase.stance),
-            self.delay.delay, self.delay.ahead, self.period,
-            self.memory.acceleration, self.memory.loaded,
-            *(
-                Body(
-                    base.position, base.orientation, base.linear_velocity, base.angular_velocity,
-                    joints.position, joints.velocity, joints.torque,
-                )
-                for base, joints in (
-                    (self.measured_base, self.measured_joints), (self.base, self.joints),
-                )
-            ),
-            Change(np.zeros(6), np.zeros(6 + n), np.zeros(6 + n), np.zeros(3), np.zeros(3), np.zeros(4)),
-        )  # fmt: skip
-        self.kernel_calls = (predicting,)
-
-
-class Sent(NamedTuple):
-    """The last command: its ``acceleration`` (n_velocities,), ``phase`` () and ``stance`` (n_contacts,)."""
-
-    acceleration: Array1D
-    phase: Indices0D
-    stance: Flags1D
-
-
-class Body(NamedTuple):
-    """The fields of ``BaseState``, then those of ``JointState``."""
-
-    position: Vector3
-    orientation: Array1D
-    linear_velocity: Vector3
-    angular_velocity: Vector3
-    joint_position: Array1D
-    joint_velocity: Array1D
-    torque: Array1D
-
-
-class Change(NamedTuple):
-    """Memory: the base's acceleration in free fall (6,) and the changes of velocities and of places,
-    (n_velocities,), vectors (3,) and a quaternion (4,)."""
-
-    fall: Array1D
-    speed: Array1D
-    way: Array1D
-    vector: Vector3
-    spare: Vector3
-    turn: Array1D
+    @kernel
+    @staticmethod
+    def step(
+        measured_base: BaseState,
+        measured_joints: JointState,
+        command: WholeBodyCommand,
+        phase: PhaseState,
+        delay: DelayEstimate,
+        base: BaseState,
+        joints: JointState,
+        memory: CommandMemory,
+        scratch: StatePredictorScratch,
+        period: float,
+    ) -> None:
+        remember_command(command, phase, memory)
+        fall_freely(measured_base, scratch)
+        add_commands(phase, delay, period, memory, scratch)
+        predict_base(measured_base, delay.ahead, base, scratch)
+        predict_joints(measured_joints, delay.ahead, joints, scratch)
 
 
 @kernel
-def remember_command(sent: Sent, acceleration: Array2D, loaded: Flags1D) -> None:
+def remember_command(command: WholeBodyCommand, phase: PhaseState, memory: CommandMemory) -> None:
     """Put the last command before the others."""
-    for i in range(loaded.shape[0] - 1, 0, -1):
-        loaded[i] = loaded[i - 1]
-        acceleration[i, :] = acceleration[i - 1]
-    loaded[0] = False
-    for point in range(sent.stance.shape[0]):
-        loaded[0] = loaded[0] or bool(sent.stance[point])
-    acceleration[0, :] = sent.acceleration
+    for i in range(COMMANDS - 1, 0, -1):
+        memory.loaded[i] = memory.loaded[i - 1]
+        memory.acceleration[i, :] = memory.acceleration[i - 1]
+    memory.acceleration[0, :] = command.acceleration
+    memory.loaded[0] = False
+    for point in range(phase.stance.shape[0]):
+        memory.loaded[0] = memory.loaded[0] or phase.stance[point]
 
 
 @kernel
-def free_fall(body: Body, change: Change) -> None:
-    """The rate of the base's velocity in its own axes in free fall, without a change of its spin."""
-    fall, vector, spare = change.fall, change.vector, change.spare
-    vector[0], vector[1], vector[2] = 0.0, 0.0, -GRAVITY
-    rotate_back(body.orientation, vector, fall[0:3])
-    rotate_back(body.orientation, body.linear_velocity, vector)
-    cross(body.angular_velocity, vector, spare)
-    for k in range(3):
-        fall[k] = fall[k] - spare[k]
-        fall[3 + k] = 0.0
+def fall_freely(base: BaseState, scratch: StatePredictorScratch) -> None:
+    """The rate of the base's velocity in its own axes in free fall: R' g - w x (R' v)."""
+    fall, velocity = scratch.fall, scratch.vector
+    fall[0], fall[1], fall[2] = 0.0, 0.0, -GRAVITY
+    rotate_back(base.orientation, fall, fall)
+    rotate_back(base.orientation, base.linear_velocity, velocity)
+    fall[:] = fall - cross(base.angular_velocity, velocity)
 
 
 @kernel
 def add_commands(
-    flies: bool,
-    delay: float,
-    ahead: float,
+    phase: PhaseState,
+    delay: DelayEstimate,
     period: float,
-    acceleration: Array2D,
-    loaded: Flags1D,
-    change: Change,
+    memory: CommandMemory,
+    scratch: StatePredictorScratch,
 ) -> None:
-    """The changes of velocities and places within ``ahead`` by the commands that act then.
+    """The changes of velocity and position within ``ahead`` by the commands that act then.
 
     The command that is i + 1 ticks old acts from delay - (i + 1) period on, for a period.
     """
-    n = change.speed.shape[0]
-    for k in range(n):
-        change.speed[k] = 0.0
-        change.way[k] = 0.0
-    for i in range(loaded.shape[0]):
-        begin = max(delay - (i + 1) * period, 0.0)
-        end = ahead if i == 0 else min(delay - i * period, ahead)
-        lasts = end - begin
-        if lasts <= 0.0:
+    velocity, position, ahead = scratch.velocity_change, scratch.position_change, delay.ahead
+    velocity[:] = 0.0
+    position[:] = 0.0
+    for i in range(COMMANDS):
+        begin = max(delay.delay - (i + 1) * period, 0.0)
+        end = ahead if i == 0 else min(delay.delay - i * period, ahead)
+        duration = end - begin
+        if duration <= 0.0:
             continue
-        weight = lasts * (ahead - 0.5 * (begin + end))
-        if loaded[i]:
-            for k in range(n):
-                change.speed[k] = change.speed[k] + lasts * acceleration[i, k]
-                change.way[k] = change.way[k] + weight * acceleration[i, k]
-        elif flies:
-            for k in range(3):
-                change.speed[k] = change.speed[k] + lasts * change.fall[k]
-                change.way[k] = change.way[k] + weight * change.fall[k]
+        weight = duration * (ahead - 0.5 * (begin + end))
+        if memory.loaded[i]:
+            velocity[:] += duration * memory.acceleration[i]
+            position[:] += weight * memory.acceleration[i]
+        elif phase.phase == Phase.FLIGHT:
+            velocity[:3] += duration * scratch.fall
+            position[:3] += weight * scratch.fall
 
 
 @kernel
-def predict_state(
-    sent: Sent,
-    delay: Array0D,
-    ahead: Array0D,
-    period: float,
-    acceleration: Array2D,
-    loaded: Flags1D,
-    measured: Body,
-    predicted: Body,
-    change: Change,
+def predict_base(
+    measured: BaseState, ahead: float, base: BaseState, scratch: StatePredictorScratch
 ) -> None:
-    """One tick of ``StatePredictor``."""
-    remember_command(sent, acceleration, loaded)
-    time = ahead[()]
-    flies = sent.phase[()] == _FLIGHT
-    free_fall(measured, change)
-    add_commands(flies, delay[()], time, period, acceleration, loaded, change)
-    speed, way, vector, spare, turn = (
-        change.speed, change.way, change.vector, change.spare, change.turn,
-    )  # fmt: skip
+    """Move the base on by its velocity and by what the commands change."""
+    velocity, position, vector = scratch.velocity_change, scratch.position_change, scratch.vector
     rotate_back(measured.orientation, measured.linear_velocity, vector)
-    for k in range(3):
-        speed[k] = vector[k] + speed[k]
-        way[k] = way[k] + time * vector[k]
-        way[3 + k] = way[3 + k] + time * measured.angular_velocity[k]
-        predicted.angular_velocity[k] = measured.angular_velocity[k] + speed[3 + k]
-    rotate(measured.orientation, way[0:3], spare)
-    exponential(way[3:6], turn)
-    multiply(measured.orientation, turn, predicted.orientation)
-    rotate(predicted.orientation, speed[0:3], predicted.linear_velocity)
-    predicted.position[:] = measured.position + spare
-    for joint in range(predicted.joint_position.shape[0]):
-        rate = measured.joint_velocity[joint]
-        predicted.joint_velocity[joint] = rate + speed[6 + joint]
-        place = measured.joint_position[joint] + time * rate
-        predicted.joint_position[joint] = place + way[6 + joint]
-        predicted.torque[joint] = measured.torque[joint]
+    velocity[:3] += vector
+    position[:3] += ahead * vector
+    position[3:6] += ahead * measured.angular_velocity
+    rotate(measured.orientation, position[0:3], vector)
+    base.position[:] = measured.position + vector
+    exponential(position[3:6], scratch.turn)
+    multiply(measured.orientation, scratch.turn, base.orientation)
+    rotate(base.orientation, velocity[0:3], base.linear_velocity)
+    base.angular_velocity[:] = measured.angular_velocity + velocity[3:6]
+
+
+@kernel
+def predict_joints(
+    measured: JointState, ahead: float, joints: JointState, scratch: StatePredictorScratch
+) -> None:
+    """Move the joints on likewise; their torques are as measured."""
+    joints.velocity[:] = measured.velocity + scratch.velocity_change[6:]
+    joints.position[:] = measured.position + ahead * measured.velocity + scratch.position_change[6:]
+    joints.torque[:] = measured.torque

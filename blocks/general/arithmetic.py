@@ -12,7 +12,7 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter, parameter
-from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
@@ -62,9 +62,9 @@ class Sum(Block):
     y = Output(Vector, text="the sum")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Both inputs must be the same quantity, and so is the sum."""
-        return {"y": given.alike("a", "b")}
+        return {"y": inputs.alike("a", "b")}
 
     @kernel
     @staticmethod
@@ -87,10 +87,10 @@ class Product(Block):
     y = Output(Vector, text="the product or quotient")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The product or quotient of the units; a frame is kept."""
         assert isinstance(params, cls.Params)
-        a, b = given["a"], given["b"]
+        a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
             return {}
         y = a.times(b.unit, 1 if params.operation == "multiply" else -1)
@@ -108,7 +108,7 @@ class Product(Block):
 class Rows(Signal):
     """A vector of ``m`` numbers, one for each row of the matrix."""
 
-    value = Field("m", carried=True, text="the vector's elements")
+    value = Field("m", inferred=True, text="the vector's elements")
 
 
 class MatrixGain(Block):
@@ -129,9 +129,7 @@ class MatrixGain(Block):
     y = Output(Rows, text="K u")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``m`` rows and ``n`` columns."""
         assert isinstance(params, cls.Params)
         return {"m": len(params.matrix), "n": len(params.matrix[0])}
@@ -142,10 +140,10 @@ class MatrixGain(Block):
         return {"matrix": [[1.0, 2.0, -1.0], [0.0, 0.5, 3.0]]}
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The unit of u times that of the matrix; the frame is what the parameter says."""
         assert isinstance(params, cls.Params)
-        u = given["u"]
+        u = inputs["u"]
         return {"y": u and replace(u.times(read_unit(params.unit)), frame=params.frame)}
 
     @kernel

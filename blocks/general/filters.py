@@ -9,9 +9,9 @@ from typing import Literal
 
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_systems import advance, band_stop, first_order, second_order, settle
-from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
-from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import SECOND
 from .vectors import UnitOfInput, Vector, VectorParameters
@@ -49,12 +49,12 @@ class LinearFilter(UnitOfInput, Block):
         advance(constants.coefficients, u.value, x.memory, y.value)
 
 
-def too_fast(name: str, frequency: float, period: float) -> list[Misfit]:
-    """A misfit where a frequency [Hz] is not below half of the rate at which the block runs."""
+def too_fast(name: str, frequency: float, period: float) -> list[UnmetRequirement]:
+    """The unmet requirement where a frequency [Hz] is not below half of the rate at which the block runs."""
     if frequency < 0.5 / period:
         return []
     return [
-        Misfit(
+        UnmetRequirement(
             f"{name} is not below half of the block's rate",
             parameter=name,
             expected=f"below {0.5 / period:g} Hz",
@@ -82,7 +82,7 @@ class Butterworth(LinearFilter):
     params: ButterworthParameters
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The cutoff must be below half of the block's rate."""
         assert isinstance(params, ButterworthParameters)
         return too_fast("cutoff", params.cutoff, context.period)
@@ -142,7 +142,7 @@ class BandStop(LinearFilter):
     params: Params
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The centre must be below half of the block's rate."""
         assert isinstance(params, cls.Params)
         return too_fast("centre", params.centre, context.period)
@@ -221,9 +221,9 @@ class FilteredDerivative(Block):
     x = State(DerivativeState, text="the input and the derivative before")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The unit of the input by a second."""
-        u = given["u"]
+        u = inputs["u"]
         return {"y": u and u.times(SECOND, -1)}
 
     def prepare(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
-from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import SECOND
 from .vectors import (
@@ -39,9 +39,9 @@ class Integrator(Bounded, Block):
     x = State(Vector, text="the integral")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The unit of the rate times a second."""
-        u = given["u"]
+        u = inputs["u"]
         return {"y": u and u.times(SECOND)}
 
     def setup(self) -> None:
@@ -87,9 +87,9 @@ class TrapezoidalIntegrator(Block):
     x = State(TrapezoidalState, text="the integral and the rate before")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The unit of the rate times a second."""
-        u = given["u"]
+        u = inputs["u"]
         return {"y": u and u.times(SECOND)}
 
     @kernel

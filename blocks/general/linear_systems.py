@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_systems import advance_transfer_function, controllable_form, discretise
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
@@ -29,13 +29,13 @@ from .vectors import (
 class SystemInput(Signal):
     """The input of a linear system, a vector of ``n`` numbers."""
 
-    value = Field("n", carried=True, text="the inputs")
+    value = Field("n", inferred=True, text="the inputs")
 
 
 class SystemOutput(Signal):
     """The output of a linear system, a vector of ``m`` numbers."""
 
-    value = Field("m", carried=True, text="the outputs")
+    value = Field("m", inferred=True, text="the outputs")
 
 
 class SystemState(Signal):
@@ -62,14 +62,14 @@ class SystemParameters(SourceParameters):
         """The dimensions ``n`` (inputs), ``m`` (outputs) and ``order``."""
         return {"n": len(self.b[0]), "m": len(self.c), "order": len(self.a)}
 
-    def wrong_sizes(self) -> Iterable[Misfit]:
+    def wrong_sizes(self) -> Iterable[UnmetRequirement]:
         """Matrices and initial values that do not fit A."""
         order = len(self.a)
-        yield from _misfit("a", "columns", len(self.a[0]), order)
-        yield from _misfit("b", "rows", len(self.b), order)
-        yield from _misfit("c", "columns", len(self.c[0]), order)
+        yield from _unequal("a", "columns", len(self.a[0]), order)
+        yield from _unequal("b", "rows", len(self.b), order)
+        yield from _unequal("c", "columns", len(self.c[0]), order)
         if self.initial is not None:
-            yield from _misfit("initial", "elements", len(self.initial), order)
+            yield from _unequal("initial", "elements", len(self.initial), order)
 
     def matrices(self, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The discrete A and B of a period [s]."""
@@ -112,15 +112,13 @@ class LinearSystem(UnitFromParameters, Block):
     x = State(SystemState, text="the system's state")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` inputs, ``m`` outputs and the ``order``."""
         assert isinstance(params, SystemParameters)
         return params.sizes()
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The matrices must fit each other."""
         assert isinstance(params, SystemParameters)
         return params.wrong_sizes()
@@ -145,9 +143,9 @@ class LinearSystem(UnitFromParameters, Block):
         self.constants.b[...] = b
 
 
-def _misfit(name: str, what: str, found: int, order: int) -> Iterable[Misfit]:
+def _unequal(name: str, what: str, found: int, order: int) -> Iterable[UnmetRequirement]:
     if found != order:
-        yield Misfit(
+        yield UnmetRequirement(
             f"{name} has {found} {what}, and the system is of order {order}",
             parameter=name,
             expected=f"{order} {what}",
@@ -191,14 +189,14 @@ class StateSpaceWithFeedthrough(LinearSystem):
     params: Params
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The matrices must fit each other."""
         assert isinstance(params, cls.Params)
         yield from params.wrong_sizes()
         found = f"{len(params.d)} x {len(params.d[0])}"
         expected = f"{len(params.c)} x {len(params.b[0])}"
         if found != expected:
-            yield Misfit("d does not fit b and c", "d", expected=expected, found=found)
+            yield UnmetRequirement("d does not fit b and c", "d", expected=expected, found=found)
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
@@ -257,21 +255,19 @@ class TransferFunction(UnitOfProduct, Block):
     x = State(TransferState, text="the states")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` elements, and the ``order``."""
         assert isinstance(params, cls.Params)
         return {"n": params.n, "order": len(params.denominator) - 1}
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """It must be proper, and its denominator have the degree it seems to have."""
         assert isinstance(params, cls.Params)
         if params.denominator[0] == 0.0:
-            yield Misfit("the denominator's first coefficient is zero", "denominator")
+            yield UnmetRequirement("the denominator's first coefficient is zero", "denominator")
         if len(params.numerator) > len(params.denominator):
-            yield Misfit(
+            yield UnmetRequirement(
                 "it is not proper: the numerator's degree is above the denominator's",
                 parameter="numerator",
                 expected=f"at most {len(params.denominator)} coefficients",

@@ -10,7 +10,7 @@ import numpy as np
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
-from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from .vectors import NEVER, CountState, Flag, Flags, Number, Seconds, Vector, VectorParameters
 
@@ -77,9 +77,9 @@ class Compare(Block):
     y = Output(Flags, text="where it holds")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Both sides must be the same quantity."""
-        given.alike("a", "b")
+        inputs.alike("a", "b")
         return {}
 
     @kernel
@@ -232,9 +232,9 @@ class Switch(Block):
     y = Output(Vector, text="the one that is taken")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Both vectors must be the same quantity, and so is the output."""
-        return {"y": given.alike("a", "b")}
+        return {"y": inputs.alike("a", "b")}
 
     @kernel
     @staticmethod

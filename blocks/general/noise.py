@@ -45,11 +45,11 @@ class WhiteNoise(UnitFromParameters, Block):
     y = Output(Vector, text="the noise")
     stream = State(StreamState, text="the random stream")
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Keep where the stream is."""
         self._random.save(self.stream)
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Take it back."""
         self._random.load(self.stream)
 
@@ -109,11 +109,11 @@ class ColouredNoise(UnitFromParameters, Block):
     y = Output(Vector, text="the noise")
     x = State(NoiseState, text="the noise and its random stream")
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Keep where the stream is."""
         self._random.save(self.x)
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Take it back."""
         self._random.load(self.x)
 

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...mathematics.kernel import kernel
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
@@ -160,11 +159,11 @@ class Relay(UnitFromParameters, Block):
     x = State(Flags, text="which elements are on")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """It must switch off below where it switches on."""
         assert isinstance(params, cls.Params)
         if params.switch_off > params.switch_on:
-            yield Misfit(
+            yield UnmetRequirement(
                 "switch_off is above switch_on",
                 parameter="switch_off",
                 expected=f"at most {params.switch_on:g}",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter
-from ...runtime.language.quantities import Carried, Given
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
@@ -79,12 +79,12 @@ class PID(Bounded, Block):
     x = State(PidState, text="the integral and the derivative")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """u has the unit of the error times ``unit``, which the feedforward must have too."""
         assert isinstance(params, cls.Params)
-        error = given.alike("setpoint", "measured")
+        error = inputs.alike("setpoint", "measured")
         u = error and error.times(read_unit(params.unit))
-        given.agree("feedforward", u, "it is added to the control")
+        inputs.agree("feedforward", u, "it is added to the control")
         return {"u": u}
 
     def prepare(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters
@@ -23,13 +23,13 @@ _DTYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 class Observation(Signal):
     """What a policy sees: ``n`` numbers of any units."""
 
-    value = Field("n", carried=True, text="the observation's elements, in the network's order")
+    value = Field("n", inferred=True, text="the observation's elements, in the network's order")
 
 
 class Action(Signal):
     """What a policy answers: ``m`` numbers."""
 
-    value = Field("m", carried=True, text="the action's elements, in the network's order")
+    value = Field("m", inferred=True, text="the action's elements, in the network's order")
 
 
 class Memory(Signal):
@@ -71,13 +71,13 @@ class Policy(UnitFromParameters, Block):
     memory = State(Memory, text="the states of a recurrent network")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The file must be a network with these inputs and outputs."""
         assert isinstance(params, cls.Params)
         try:
             Network(params, context.folder)
         except ValueError as error:
-            yield Misfit(str(error), "file")
+            yield UnmetRequirement(str(error), "file")
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

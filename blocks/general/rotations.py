@@ -20,7 +20,7 @@ from ...mathematics.rotations import (
 )
 from ...runtime.language.block import Block, Input, Output
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
 
 
@@ -45,7 +45,7 @@ class EulerAngles(Signal):
 class Vector3(Signal):
     """A vector in space."""
 
-    value = Field(3, carried=True, text="x, y, z")
+    value = Field(3, inferred=True, text="x, y, z")
 
 
 def random_unit(rng: np.random.Generator) -> Mapping[str, Any]:
@@ -86,14 +86,14 @@ class RotateVector(Block):
         return {"rotation": random_unit(rng)}
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The vector must be in the first frame; the result is in the second."""
         assert isinstance(params, cls.Params)
         before, _, after = params.direction.split()
-        u = given["u"]
+        u = inputs["u"]
         if u is None:
             return {}
-        given.agree("u", Quantity(u.unit, before), f"the block turns vectors from {before}")
+        inputs.agree("u", Quantity(u.unit, before), f"the block turns vectors from {before}")
         return {"y": Quantity(u.unit, after)}
 
     @kernel

@@ -37,9 +37,7 @@ class Constant(UnitFromParameters, Block):
     y = Output(Vector, text="the vector")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` is the length of ``value``."""
         assert isinstance(params, cls.Params)
         return {"n": len(params.value)}

@@ -11,7 +11,16 @@ from pydantic import Field as Key
 from ...mathematics.arrays import Flags1D, Indices1D
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Clock, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import (
+    Block,
+    Clock,
+    Context,
+    Input,
+    Metric,
+    Output,
+    State,
+    UnmetRequirement,
+)
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
@@ -95,20 +104,18 @@ class StateMachine(Block):
     x = State(MachineState, text="the present state")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` conditions and ``n_states``."""
         assert isinstance(params, cls.Params)
         return {"n": len(params.conditions), "n_states": len(params.states)}
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every name of a transition must be one of a state or of a condition."""
         assert isinstance(params, cls.Params)
         for key, names in (("states", params.states), ("conditions", params.conditions)):
             for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-                yield Misfit(f"{name!r} is twice in {key}", parameter=key)
+                yield UnmetRequirement(f"{name!r} is twice in {key}", parameter=key)
         for transition in params.transitions:
             for state in (transition.source, transition.to):
                 if state not in params.states:
@@ -171,8 +178,8 @@ class StateMachine(Block):
         x.runs += 1
 
 
-def _unknown(kind: str, name: str, known: list[str]) -> Misfit:
-    return Misfit(
+def _unknown(kind: str, name: str, known: list[str]) -> UnmetRequirement:
+    return UnmetRequirement(
         f"there is no {kind} {name!r}",
         parameter="transitions",
         expected=", ".join(known),
@@ -207,12 +214,12 @@ class Assertion(Bounded, Block):
     x = State(Violations, text="what was broken")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The bounds must not cross, and one must be there."""
         assert isinstance(params, cls.Params)
-        yield from super().requires(params, robot)
+        yield from super().requires(params, context)
         if params.lower is None and params.upper is None:
-            yield Misfit("it has no bound", fix="with: {upper: 1.0}")
+            yield UnmetRequirement("it has no bound", fix="with: {upper: 1.0}")
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, object]:

@@ -15,17 +15,17 @@ from ...mathematics.arrays import Array1D, Array2D, Indices1D
 from ...mathematics.interpolation import interpolate, interpolate_grid, interval
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Clock, Context, Input, Misfit, Output
+from ...runtime.language.block import Block, Clock, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Numbers, Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
 
 
-def unsorted_points(name: str, points: Sequence[float]) -> Iterable[Misfit]:
-    """A misfit where points do not rise from each to the next."""
+def unsorted_points(name: str, points: Sequence[float]) -> Iterable[UnmetRequirement]:
+    """The unmet requirement where points do not rise from each to the next."""
     for one, two in pairwise(points):
         if two <= one:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{name} does not rise",
                 parameter=name.partition("[")[0],
                 expected=f"more than {one:g} behind {one:g}",
@@ -55,12 +55,12 @@ class LookupTable(UnitFromParameters, Block):
     y = Output(Vector, text="the table's values there")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The points must rise and each must have a value."""
         assert isinstance(params, cls.Params)
         yield from unsorted_points("points", params.points)
         if len(params.values) != len(params.points):
-            yield Misfit(
+            yield UnmetRequirement(
                 "there must be as many values as points",
                 parameter="values",
                 expected=str(len(params.points)),
@@ -84,7 +84,7 @@ class LookupTable(UnitFromParameters, Block):
 class TableValue(Signal):
     """What a table of several variables gives: a vector of one number."""
 
-    value = Field(1, carried=True, text="the number")
+    value = Field(1, inferred=True, text="the number")
 
 
 class LookupGrid(UnitFromParameters, Block):
@@ -117,21 +117,19 @@ class LookupGrid(UnitFromParameters, Block):
     y = Output(TableValue, text="the table's value there")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` variables."""
         assert isinstance(params, cls.Params)
         return {"n": len(params.axes)}
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every axis must rise, and the grid have as many values as points."""
         assert isinstance(params, cls.Params)
         for k, axis in enumerate(params.axes):
             yield from unsorted_points(f"axes[{k}]", axis)
             if len(axis) < 2:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"axes[{k}] has too few points",
                     "axes",
                     expected="2 or more",
@@ -139,7 +137,7 @@ class LookupGrid(UnitFromParameters, Block):
                 )
         expected = prod(len(axis) for axis in params.axes)
         if len(params.values) != expected:
-            yield Misfit(
+            yield UnmetRequirement(
                 "values does not fill the grid",
                 parameter="values",
                 expected=" x ".join(str(len(axis)) for axis in params.axes) + f" = {expected}",
@@ -197,21 +195,19 @@ class TablePlayback(UnitFromParameters, Block):
     y = Output(Vector, text="the columns at the present time")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` columns."""
         assert isinstance(params, cls.Params)
         return {"n": len(params.columns)}
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """The table must be there and be one."""
         assert isinstance(params, cls.Params)
         try:
             read_table(params.file, params.rows, params.time, params.columns, context.folder)
         except ValueError as error:
-            yield Misfit(str(error), "file" if params.file is not None else "rows")
+            yield UnmetRequirement(str(error), "file" if params.file is not None else "rows")
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

@@ -10,11 +10,10 @@ import numpy as np
 from pydantic import field_validator
 
 from ...mathematics.expression import parse_expression
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Context, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import UnitError
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.unit_algebra import ONE, SECOND, over, read_unit, root, times
 from ...runtime.language.units import Unit, parse_unit
 from .vectors import (
@@ -43,9 +42,9 @@ _OF_ANGLES = ("sin", "cos", "tan")
 _TO_ANGLES = ("asin", "acos", "atan")
 
 
-def _quantity(name: str, given: Given) -> Quantity | None:
+def _quantity(name: str, inputs: InputQuantities) -> Quantity | None:
     """What a function makes of the quantity of ``u``."""
-    u = given["u"]
+    u = inputs["u"]
     if u is None or name in _SAME:
         return u
     if name == "reciprocal":
@@ -56,12 +55,12 @@ def _quantity(name: str, given: Given) -> Quantity | None:
         try:
             return Quantity(None if u.unit is None else root(u.unit), u.frame)
         except UnitError as error:
-            given.refuse("u", str(error))
+            inputs.refuse("u", str(error))
             return Quantity(None)
     if name in _OF_ANGLES:
-        given.demand("u", ("rad", ""), f"{name} takes angles in rad")
+        inputs.demand("u", ("rad", ""), f"{name} takes angles in rad")
     elif name != "sign":
-        given.demand("u", ("",), f"{name} takes plain numbers")
+        inputs.demand("u", ("",), f"{name} takes plain numbers")
     return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
 
 
@@ -81,10 +80,10 @@ class Function(Block):
     y = Output(Vector, text="the function's values")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Angles go into sin, cos and tan; roots need even powers."""
         assert isinstance(params, cls.Params)
-        return {"y": _quantity(params.function, given)}
+        return {"y": _quantity(params.function, inputs)}
 
     def setup(self) -> None:
         """Choose the function."""
@@ -140,42 +139,36 @@ class Expression(Block):
     y = Output(Vector, text="the formula's value")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The formula must be one."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """The formula must be one, and every input that it reads must be wired."""
         assert isinstance(params, cls.Params)
         for name in params.constants:
             if name in (*INPUTS, "t", "pi") or not name.isidentifier():
-                yield Misfit(f"a constant cannot be called {name!r}", "constants")
+                yield UnmetRequirement(f"a constant cannot be called {name!r}", "constants")
         for name in params.units:
             if name not in params.constants:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"there is no constant {name!r}",
                     f"units.{name}",
                     expected=", ".join(params.constants) or "constants",
                 )
         try:
-            parse_expression(params.expression, (*INPUTS, "t", *params.constants))
-        except ValueError as error:
-            yield Misfit(str(error), "expression", found=params.expression)
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Every input that the formula reads must be wired."""
-        assert isinstance(params, cls.Params)
-        try:
             names = parse_expression(params.expression, (*INPUTS, "t", *params.constants)).names
-        except ValueError:
-            return  # reported by ``requires``
+        except ValueError as error:
+            yield UnmetRequirement(str(error), "expression", found=params.expression)
+            return
         for name in names:
             if name in INPUTS and name not in context.wired:
-                yield Misfit(f"the formula reads {name!r}, which is not wired", "expression")
+                yield UnmetRequirement(
+                    f"the formula reads {name!r}, which is not wired", "expression"
+                )
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The unit of the formula, and the one frame that its inputs have."""
         assert isinstance(params, cls.Params)
         formula = parse_expression(params.expression, (*INPUTS, "t", *params.constants))
-        read = {name: given[name] for name in formula.names if name in INPUTS}
+        read = {name: inputs[name] for name in formula.names if name in INPUTS}
         known = {name: quantity for name, quantity in read.items() if quantity is not None}
         frames = dict.fromkeys(q.frame for q in known.values() if q.frame is not None)
         frame = next(iter(frames)) if len(frames) == 1 else None
@@ -188,10 +181,10 @@ class Expression(Block):
         try:
             unit = unit_of(formula.tree, {**{n: q.unit for n, q in known.items()}, **units, **TIME})
         except UnitError as error:
-            given.refuse(next(iter(known), "a"), f"in {params.expression!r} {error}")
+            inputs.refuse(next(iter(known), "a"), f"in {params.expression!r} {error}")
             return {"y": Quantity(said, frame)}
         if said is not None and unit is not None and not said.matches(unit):
-            given.refuse(next(iter(known), "a"), f"the formula is in {unit}, not in {said}")
+            inputs.refuse(next(iter(known), "a"), f"the formula is in {unit}, not in {said}")
         return {"y": Quantity(unit if said is None else said, frame)}
 
     @classmethod

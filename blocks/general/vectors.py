@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, ValidationInfo, field_validator, model_validator
 
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Misfit
+from ...runtime.language.block import Context, UnmetRequirement
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
-from ...runtime.language.quantities import Carried, Given, Quantity
+from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from ...runtime.language.units import QUANTITY, parse_quantity
@@ -21,7 +20,7 @@ from ...runtime.language.units import QUANTITY, parse_quantity
 class Vector(Signal):
     """A vector of ``n`` numbers. Its unit and frame are those of what is wired."""
 
-    value = Field("n", carried=True, text="the vector's elements")
+    value = Field("n", inferred=True, text="the vector's elements")
 
 
 class Number(Signal):
@@ -95,12 +94,12 @@ class InitialValueParameters(VectorParameters):
 
 def crossed_bounds(
     lower: ScalarOrVector | None, upper: ScalarOrVector | None, n: int
-) -> Iterable[Misfit]:
-    """A misfit where a lower bound is above its upper one."""
+) -> Iterable[UnmetRequirement]:
+    """The unmet requirement where a lower bound is above its upper one."""
     low = np.full(n, -np.inf if lower is None else lower)
     high = np.full(n, np.inf if upper is None else upper)
     for i in np.flatnonzero(low > high)[:1]:
-        yield Misfit(
+        yield UnmetRequirement(
             f"the lower bound of element {i} is above the upper one",
             parameter="lower",
             expected=f"at most {high[i]:g}",
@@ -121,7 +120,7 @@ class Bounded:
     Constants: ClassVar[type[Signal] | None] = Bounds
 
     @classmethod
-    def requires(cls, params: Any, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Any, context: Context) -> Iterable[UnmetRequirement]:
         """The bounds must not cross."""
         return crossed_bounds(params.lower, params.upper, params.n)
 
@@ -202,7 +201,7 @@ class UnitFromParameters:
     """A block whose output ``y`` is what its parameters ``unit`` and ``frame`` say."""
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The quantity of the parameters."""
         assert isinstance(params, SourceParameters)
         return {"y": params.quantity()}
@@ -212,19 +211,19 @@ class UnitOfInput:
     """A block whose output ``y`` is the same quantity as its input ``u``."""
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The quantity of ``u``."""
-        return {"y": given["u"]}
+        return {"y": inputs["u"]}
 
 
 class UnitOfProduct:
     """A block whose output ``y`` is its input ``u`` times the parameter ``unit``."""
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The quantity of ``u``, times the unit."""
         assert isinstance(params, InUnit)
-        u = given["u"]
+        u = inputs["u"]
         return {"y": u and u.times(read_unit(params.unit))}
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.quantities import UNCHECKED, Carried, Given
+from ...runtime.language.quantities import UNCHECKED, InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from .vectors import UnitOfInput, Vector
 
@@ -17,19 +17,19 @@ from .vectors import UnitOfInput, Vector
 class First(Signal):
     """A vector of ``n_a`` numbers."""
 
-    value = Field("n_a", carried=True, text="the first elements")
+    value = Field("n_a", inferred=True, text="the first elements")
 
 
 class Second(Signal):
     """A vector of ``n_b`` numbers."""
 
-    value = Field("n_b", carried=True, text="the elements behind them")
+    value = Field("n_b", inferred=True, text="the elements behind them")
 
 
 class Joined(Signal):
     """A vector of ``n_a + n_b`` numbers."""
 
-    value = Field("n", carried=True, text="first those of a, then those of b")
+    value = Field("n", inferred=True, text="first those of a, then those of b")
 
 
 class PairSizes(Parameters):
@@ -43,9 +43,7 @@ class Pairs:
     """The base of blocks with two vectors and the one that they make."""
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` is the sum of ``n_a`` and ``n_b``."""
         assert isinstance(params, PairSizes)
         return {"n_a": params.n_a, "n_b": params.n_b, "n": params.n_a + params.n_b}
@@ -61,9 +59,9 @@ class Mux(Pairs, Block):
     y = Output(Joined, text="all elements")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """What both have in common; the unit is not checked where they differ."""
-        a, b = given["a"], given["b"]
+        a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
             return {}
         return {"y": a if a == b else UNCHECKED}
@@ -85,9 +83,9 @@ class Demux(Pairs, Block):
     b = Output(Second, text="the elements behind them")
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Both are what u is."""
-        return {"a": given["u"], "b": given["u"]}
+        return {"a": inputs["u"], "b": inputs["u"]}
 
     @kernel
     @staticmethod
@@ -99,7 +97,7 @@ class Demux(Pairs, Block):
 class Selected(Signal):
     """The ``m`` elements that were selected."""
 
-    value = Field("m", carried=True, text="the elements, in the order asked for")
+    value = Field("m", inferred=True, text="the elements, in the order asked for")
 
 
 class Selector(UnitOfInput, Block):
@@ -114,20 +112,18 @@ class Selector(UnitOfInput, Block):
     y = Output(Selected, text="the selected elements")
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """``n`` elements come in and ``m`` go out."""
         assert isinstance(params, cls.Params)
         return {"n": params.n, "m": len(params.elements)}
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Every element that is selected must be there."""
         assert isinstance(params, cls.Params)
         for element in params.elements:
             if not 0 <= element < params.n:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"element {element} is not there",
                     parameter="elements",
                     expected=f"0 to {params.n - 1}",

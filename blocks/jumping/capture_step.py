@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from ...mathematics.arrays import Array2D, Flags1D, Indices1D
+from ...mathematics.arrays import Array1D, Array2D, Flags1D, Indices1D
 from ...mathematics.capture_step import (
+    approach,
     capture_point,
-    choose_foothold,
     farthest_foot,
     limit_foothold,
+    nearest_in_foot,
     spread_to_feet,
     support_margin,
-    swing_points,
 )
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading
@@ -30,6 +30,8 @@ _AIMED = 0.25
 """The last share of a step in which the foothold stays as it is."""
 _NEARER = 0.005
 """A foot is preferred if it comes nearer to its foothold by more than this [m]."""
+_SHORTEST = 0.03
+"""The motion of a foot counts on at least this much time [s], which limits its feedback gains."""
 
 
 class StepParams(Parameters):
@@ -305,10 +307,7 @@ def aim_step(
     """Choose the foothold of a foot that has ``left`` seconds to go; returns how far it is from where
     it should be [m]."""
     place, n_feet, middle = memory.foothold[foot], constants.side.shape[0], scratch.middle
-    choose_foothold(
-        scratch.capture, rate, left, params.beyond, terms.contact_position,
-        constants.foot_of_point, foot, n_feet, scratch.nearest, scratch.other, place,
-    )  # fmt: skip
+    choose_foothold(terms, params, constants, scratch, foot, rate, left, place)
     chosen_x, chosen_y = place[0], place[1]
     for k in range(3):
         middle[k] = 0.0
@@ -322,6 +321,42 @@ def aim_step(
     )  # fmt: skip
     x, y = place[0] - chosen_x, place[1] - chosen_y
     return math.sqrt(x * x + y * y)
+
+
+@kernel
+def choose_foothold(
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    scratch: StepScratch,
+    foot: int,
+    rate: float,
+    left: float,
+    out: Array1D,
+) -> None:
+    """Find where a foot should land: at the capture point of that instant, and ``beyond``.
+
+    The force is taken to act where the other feet are nearest to the capture point.
+
+    Args:
+        rate: the pendulum's frequency [1/s].
+        left: time until the foot lands [s].
+        out: becomes the foothold; its height stays, (3,).
+    """
+    capture, nearest, other = scratch.capture, scratch.nearest, scratch.other
+    least = math.inf
+    for standing in range(constants.side.shape[0]):
+        if standing == foot:
+            continue
+        distance = nearest_in_foot(
+            terms.contact_position, constants.foot_of_point, standing, capture, other
+        )
+        if distance < least:
+            least = distance
+            nearest[:] = other
+    grown = (1.0 + params.beyond) * math.exp(rate * left)
+    for k in range(2):
+        out[k] = nearest[k] + grown * (capture[k] - nearest[k])
 
 
 @kernel
@@ -351,17 +386,47 @@ def swing_foot(
         return
     if left > _AIMED * duration:
         aim_step(terms, params, constants, memory, scratch, foot, rate, left)
-    place = memory.foothold[foot]
-    place[2] = memory.ground
-    swing_points(
-        foot, constants.foot_of_point, constants.offset, place, memory.heading, elapsed, duration,
-        params.height, terms.contact_position, terms.contact_velocity, out.stance,
-        out.stepping, out.step_acceleration,
-    )  # fmt: skip
+    memory.foothold[foot, 2] = memory.ground
+    swing_points(terms, params, constants, memory, out, foot)
     leave_hovering(
         terms.contact_position, constants.foot_of_point, params.flat, out.stance,
         scratch.standing,
     )  # fmt: skip
+
+
+@kernel
+def swing_points(
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    memory: StepMemory,
+    out: PhaseState,
+    foot: int,
+) -> None:
+    """Accelerate the points of a foot towards its foothold, with a flat sole.
+
+    In the first half of the step the sole rises by ``height``. In the second it comes down as if the
+    ground were lower by that, so it is still moving when it meets the ground.
+    """
+    cosine, sine = math.cos(memory.heading), math.sin(memory.heading)
+    elapsed, duration, height = memory.elapsed, params.duration, params.height
+    left = max(duration - elapsed, _SHORTEST)
+    rises = elapsed < 0.5 * duration
+    place, acceleration = memory.foothold[foot], out.step_acceleration
+    position, velocity, offset = terms.contact_position, terms.contact_velocity, constants.offset
+    for i in range(constants.foot_of_point.shape[0]):
+        if constants.foot_of_point[i] != foot:
+            continue
+        out.stance[i], out.stepping[i] = False, True
+        x = place[0] + cosine * offset[i, 0] - sine * offset[i, 1]
+        y = place[1] + sine * offset[i, 0] + cosine * offset[i, 1]
+        z, until = place[2] - height, left
+        if rises:
+            z = place[2] + height
+            until = max(0.5 * duration - elapsed, _SHORTEST)
+        acceleration[i, 0] = approach(position[i, 0], velocity[i, 0], x, left)
+        acceleration[i, 1] = approach(position[i, 1], velocity[i, 1], y, left)
+        acceleration[i, 2] = approach(position[i, 2], velocity[i, 2], z, until)
 
 
 @kernel

@@ -34,8 +34,8 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
 from ...robots.pinocchio_model import PinocchioModel
-from ...runtime.language.block import Block, Input, Misfit, Output
-from ...runtime.language.context import Clock
+from ...runtime.language.block import Block, Input, Output, UnmetRequirement
+from ...runtime.language.context import Clock, Context
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
@@ -74,12 +74,12 @@ def missing_joints(robot: RobotDescription) -> int:
     return max(0, rows - (len(robot.joints) - len(robot.held)))
 
 
-def too_few_joints(robot: RobotDescription | None) -> Iterator[Misfit]:
-    """The misfit of a robot that lacks joints to move its centre of mass and base while it stands."""
+def too_few_joints(robot: RobotDescription | None) -> Iterator[UnmetRequirement]:
+    """The unmet requirement of a robot that lacks joints to move its centre of mass and base while it stands."""
     assert robot is not None
     missing = missing_joints(robot)
     if missing:
-        yield Misfit(
+        yield UnmetRequirement(
             f"{robot.name} lacks {missing} joints to move its centre of mass and its base with "
             "all feet on the ground",
             expected=f"{len(robot.joints) + missing} joints that are not held",
@@ -320,9 +320,9 @@ class GuidedReference(Block):
     """What is fed forward is the mean over so many seconds."""
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report too few joints to move the centre of mass and the base with all feet standing."""
-        return too_few_joints(robot)
+        return too_few_joints(context.robot)
 
     @abstractmethod
     def make_table(self) -> JumpTable:

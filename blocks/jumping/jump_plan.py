@@ -18,7 +18,7 @@ from ...planner.library.jump_table import (
     read_table,
     table_rows,
 )
-from ...runtime.language.block import Block, Context, Input, Metric, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
 from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
@@ -52,7 +52,7 @@ class JumpPlan(Block):
     Every plan, also one from the library, must pass the validity check with exact dynamics
     (``planner/checking/validity``). With ``check: reported`` a plan that fails it is followed all
     the same, to compare the formulations ``paper`` and ``srbm``, whose plans always fail. Then the
-    run's cautions name every test that failed, and the metrics have ``plan_valid`` and
+    warnings of the run name every test that failed, and the metrics have ``plan_valid`` and
     ``plan_tests_failed``. For those formulations the reference has the centre of mass and momentum
     of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
     without the features that only ``full`` has: impacts, margins and limits of the motors.
@@ -133,7 +133,7 @@ class JumpPlan(Block):
     progress = State(PlanProgress, text="how late the plan is")
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a task that cannot be read, or is for another robot or actuator profile."""
         from ...planner.library.library import shipped_tasks
         from ...planner.task.task import JumpTaskError
@@ -146,7 +146,7 @@ class JumpPlan(Block):
             for line in str(error).splitlines():
                 place, _, rest = line.partition(": ")
                 key = rest.partition(": ")[0] if place == "task" else ""
-                yield Misfit(
+                yield UnmetRequirement(
                     f"the task cannot be used: {rest if key else line}",
                     parameter=f"task.{key}" if key else "task",
                 )
@@ -154,7 +154,7 @@ class JumpPlan(Block):
         except LookupError as error:
             there = shipped_tasks()
             near = get_close_matches(str(params.task), there, 3)
-            yield Misfit(
+            yield UnmetRequirement(
                 str(error.args[0]),
                 parameter="task",
                 expected="a task's file, relative to the graph, or one of the "
@@ -165,7 +165,7 @@ class JumpPlan(Block):
             )
             return
         if task.robot != robot.name:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the task {task.name!r} is for {task.robot}, but the graph's robot is "
                 f"{robot.name}",
                 parameter="task",
@@ -174,7 +174,7 @@ class JumpPlan(Block):
                 fix=f"robot: {task.robot}, as a key of the graph",
             )
         elif task.profile and task.profile != robot.motors.profile:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the task {task.name!r} is planned with the actuators {task.profile}, but the "
                 f"graph runs with {robot.motors.profile}",
                 parameter="task",
@@ -184,7 +184,7 @@ class JumpPlan(Block):
             )
 
     @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """The ground and the score's expectation that follow from the task."""
         from ...planner.task.ground import scene_of
         from ...planner.task.task import JumpTaskError
@@ -194,7 +194,7 @@ class JumpPlan(Block):
         try:
             scene = scene_of(task, context.robot)
         except JumpTaskError as error:
-            scene = Misfit(str(error), fix="robot.scene: flat, or a floor and boxes")
+            scene = UnmetRequirement(str(error), fix="robot.scene: flat, or a floor and boxes")
         end, hops = task.places()[-1], task.hops()
         velocity, momentum = cls._corrections(task, params, context)
         return {
@@ -210,7 +210,7 @@ class JumpPlan(Block):
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
-        """What a rehearsal has learnt; for both the same ``Misfit`` where its file is damaged."""
+        """What a rehearsal has learnt; for both the same ``UnmetRequirement`` where its file is damaged."""
         from ...planner.library.rehearsed import (
             ZERO,
             RehearsalFileError,
@@ -227,7 +227,7 @@ class JumpPlan(Block):
             task = _as_planned(task, params.formulation)
             found = find_rehearsed(plan_library(params, context.robot), task, controller)
         except RehearsalFileError as error:
-            damaged = Misfit(str(error), fix=f"{context.path}.rehearsed: false")
+            damaged = UnmetRequirement(str(error), fix=f"{context.path}.rehearsed: false")
             return damaged, damaged
         if found is None:
             return list(ZERO), list(ZERO)
@@ -286,7 +286,7 @@ class JumpPlan(Block):
             return {}
         return {"plan_valid": report.valid, "plan_tests_failed": len(report.failed)}
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         report = self._report
         if report is None or report.valid:
             return ()

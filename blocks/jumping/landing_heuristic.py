@@ -32,9 +32,8 @@ from ...mathematics.rotations import (
     to_matrix,
     yaw,
 )
-from ...robots.description import RobotDescription
 from ...robots.kinematics import foot_sides, standing_feet
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
 from ...runtime.language.signals import Field
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
@@ -202,15 +201,16 @@ class LandingHeuristic(Block):
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report limits within which the robot cannot stand."""
+        robot = context.robot
         assert isinstance(params, LandingParams) and robot is not None
         if params.limits_about == "stance":
             return
         for foot, place in zip(robot.feet, standing_feet(robot), strict=True):
             x, y = abs(float(place[0])), abs(float(place[1]))
             if x > params.p_max[0] or y > params.p_max[1]:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{foot.name} of {robot.name} stands {x:.3f} m ahead or behind and {y:.3f} m "
                     "beside the centre of mass, which is beyond p_max",
                     parameter="p_max",

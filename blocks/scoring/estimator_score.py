@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from math import sqrt
 
-import numpy as np
-
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import conjugate, logarithm, multiply
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, RobotTruth
+from .footing import any_loaded, magnitude
 
 KINDS = 5
 """Position, velocity, attitude and its two parts tilt and yaw, in this order."""
@@ -39,6 +40,14 @@ class EstimatorRecord(Signal):
     landings = Field(dtype="int64", text="flights that have ended")
 
 
+class EstimatorScratch(Signal):
+    """What a tick computes on its way."""
+
+    error = Field(3, text="of a position, a velocity or an orientation")
+    squares = Field(KINDS, text="of the errors of the tick")
+    turn = Field(4, unit="", text="from the true to the estimated orientation")
+
+
 class EstimatorScore(Block):
     """Compares the estimated base with the true one. No controller can see it.
 
@@ -64,43 +73,48 @@ class EstimatorScore(Block):
             0.02, unit="s", gt=0, text="all points unloaded for this long is a flight"
         )
 
+    Scratch = EstimatorScratch
     params: Params
     truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
     base = Input(BaseState, text="what the estimator says")
     record = State(EstimatorRecord, text="the errors so far")
 
-    def setup(self) -> None:
-        """Scratch memory."""
-        self._error, self._squares = np.zeros(3), np.zeros(KINDS)
-
-    def step(self) -> None:
-        """Compare one tick."""
-        record = self.record
-        self._compare()
-        last = record.last
-        np.multiply(last, last, out=self._squares)
+    @kernel
+    @staticmethod
+    def step(
+        truth: RobotTruth,
+        base: BaseState,
+        record: EstimatorRecord,
+        params: Params,
+        scratch: EstimatorScratch,
+        period: float,
+    ) -> None:
+        find_errors(truth, base, record, scratch)
+        errors, squares = record.last, scratch.squares
+        squares[:] = errors * errors
         record.ticks += 1
-        record.square_sum += self._squares
-        np.maximum(record.peak, last, out=record.peak)
-        if any(self.truth.contact_touched.tolist()):
-            if self._confirmed():
-                self._land()
-            record.unloaded_ticks[()] = 0
+        record.square_sum[:] += squares
+        record.peak[:] = max(record.peak, errors)
+        confirmed = is_flight(record, params.flight_confirmation, period)
+        if any_loaded(truth.contact_touched):
+            if confirmed:
+                record_landing(record)
+            record.unloaded_ticks = 0
             return
         if record.unloaded_ticks == 0:
-            record.unloaded_error[:] = last
-            record.unloaded_square_sum.fill(0.0)
-            record.unloaded_peak.fill(0.0)
-        before = self._confirmed()
+            record.unloaded_error[:] = errors
+            record.unloaded_square_sum[:] = 0.0
+            record.unloaded_peak[:] = 0.0
         record.unloaded_ticks += 1
-        record.unloaded_square_sum += self._squares
-        np.maximum(record.unloaded_peak, last, out=record.unloaded_peak)
-        if self._confirmed() and not before:
+        record.unloaded_square_sum[:] += squares
+        record.unloaded_peak[:] = max(record.unloaded_peak, errors)
+        if not is_flight(record, params.flight_confirmation, period):
+            return
+        if not confirmed:
             record.flights += 1
             record.lift_off[:] = record.unloaded_error
         # The last tick before a point is loaded again is the touchdown.
-        if self._confirmed():
-            record.touchdown[:] = last
+        record.touchdown[:] = errors
 
     def metrics(self) -> Mapping[str, Metric]:
         """The errors by name."""
@@ -113,47 +127,47 @@ class EstimatorScore(Block):
                 values[f"estimator_{name}_{what}_{unit}"] = value
 
             if ticks:
-                put("rms", math.sqrt(record.square_sum.item(kind) / ticks))
+                put("rms", sqrt(record.square_sum.item(kind) / ticks))
                 put("peak", record.peak.item(kind))
                 put("end", record.last.item(kind))
             if record.flights:
                 put("lift_off", record.lift_off.item(kind))
             if record.landings:
                 flown = int(record.flight_ticks)
-                put("flight_rms", math.sqrt(record.flight_square_sum.item(kind) / flown))
+                put("flight_rms", sqrt(record.flight_square_sum.item(kind) / flown))
                 put("flight_peak", record.flight_peak.item(kind))
                 put("touchdown", record.touchdown.item(kind))
         return values
 
-    def _confirmed(self) -> bool:
-        """Whether the robot has been unloaded for long enough that this is a flight."""
-        ticks = int(self.record.unloaded_ticks)
-        return ticks * self.period >= self.params.flight_confirmation - 1e-9
 
-    def _land(self) -> None:
-        record = self.record
-        record.landings += 1
-        record.flight_ticks += record.unloaded_ticks
-        record.flight_square_sum += record.unloaded_square_sum
-        np.maximum(record.flight_peak, record.unloaded_peak, out=record.flight_peak)
+@kernel
+def find_errors(
+    truth: RobotTruth, base: BaseState, record: EstimatorRecord, scratch: EstimatorScratch
+) -> None:
+    """The errors of this tick, into ``record.last``."""
+    error, turn = scratch.error, scratch.turn
+    error[:] = base.position - truth.base_position
+    record.last[0] = magnitude(error)
+    error[:] = base.linear_velocity - truth.base_linear_velocity
+    record.last[1] = magnitude(error)
+    conjugate(truth.base_orientation, turn)
+    multiply(base.orientation, turn, turn)
+    logarithm(turn, error)
+    record.last[2] = magnitude(error)
+    record.last[3] = sqrt(error[0] * error[0] + error[1] * error[1])
+    record.last[4] = abs(error[2])
 
-    def _compare(self) -> None:
-        """The errors of this tick, into ``record.last``."""
-        last, truth, base = self.record.last, self.truth, self.base
-        for kind, estimated, true in (
-            (0, base.position, truth.base_position),
-            (1, base.linear_velocity, truth.base_linear_velocity),
-        ):
-            np.subtract(estimated, true, out=self._error)
-            last[kind] = math.hypot(*self._error.tolist())
-        # The product of the estimated quaternion and the true one's inverse.
-        ax, ay, az, aw = base.orientation.tolist()
-        bx, by, bz, bw = truth.base_orientation.tolist()
-        x = ax * bw - aw * bx - ay * bz + az * by
-        y = ay * bw - aw * by - az * bx + ax * bz
-        z = az * bw - aw * bz - ax * by + ay * bx
-        w = aw * bw + ax * bx + ay * by + az * bz
-        sine = math.hypot(x, y, z)
-        angle = 2.0 * math.atan2(sine, abs(w))
-        scale = angle / sine if sine > 0.0 else 0.0
-        last[2], last[3], last[4] = angle, scale * math.hypot(x, y), scale * abs(z)
+
+@kernel
+def is_flight(record: EstimatorRecord, confirmation: float, period: float) -> bool:
+    """Whether the robot has been unloaded for long enough that this is a flight."""
+    return bool(record.unloaded_ticks * period >= confirmation - 1e-9)
+
+
+@kernel
+def record_landing(record: EstimatorRecord) -> None:
+    """Add the flight that has ended to those before."""
+    record.landings += 1
+    record.flight_ticks += record.unloaded_ticks
+    record.flight_square_sum[:] += record.unloaded_square_sum
+    record.flight_peak[:] = max(record.flight_peak, record.unloaded_peak)

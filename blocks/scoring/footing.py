@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D
+from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D, Vector3
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
@@ -202,3 +202,18 @@ def least_load(foot_of_point: Indices1D, force: Array2D, feet: int, weight: floa
         if foot == 0 or load < least:
             least = load
     return least / weight
+
+
+@kernel
+def any_loaded(touched: Flags1D) -> bool:
+    """Whether any contact point carries load."""
+    found = False
+    for point in range(touched.shape[0]):
+        found = found or bool(touched[point])
+    return found
+
+
+@kernel
+def magnitude(vector: Vector3) -> float:
+    """The Euclidean norm of a vector."""
+    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

@@ -14,7 +14,7 @@ from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.context import Clock
 from ...runtime.language.signals import Field, Signal
 from ..signals import JumpReference, RobotTruth, WholeBodyCommand
-from .footing import BallFeet, Footing
+from .footing import BallFeet, Footing, any_loaded
 from .jump_criteria import (
     JumpCriteria,
     JumpRecord,
@@ -261,15 +261,6 @@ def begin_jump(truth: RobotTruth, record: JumpRecord) -> None:
 
 
 @kernel
-def any_loaded(truth: RobotTruth) -> bool:
-    """Whether any contact point carries load."""
-    found = False
-    for point in range(truth.contact_touched.shape[0]):
-        found = found or bool(truth.contact_touched[point])
-    return found
-
-
-@kernel
 def record_flight(
     truth: RobotTruth,
     record: JumpRecord,
@@ -282,7 +273,7 @@ def record_flight(
 
     ``bounces`` says that a foot off the ground would be no lift-off: it is between two jumps.
     """
-    height, now, loaded = truth.com[2], record.now, any_loaded(truth)
+    height, now, loaded = truth.com[2], record.now, any_loaded(truth.contact_touched)
     if record.lift_off_time == NEVER:
         record.squat_height = min(record.squat_height, height)
         if loaded or bounces:
@@ -347,7 +338,7 @@ def record_row(
     scratch: RunEnd,
 ) -> None:
     """Between two jumps: where the feet stand, and whether another comes."""
-    if constants.planned and any_loaded(truth):
+    if constants.planned and any_loaded(truth.contact_touched):
         compare_place(record, series)
     landed = record.now - series.landed_time
     if record.lift_off_time == NEVER and landed >= params.rest_time - 1e-9:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import degrees, radians, sqrt
 from typing import Any
 
-from ...mathematics.arrays import Array1D, Flags1D, Vector3
+from ...mathematics.arrays import Array1D, Flags1D
 from ...mathematics.capture_step import support_margin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -14,7 +14,15 @@ from ...runtime.language.block import Metric
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import RobotTruth, WholeBodyCommand
-from .footing import BallFeet, Footing, least_load, measure_feet, points_missing, unroll
+from .footing import (
+    BallFeet,
+    Footing,
+    least_load,
+    magnitude,
+    measure_feet,
+    points_missing,
+    unroll,
+)
 
 NEVER = -1.0
 """The value of a time that has not come yet."""
@@ -235,12 +243,6 @@ def record_rest(truth: RobotTruth, record: StandRecord, constants: StandConstant
     record.load_share = least_load(
         constants.foot_of_point, truth.contact_force, feet, constants.weight
     )
-
-
-@kernel
-def magnitude(vector: Vector3) -> float:
-    """The Euclidean norm of a vector."""
-    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
 @kernel

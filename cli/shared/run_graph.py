@@ -111,7 +111,7 @@ def run_once(
                 f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
         if recorder.before:
             say(out, recorder.before)
-    for warning in (*result.cautions, *result.stop_problems):
+    for warning in (*result.block_warnings, *result.stop_problems):
         print_warning(warning)
     if as_json:
         shown = str(recording) if recording else None

@@ -114,7 +114,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     _print_links(out, part_reports)
     if recording is not None:
         say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
-    for text in (*result.cautions, *result.stop_problems, *result.warnings):
+    for text in (*result.block_warnings, *result.stop_problems, *result.warnings):
         print_warning(text)
     if options.as_json:
         overrides = dict(graph.overrides)
@@ -256,7 +256,7 @@ def _whole_result(
         skipped_periods=sum(part.get("skipped_periods", 0) for part in part_reports.values()),
         error=error,
         stop_problems=_collected(part_reports, "stop_problems"),
-        cautions=_collected(part_reports, "cautions"),
+        block_warnings=_collected(part_reports, "block_warnings"),
         warnings=tuple(
             f"{name}: {text}"
             for name, part in part_reports.items()

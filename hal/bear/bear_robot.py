@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ...blocks.signals import DrivePhase
-from ...runtime.language.block import Context, Misfit
+from ...runtime.language.block import Context, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..drive_control import joint_gains
 from .bus import BusError, open_port
@@ -74,18 +74,19 @@ class BearRobot(DrivenRobot):
     params: BearParameters
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report a wrong file of the hardware."""
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report gains that no drives can give the joints, and a wrong file of the hardware."""
         assert isinstance(params, BearParameters) and context.robot is not None
+        yield from super().requires(params, context)
         try:
             hardware = read_hardware(params.hardware, context, context.robot)
         except HardwareError as error:
-            yield Misfit(str(error), parameter="hardware", found=params.hardware)
+            yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
             return
         yield from missing_sensors(hardware, context.robot)
         ratio = context.period / hardware.bus.period
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the bus's period {hardware.bus.period} s does not divide the control period "
                 f"{context.period} s"
             )

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Metric, Misfit
+from ...runtime.language.block import Context, Metric, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
-from ..drive_control import DriveGains, gain_misfits, lost_gains
+from ..drive_control import DriveGains, gain_requirements, lost_gains
 from ..robot import Robot
 from .configuration import Hardware, HardwareError
 from .driver import Driver
@@ -30,10 +30,11 @@ class DrivenRobot(Robot):
     params: DriveParameters
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report gains that no drives can give the joints."""
+        robot = context.robot
         assert isinstance(params, DriveParameters) and robot is not None
-        yield from gain_misfits(params, robot)
+        yield from gain_requirements(params, robot)
 
     def setup(self) -> None:
         """Nothing is opened."""
@@ -97,11 +98,11 @@ def read_hardware(name: str, context: Context, robot: RobotDescription) -> Hardw
     return Hardware.read(file, robot)
 
 
-def missing_sensors(hardware: Hardware, robot: RobotDescription) -> Iterator[Misfit]:
+def missing_sensors(hardware: Hardware, robot: RobotDescription) -> Iterator[UnmetRequirement]:
     """Report sensors of the description that the board's packets do not carry."""
     for name in robot.sensors.mounted:
         if name not in hardware.board.sensors:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"the packets of the sensor board do not carry {robot.name}'s sensor {name!r}",
                 parameter="hardware",
                 fix=f"board: {{sensors: [{', '.join(robot.sensors.mounted)}]}} in the hardware's file",

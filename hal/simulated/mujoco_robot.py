@@ -10,9 +10,9 @@ import numpy as np
 
 from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Metric, Misfit, State
+from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
-from ..drive_control import gain_misfits, lost_gains
+from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters
 from .state import DriveState, TickRecord
@@ -82,32 +82,30 @@ class MujocoRobot(SimulatedRobot):
         }  # fmt: skip
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a transmission that the simulator cannot express, gains that no drives can give, and
         feet that cannot stand."""
+        robot = context.robot
         assert isinstance(params, SimulatorParameters) and robot is not None
         complaint = unsupported_motor(robot)
         if complaint:
-            yield Misfit(complaint, fix="correct `transmission` in the robot's description")
+            yield UnmetRequirement(
+                complaint, fix="correct `transmission` in the robot's description"
+            )
         elif params.bus_period is not None:
-            yield from gain_misfits(params, robot)
+            yield from gain_requirements(params, robot)
         uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
         if uneven:
-            yield Misfit(
+            yield UnmetRequirement(
                 uneven,
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report periods that do not divide each other."""
-        assert isinstance(params, SimulatorParameters)
         bus = params.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"
         steps = whole / params.timestep
         if not _is_whole(steps):
-            yield Misfit(
+            yield UnmetRequirement(
                 f"timestep {params.timestep} s does not divide {what} {whole} s",
                 parameter="timestep",
                 expected=f"a whole fraction of {whole} s",
@@ -115,7 +113,7 @@ class MujocoRobot(SimulatedRobot):
                 fix=f"timestep: {_nearest_step(whole, params.timestep):.10g} s",
             )
         if bus is not None and not _is_whole(context.period / bus):
-            yield Misfit(
+            yield UnmetRequirement(
                 f"bus_period {bus} s does not divide the control period {context.period} s",
                 parameter="bus_period",
                 expected=f"a whole fraction of {context.period} s",
@@ -225,11 +223,11 @@ class MujocoRobot(SimulatedRobot):
         self.plant.clear_record()
         self._damped.run()
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Copy the state of the simulator and the random streams to the declared state."""
         self.plant.save()
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Restore both from the declared state, and recompute what depends on them."""
         self.plant.load()
 

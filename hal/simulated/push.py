@@ -11,8 +11,7 @@ import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...mathematics.kernel import kernel
-from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Misfit, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 
@@ -85,13 +84,14 @@ class Push(Block):
     progress = State(PushState, text="the progress of the push")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a point that the robot does not have."""
+        robot = context.robot
         assert isinstance(params, cls.Params) and robot is not None
         if params.point not in robot.points:
             points = list(robot.points)
             near = get_close_matches(params.point, points, 1) or points[:1]
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{robot.name} has no point {params.point!r} to push at",
                 parameter="point",
                 expected=", ".join(points) or "a robot with named points",

@@ -178,8 +178,6 @@ class SimulatedRobot(Robot, ABC):
         return params.build_scene()
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """The number of named points that a force may act at; the seed is not a dimension."""
         return {"n_points": len(robot.points) if robot is not None else 0}

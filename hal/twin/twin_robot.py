@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Metric, Misfit, State
+from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..bear.configuration import Hardware
@@ -124,42 +124,39 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     rest = State(Registers, text="registers, counters and commands on their way, for a snapshot")
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """Report what the simulator cannot express, and gains that the drives cannot give."""
-        assert robot is not None
-        yield from super().requires(params, robot)
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report what neither simulator nor drives can do, periods that do not divide each other,
+        and a wrong file of the hardware."""
+        robot = context.robot
+        assert isinstance(params, TwinParameters) and robot is not None
+        yield from super().requires(params, context)
         complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
-            yield Misfit(complaint, fix="correct the robot's description")
+            yield UnmetRequirement(complaint, fix="correct the robot's description")
         if len(robot.contacts) > 7:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{robot.name} has {len(robot.contacts)} contact points, and a packet of the "
                 "sensor board has room for 7 switches"
             )
         if len(robot.joints) > 18:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{robot.name} has {len(robot.joints)} motors, and one exchange has room for 18"
             )
-
-    @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """Report periods that do not divide each other, and a wrong file of the hardware."""
-        assert isinstance(params, TwinParameters) and context.robot is not None
         period = 0.001
         if params.hardware:
             try:
-                hardware = read_hardware(params.hardware, context, context.robot)
+                hardware = read_hardware(params.hardware, context, robot)
                 period = hardware.bus.period
-                yield from missing_sensors(hardware, context.robot)
+                yield from missing_sensors(hardware, robot)
             except Exception as error:  # noqa: BLE001  # said in the load report
-                yield Misfit(str(error), parameter="hardware", found=params.hardware)
+                yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
         for what, longer, shorter in (
             ("the bus's period", context.period, period),
             ("timestep", period, params.timestep),
         ):
             ratio = longer / shorter
             if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{what} {shorter} s does not divide {longer} s",
                     parameter="timestep" if what == "timestep" else "",
                 )
@@ -248,12 +245,12 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         if self.driver is not None:
             self.driver.close()
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Copy all that is kept elsewhere to the declared state."""
         self.twin.plant.save()
         self._kept.save(self.rest.values)
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         """Restore it from there."""
         self.twin.plant.load()
         self._kept.load(self.rest.values)

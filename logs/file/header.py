@@ -140,12 +140,12 @@ def _carried(graph: CheckedGraph) -> dict[str, Quantity]:
 def _recorded(
     layout: Layout,
     declared: Mapping[str, Declared],
-    carried: Mapping[str, Quantity] | None = None,
+    quantities: Mapping[str, Quantity] | None = None,
 ) -> RecordedLayout:
     fields = []
     for name, slot in layout.slots.items():
         signal, field, constant = declared[name]
-        quantity = (carried or {}).get(name) or Quantity(field.unit, field.frame)
+        quantity = (quantities or {}).get(name) or Quantity(field.unit, field.frame)
         fields.append(
             RecordedField(
                 name=name,

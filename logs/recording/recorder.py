@@ -403,9 +403,9 @@ class Recorder:
             return
         try:
             for block in self._bound.blocks.values():
-                block.freeze()
+                block.save_state()
         except Exception as error:  # noqa: BLE001  # a recorder must not end the run
-            self._warn(f"no keyframes from tick {tick} on: a freeze failed ({error})")
+            self._warn(f"no keyframes from tick {tick} on: saving a state failed ({error})")
             self._every = 0
             return
         size = len(self._bus)

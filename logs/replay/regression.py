@@ -53,7 +53,7 @@ class _Watch:
         if tick != self._tick:
             return
         block, spec = bound.blocks[self._path], bound.graph.block(self._path)
-        block.freeze()
+        block.save_state()
         memory = bound.memory
         for ports, region, kept in (
             (spec.block_type.states, memory.state, self.state),

@@ -431,7 +431,7 @@ class Follower:
             translation.write(data, region.buffer)
         self._bound.clock.tick = self._first
         for block in self._bound.blocks.values():
-            block.thaw()
+            block.load_state()
 
     def _compare(self) -> None:
         if not self._used:

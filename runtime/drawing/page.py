@@ -277,8 +277,8 @@ def _fields(port: PortReference, spec: BlockSpec) -> str:
     """The fields of an output with what they carry in this graph."""
     found = []
     for field in port.fields:
-        carried = spec.quantities.get(f"{port.name}.{field.name}")
-        found.append(f"{field.name}: {field.type}" + (f" {carried}" if carried else ""))
+        quantity = spec.quantities.get(f"{port.name}.{field.name}")
+        found.append(f"{field.name}: {field.type}" + (f" {quantity}" if quantity else ""))
     return f"{port.signal}: {', '.join(found)}"
 
 

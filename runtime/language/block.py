@@ -40,7 +40,7 @@ from .context import Clock as Clock  # noqa: PLC0414  also imported from here
 from .context import Context as Context  # noqa: PLC0414
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters
-from .quantities import Carried, Given
+from .quantities import InputQuantities, OutputQuantities
 from .signals import Signal
 from .steps import PythonCall, declare_steps
 from .terrain import Terrain
@@ -124,7 +124,7 @@ class State(Port[S]):
 
 
 @dataclass(frozen=True)
-class Misfit:
+class UnmetRequirement:
     """Something about the graph's robot or a parameter that a block cannot work with.
 
     ``message`` says what is wrong. ``parameter`` is the parameter concerned, if any, as ``name`` or
@@ -227,9 +227,7 @@ class Block:
         )
 
     @classmethod
-    def local_dimensions(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, int]:
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """Dimensions of this block alone; they hide dimensions of the graph with the same name.
 
         By default every integer parameter is a dimension, so a block with a parameter ``n`` may
@@ -239,7 +237,7 @@ class Block:
         return {n: v for n, v in values.items() if isinstance(v, int) and not isinstance(v, bool)}
 
     @classmethod
-    def fitted(
+    def specialize(
         cls,
         params: Parameters,
         folder: Path,
@@ -250,37 +248,29 @@ class Block:
         the class itself.
 
         Another class has the name of this one. Files that parameters name are relative to
-        ``folder``; beside the loaded graph, in ``graph_folder``, users keep their modules. A ``BlockError`` that this raises should be a misfit of ``requires`` as well.
+        ``folder``; beside the loaded graph, in ``graph_folder``, users keep their modules. A ``BlockError`` that this raises should be an unmet requirement of ``requires`` as well.
         """
         return cls
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
-        """The misfits between this block and its parameters and robot; none if all is well.
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """What the block needs of its parameters, robot and graph and does not have.
 
-        Loading calls this, and puts the misfits into its report. It is called only if the robot has
-        everything in ``needs``, so ``robot`` is never ``None`` for a block that needs a robot.
+        Loading reports it. ``context`` is the one that the block will be constructed with: it has
+        the robot, the period of the block, the names of its wired inputs, and the folder to which
+        its files are relative. This is called only if the robot has everything in ``needs``.
         """
         return ()
 
     @classmethod
-    def requires_of_graph(cls, params: Parameters, context: Context) -> Iterable[Misfit]:
-        """The misfits between this block and the graph it is in; called together with ``requires``.
-
-        ``context`` is the one that the block will be constructed with. It has the period of the
-        block, the names of its wired inputs, and the folder to which its files are relative.
-        """
-        return ()
-
-    @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         """What follows from this block's parameters for other blocks, as plain data by name.
 
         A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is said twice;
         ``name`` may also be a parameter of the block. Loading puts the value in its place.
-        A ``Misfit`` in place of a value says why there is none; it is reported where a graph uses
-        it. ``context`` is as for ``requires_of_graph``, but has no dimensions and no wired inputs.
-        What this raises should be a misfit of ``requires_of_graph`` as well.
+        A ``UnmetRequirement`` in place of a value says why there is none; it is reported where a graph uses
+        it. ``context`` is as for ``requires``, but has no dimensions and no wired inputs.
+        What this raises should be an unmet requirement of ``requires`` as well.
         """
         return {}
 
@@ -296,12 +286,12 @@ class Block:
         return {}
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
-        """The units and frames of outputs whose fields are declared as ``carried``.
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """The units and frames of outputs whose fields are declared as ``inferred``.
 
-        ``given`` has those of the inputs. A gain, for instance, answers ``{"y": u.times(unit)}``
-        with ``u = given["u"]``, and ``{"y": None}`` while ``u`` is not known. What inputs must have
-        in common is said by ``given.alike("a", "b")``. Without this method such an output has a
+        ``inputs`` has those of the inputs. A gain, for instance, answers ``{"y": u.times(unit)}``
+        with ``u = inputs["u"]``, and ``{"y": None}`` while ``u`` is not known. What inputs must have
+        in common is said by ``inputs.alike("a", "b")``. Without this method such an output has a
         unit that is not checked, which ``aloft check`` says.
         """
         return {}
@@ -406,17 +396,17 @@ class Block:
     def close(self) -> None:
         """Close what ``start`` opened; called once, also after a failure."""
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         """Before a snapshot: write what the block keeps elsewhere into its declared state."""
 
-    def thaw(self) -> None:
-        """After a restore: read back from the declared state what ``freeze`` wrote there."""
+    def load_state(self) -> None:
+        """After a restore: read back from the declared state what ``save_state`` wrote there."""
 
     def metrics(self) -> Mapping[str, Metric]:
         """The block's results at the end of a run, with units in their names."""
         return {}
 
-    def cautions(self) -> Sequence[str]:
+    def warnings(self) -> Sequence[str]:
         """Warnings to those who read the run's results, such as of a check that was waived.
 
         Called when every block has started, and again when the run is over; what is said then for

@@ -22,7 +22,7 @@ class WrittenClass:
     bases: tuple[str, ...]
     """The base classes, each by the last part of its name: ``Block`` for ``aloft.Block``."""
     has_ports: bool
-    """Whether it declares a port, or says by ``fitted`` which ports it has."""
+    """Whether it declares a port, or says by ``specialize`` which ports it has."""
     has_machine: bool
     """Whether it defines ``step`` or ``emit``."""
     is_abstract: bool
@@ -115,7 +115,7 @@ def _written(node: ast.ClassDef) -> WrittenClass:
         node.name,
         bases,
         any(isinstance(value, ast.Call) and _last_name(value.func) in _PORTS for value in values)
-        or any(function.name == "fitted" for function in functions),
+        or any(function.name == "specialize" for function in functions),
         any(function.name in _MACHINE for function in functions),
         "ABC" in bases
         or any(

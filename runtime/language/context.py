@@ -56,7 +56,7 @@ class Context:
     names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
     which users keep their modules.
 
-    While a block is asked what it ``tells``, and only then, ``graph`` has the entry of every block
+    While a block is asked for its ``exported_values``, and only then, ``graph`` has the entry of every block
     in the flattened graph, by its path: ``use``, ``with``, ``in`` and what else it has.
     """
 

@@ -1,7 +1,7 @@
 """What the numbers on a wire are: their unit and their frame, also behind blocks that take any.
 
-A general block such as ``Gain`` takes vectors of every unit. Its fields are ``carried``: the graph
-decides what they are, and the block's ``carried`` method says how outputs follow from inputs.
+A general block such as ``Gain`` takes vectors of every unit. Its fields are ``inferred``: the graph
+decides what they are, and the block's ``infer_units`` method says how outputs follow from inputs.
 Loading applies these methods from block to block, and then checks every wire.
 """
 
@@ -45,7 +45,7 @@ UNCHECKED = Quantity(None)
 
 def quantity_of(field: Field) -> Quantity | None:
     """The quantity that a field declares; ``None`` for one that carries whatever is wired."""
-    return None if field.carried else Quantity(field.unit, field.frame)
+    return None if field.inferred else Quantity(field.unit, field.frame)
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Disagreement:
     reason: str = ""
 
 
-class Given:
-    """The quantities at a block's inputs, as ``Block.carried`` reads them.
+class InputQuantities:
+    """The quantities at a block's inputs, as ``Block.infer_units`` reads them.
 
     An input is named by its port, or by ``port.field`` if it has several fields. What is not known
     yet, and what is not wired, is ``None``.
@@ -125,5 +125,5 @@ class Given:
         self.disagreements.append(Disagreement(self._name(port), None, found, reason=reason))
 
 
-Carried = Mapping[str, Quantity | None]
+OutputQuantities = Mapping[str, Quantity | None]
 """The quantities of a block's outputs, by port or ``port.field``; ``None`` while not known."""

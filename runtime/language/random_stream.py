@@ -13,10 +13,10 @@ snapshots, replay and the conformance suite then work with nothing more than two
         def step(self) -> None:
             self._random.generator.standard_normal(out=self._noise)
 
-        def freeze(self) -> None:
+        def save_state(self) -> None:
             self._random.save(self.stream)
 
-        def thaw(self) -> None:
+        def load_state(self) -> None:
             self._random.load(self.stream)
 """
 
@@ -53,11 +53,11 @@ class RandomStream:
         self.generator = np.random.Generator(self._bits)
 
     def save(self, state: StreamState) -> None:
-        """Write where the stream is; for ``Block.freeze``."""
+        """Write where the stream is; for ``Block.save_state``."""
         save_generator(self._bits, state.words)
 
     def load(self, state: StreamState) -> None:
-        """Go back to where the stream was; for ``Block.thaw``."""
+        """Go back to where the stream was; for ``Block.load_state``."""
         load_generator(self._bits, state.words)
 
 

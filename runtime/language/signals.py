@@ -50,11 +50,11 @@ class Field:
         dtype: ``"float64"``, ``"int64"`` or ``"bool"``.
         text: one line on what the field is.
         values: what the numbers of an ``"int64"`` field stand for; shown by name in recordings.
-        carried: unit and frame are those of whatever the graph wires to the block: an input takes
-            any, and ``Block.carried`` says what an output has.
+        inferred: unit and frame are those of whatever the graph wires to the block: an input takes
+            any, and ``Block.infer_units`` says what an output has.
 
     Raises:
-        DeclarationError: the dtype or the unit is unknown, a size is not positive, or a carried
+        DeclarationError: the dtype or the unit is unknown, a size is not positive, or an inferred
             field has a unit or a frame of its own.
     """
 
@@ -67,7 +67,7 @@ class Field:
         dtype: str = "float64",
         text: str = "",
         values: type[IntEnum] | None = None,
-        carried: bool = False,
+        inferred: bool = False,
     ) -> None:
         self.shape: tuple[Dimension, ...] = shape if isinstance(shape, tuple) else (shape,)
         if dtype not in DTYPES:
@@ -81,9 +81,9 @@ class Field:
         self.frame = frame
         self.text = text
         self.values = values
-        if carried and (unit is not None or frame is not None):
-            raise DeclarationError("a carried field has no unit and no frame of its own")
-        self.carried = carried
+        if inferred and (unit is not None or frame is not None):
+            raise DeclarationError("an inferred field has no unit and no frame of its own")
+        self.inferred = inferred
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:

@@ -25,7 +25,7 @@ fields that it, or a kernel it calls, reads by name.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from types import CodeType, FunctionType
 from typing import Any
@@ -217,7 +217,7 @@ def bind_steps(block: Block) -> None:
             block.kernel_calls = (call,)
 
 
-def call_of(block: Block, function: FunctionType) -> KernelCall | PythonCall:
+def call_of(block: Block, function: Callable[..., object]) -> KernelCall | PythonCall:
     """The call of a function that names what it takes of a block.
 
     Raises:
@@ -227,6 +227,7 @@ def call_of(block: Block, function: FunctionType) -> KernelCall | PythonCall:
         return PythonCall(
             function, tuple(_python_argument(block, n) for n in arguments_of(function))
         )
+    assert isinstance(function, FunctionType)
     used = names_used(function)
     arguments = [_kernel_argument(block, function, each, used) for each in arguments_of(function)]
     if reports_event(function):
@@ -261,7 +262,7 @@ def _kernel_argument(block: Block, function: FunctionType, name: str, used: froz
             clock.present.reshape(()), clock.base_period
         )
     if name == "params":
-        return _parameter_record(block, used)
+        return parameter_record(block, used)
     try:
         value = getattr(block, name)
     except AttributeError:
@@ -282,12 +283,14 @@ def as_record(signal: Signal, used: frozenset[str] | None = None) -> Any:
 # Parameters
 
 
-def _parameter_record(block: Block, used: frozenset[str]) -> Any:
+def parameter_record(block: Block, used: Collection[str]) -> Any:
     """Arrays with the parameters that kernels name; a live change writes into them."""
-    kinds = parameter_kinds(type(block.params))
+    kinds, arrays = parameter_kinds(type(block.params)), block.parameter_arrays
     names = tuple(name for name in kinds if name in used)
-    block.parameter_arrays = {n: _parameter_array(block.params, n, kinds[n]) for n in names}
-    return record_type("Params", names)(*block.parameter_arrays.values())
+    for name in names:
+        if name not in arrays:  # else another call of the block reads it, too
+            arrays[name] = _parameter_array(block.params, name, kinds[name])
+    return record_type("Params", names)(*(arrays[name] for name in names))
 
 
 def _parameter_array(params: Parameters, name: str, kind: Kind) -> NDArray[Any]:

@@ -36,8 +36,8 @@ class ValueTexts:
                 continue
             for port, output in spec.block_type.outputs.items():
                 for name, field in output.signal.fields.items():
-                    carried = spec.quantities.get(f"{port}.{name}")
-                    unit = carried.unit if carried is not None else field.unit
+                    quantity = spec.quantities.get(f"{port}.{name}")
+                    unit = quantity.unit if quantity is not None else field.unit
                     text = "" if unit is None or str(unit) == "1" else str(unit)
                     names = {int(value): value.name.lower() for value in field.values or ()}
                     self._fields.append(_Field(f"{spec.path}.{port}", name, text, names))

@@ -150,7 +150,7 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
     numbers = f"[{', '.join(map(str, shape))}]" if shape else ""
     quantity = spec.quantities.get(f"{port}.{name}", Quantity(field.unit, field.frame))
     unit = f" {quantity.unit}" if quantity.unit is not None else ""
-    if field.carried and quantity.unit is None:
+    if field.inferred and quantity.unit is None:
         unit = " unit not checked"
     frame = f" in {quantity.frame}" if quantity.frame else ""
     return f"{name}: {field.dtype_name}{numbers}{unit}{frame}"

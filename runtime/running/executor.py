@@ -93,7 +93,7 @@ class Executor:
         self._on_ready = on_ready
         self._plain = plain
         self._fuse = fuse and not plain
-        self._cautions: list[str] = []
+        self._warnings: list[str] = []
 
     def start(self, ticks: int | None = None) -> None:
         """Compile the kernels, open the sinks and start all blocks: idle -> ready.
@@ -140,7 +140,7 @@ class Executor:
                 try:
                     interrupts.armed = True
                     self.start(limit)
-                    self._ask_for_cautions()
+                    self._ask_for_warnings()
                     if self._on_ready is not None:
                         self._on_ready()
                     self.life.move(LifeState.RUNNING)
@@ -205,7 +205,7 @@ class Executor:
         reason = compile_calls(self.bound.kernel_calls)
         self.bound.parameters.compile = None if reason else compile_calls
         if reason:
-            self._cautions.append(
+            self._warnings.append(
                 f"the mathematics runs as plain Python, which is several times slower: {reason}"
             )
 
@@ -252,17 +252,17 @@ class Executor:
         note = Note(self.bound.clock.tick, "fault", f"{error}{place}", "ERROR", error.to_json())
         self.ticker.tell(note)
 
-    def _ask_for_cautions(self) -> None:
-        self._add_cautions()
-        for caution in self._cautions:
-            self._note("caution", caution, "WARN")
+    def _ask_for_warnings(self) -> None:
+        self._add_warnings()
+        for warning in self._warnings:
+            self._note("warning", warning, "WARN")
 
-    def _add_cautions(self) -> None:
-        """The blocks' cautions that are not known yet, in the order of the blocks."""
+    def _add_warnings(self) -> None:
+        """The blocks' warnings that are not known yet, in the order of the blocks."""
         for path, block in self.bound.blocks.items():
-            known = set(self._cautions)
-            texts = [f"{path}: {text}" for text in block.cautions()]
-            self._cautions += [text for text in texts if text not in known]
+            known = set(self._warnings)
+            texts = [f"{path}: {text}" for text in block.warnings()]
+            self._warnings += [text for text in texts if text not in known]
 
     def _pause(self) -> None:
         """Wait for one period between two stop cycles, so that a bus has time to carry each."""
@@ -277,7 +277,7 @@ class Executor:
         interrupts: Interrupts,
     ) -> RunResult:
         if error is None:
-            self._add_cautions()
+            self._add_warnings()
         by_block: dict[str, dict[str, Metric]] = {}
         giving: dict[str, Block | SupportsMetrics] = {**self.bound.blocks}
         giving |= {sink.name: sink for sink in self._opened if isinstance(sink, SupportsMetrics)}
@@ -310,7 +310,7 @@ class Executor:
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
             error=error,
             stop_problems=tuple(problems),
-            cautions=tuple(self._cautions),
+            block_warnings=tuple(self._warnings),
             parameter_changes=tuple(self.bound.parameters.changes),
             log=self._log,
             graph=self.bound.graph,

@@ -224,13 +224,13 @@ class BoundGraph:
         return block
 
     def snapshot(self) -> Snapshot:
-        """Everything the graph remembers now, after every block's ``freeze``."""
+        """Everything the graph remembers now, after every block's ``save_state``."""
         for block in self.blocks.values():
-            block.freeze()
+            block.save_state()
         return self.memory.snapshot(self.clock.tick)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot and call every block's ``thaw``; the graph may run on from there.
+        """Go back to a snapshot and call every block's ``load_state``; the graph may run on from there.
 
         Raises:
             ValueError: the snapshot's sizes show that it is of another graph.
@@ -240,7 +240,7 @@ class BoundGraph:
         self.clock.stop_reason = None
         self.clock.stopped_by = ""
         for block in self.blocks.values():
-            block.thaw()
+            block.load_state()
 
 
 def nameless_memory(size: int, name: str) -> int:

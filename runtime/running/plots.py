@@ -110,8 +110,8 @@ def _declared(
     field = None if spec is None else _field(spec, rest)
     if graph is None or spec is None or field is None:
         return "", numbers, ()
-    carried = spec.quantities.get(rest)
-    unit = carried.unit if carried is not None else field.unit
+    quantity = spec.quantities.get(rest)
+    unit = quantity.unit if quantity is not None else field.unit
     text = "" if unit is None or str(unit) == "1" else str(unit)
     if graph.robot is not None and field.shape == ("n_joints",):
         joints = tuple(joint.name for joint in graph.robot.joints)

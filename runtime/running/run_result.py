@@ -50,7 +50,7 @@ class RunResult:
     skipped_periods: int = 0
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
-    cautions: tuple[str, ...] = ()
+    block_warnings: tuple[str, ...] = ()
     """What the blocks warn readers of the result of, such as a check that was waived."""
     parameter_changes: tuple[ParameterChange, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -157,7 +157,7 @@ class RunResult:
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "error": None if self.error is None else self.error.to_json(),
             "stop_problems": list(self.stop_problems),
-            "cautions": list(self.cautions),
+            "block_warnings": list(self.block_warnings),
             "warnings": list(self.warnings),
             "parameter_changes": [asdict(change) for change in self.parameter_changes],
         }

@@ -21,7 +21,7 @@ class Note:
     """An event of a run at ``tick``, before that tick ran, which the runtime gives to all recorders.
 
     The runtime writes the kinds ``life`` (a change of the life cycle), ``overrun`` (a late tick),
-    ``fault`` (the error that ended a run early), ``caution`` (a block's warning to those who read the
+    ``fault`` (the error that ended a run early), ``warning`` (a block's warning to those who read the
     result) and ``parameter`` (a live change). Recorders add ``dropped`` (ticks that were not kept).
 
     Attributes:

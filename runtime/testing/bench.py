@@ -13,8 +13,8 @@ from ...mathematics.compiling.kernel_call import collect_calls
 from ...robots.description import RobotDescription, find_robot
 from ..language.block import Block, Clock, Context
 from ..language.errors import BlockError
-from ..language.fit import find_misfits
 from ..language.parameters import Parameters
+from ..language.requirements import unmet_requirements
 from ..language.signals import Signal
 from ..language.stages import BlockSpec
 from ..running.memory import Memory, Snapshot
@@ -68,11 +68,11 @@ class BlockBench(Generic[B]):
         description = find_robot(robot) if isinstance(robot, str) else robot
         if not isinstance(params, Parameters):
             params = block_type.Params.model_validate(dict(params or {}))
-        block_type = cast("type[B]", block_type.fitted(params, folder or Path(), description))
+        block_type = cast("type[B]", block_type.specialize(params, folder or Path(), description))
         sizes = {
             **(description.dimensions if description else {}),
             **(dimensions or {}),
-            **block_type.local_dimensions(params, description),
+            **block_type.dimensions(params, description),
         }
         names = tuple(block_type.inputs) if wired is None else tuple(wired)
         for name in names:
@@ -90,9 +90,9 @@ class BlockBench(Generic[B]):
             wired=names,
             folder=folder or Path(),
         )
-        misfits = find_misfits(block_type, params, context)
-        if misfits:
-            reasons = "; ".join(misfit.message for misfit in misfits)
+        unmet = unmet_requirements(block_type, params, context)
+        if unmet:
+            reasons = "; ".join(requirement.message for requirement in unmet)
             raise BlockError(f"{block_type.__name__}: {reasons}")
         self.memory = Memory([spec], description)
         with collect_calls() as calls:
@@ -162,7 +162,7 @@ class BlockBench(Generic[B]):
 
     def snapshot(self) -> Snapshot:
         """A copy of the block's state and ports, and the tick."""
-        self.block.freeze()
+        self.block.save_state()
         return self.memory.snapshot(self.clock.tick)
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -170,7 +170,7 @@ class BlockBench(Generic[B]):
         self.memory.restore(snapshot)
         self.clock.tick = snapshot.tick
         self.clock.stop_reason = None
-        self.block.thaw()
+        self.block.load_state()
 
     def close(self) -> None:
         """Close the block; also at the end of a ``with``."""

@@ -8,7 +8,7 @@ For a block of your own, write one parametrised test::
 
 A block that works with robots is checked with each robot that it fits::
 
-    if not misfits(MyBlock, robot="go2"):
+    if not unmet_messages(MyBlock, robot="go2"):
         check_block(MyBlock, robot="go2")
 
 Parameters and inputs come from ``Block.example_parameters`` and ``Block.example_inputs``; inputs
@@ -35,9 +35,9 @@ from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import find_robot
 from ...robots.robot_description import RobotDescription
 from ..language.block import Block, Clock, Context
-from ..language.fit import find_misfits
 from ..language.parameter_change import Adjustment
 from ..language.parameters import Parameters, is_live
+from ..language.requirements import unmet_requirements
 from ..language.signals import Field
 from ..running.finite import FiniteCheck
 from ..running.live_parameters import LiveParameters
@@ -123,9 +123,9 @@ def _names(code: CodeType) -> Iterator[str]:
 def _ports_used(subject: Subject) -> None:
     """Every declared port is named somewhere in the code of the class, or taken by a step."""
     kind = subject.block_type
-    fits = kind.fitted.__func__ is not Block.fitted.__func__  # type: ignore[attr-defined]  # a class method
+    fits = kind.specialize.__func__ is not Block.specialize.__func__  # type: ignore[attr-defined]  # a class method
     if fits and getattr(sys.modules[kind.__module__], kind.__name__, None) is not kind:
-        return  # `fitted` has made it: its ports follow from what it is given, so no code names them
+        return  # `specialize` has made it: its ports follow from what it is given, so no code names them
     used: dict[str, None] = {}
     for owner in kind.__mro__:
         for value in vars(owner).values() if issubclass(owner, Block) else ():
@@ -260,7 +260,7 @@ def _live_parameters(subject: Subject) -> None:
     """After a live change a block goes on as one that had the parameter from the start."""
     for name, params in live_changes(subject.bench().block.params):
         given = params.model_dump(round_trip=True)
-        if misfits(subject.block_type, given, robot=subject.robot, rate=subject.rate):
+        if unmet_messages(subject.block_type, given, robot=subject.robot, rate=subject.rate):
             continue  # the block cannot work with this robot after the change
         changed = subject.bench()
         subject.trace(changed, WARM_UP)
@@ -348,7 +348,7 @@ def conformance_cases() -> tuple[str, ...]:
     return tuple(CASES)
 
 
-def misfits(
+def unmet_messages(
     block_type: type[Block],
     params: Mapping[str, Any] | None = None,
     *,
@@ -364,12 +364,14 @@ def misfits(
     description = find_robot(robot) if isinstance(robot, str) else robot
     sizes = {
         **(description.dimensions if description else {}),
-        **block_type.local_dimensions(ready, description),
+        **block_type.dimensions(ready, description),
     }
     context = Context(
         "block", Clock(1.0 / rate), 1, 0, sizes, description, tuple(block_type.inputs)
     )
-    return tuple(misfit.message for misfit in find_misfits(block_type, ready, context))
+    return tuple(
+        requirement.message for requirement in unmet_requirements(block_type, ready, context)
+    )
 
 
 def check_block(
@@ -399,7 +401,7 @@ def check_block(
     given = block_type.example_parameters() if params is None else params
     description = find_robot(robot) if isinstance(robot, str) else robot
     subject = Subject(
-        block_type.fitted(block_type.Params.model_validate(dict(given)), Path(), description),
+        block_type.specialize(block_type.Params.model_validate(dict(given)), Path(), description),
         given,
         robot,
         rate,

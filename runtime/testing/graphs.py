@@ -76,11 +76,11 @@ def _spec(
     dimensions: Mapping[str, int] | None,
 ) -> BlockSpec:
     params = use.block_type.Params.model_validate(dict(use.params))
-    use = replace(use, block_type=use.block_type.fitted(params, Path(), robot))
+    use = replace(use, block_type=use.block_type.specialize(params, Path(), robot))
     sizes = {
         **(robot.dimensions if robot else {}),
         **(dimensions or {}),
-        **use.block_type.local_dimensions(params, robot),
+        **use.block_type.dimensions(params, robot),
     }
     return BlockSpec(path, use.block_type, params, wires, sizes, use.period_ticks, use.offset_ticks)
 

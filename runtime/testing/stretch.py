@@ -145,7 +145,7 @@ class Stretch:
             port, _, entry = name.partition(".")
             np.copyto(bench.get(port).views()[entry], value)
         bench.clock.tick = int(self.ticks[0]) if len(self.ticks) else 0
-        bench.block.thaw()
+        bench.block.load_state()
 
     def _compare(
         self, bench: BlockBench[Block], name: str, expected: NDArray[Any], tick: int,

@@ -15,7 +15,7 @@ class Counter(Block):
         goal: float = parameter(1e9, text="the metric must not exceed this")
         fail_at: int = parameter(-1, text="the tick at which it raises")
         stop_at: int = parameter(-1, text="the tick at which it ends the run")
-        caution: str = parameter("", text="what the reader of its results is told")
+        warning: str = parameter("", text="what the reader of its results is told")
         nan_at: int = parameter(-1, text="the tick at which its output is not a number")
 
     params: Params
@@ -33,8 +33,8 @@ class Counter(Block):
         self.count.value += 1.0
         self.y.value[()] = float("nan") if self.tick == self.params.nan_at else self.count.value
 
-    def cautions(self) -> list[str]:
-        return [self.params.caution] if self.params.caution else []
+    def warnings(self) -> list[str]:
+        return [self.params.warning] if self.params.warning else []
 
     def metrics(self) -> dict[str, float | bool | str]:
         value = float(self.count.value)

@@ -56,8 +56,8 @@ def test_the_hash_is_the_same_everywhere(folder: Path, call_json: CallJson, star
     assert len(here) == 1
 
 
-def test_a_caution_is_printed_even_where_all_else_is_quiet(folder: Path, call: Call) -> None:
-    setting = ("--set", "counter.caution=counted by hand")
+def test_a_warning_is_printed_even_where_all_else_is_quiet(folder: Path, call: Call) -> None:
+    setting = ("--set", "counter.warning=counted by hand")
     done = call("run", "count.yaml", "--quiet", "--no-record", *setting)
     assert "warning: counter: counted by hand" in done.stderr
 

@@ -129,7 +129,7 @@ def test_what_cannot_be_saved_is_said_and_only_the_start_can_be_restored(folder:
         run.step()
         assert run["spring.position.value"].tolist() == [0.1]
     result = graph.run()
-    assert any("cannot save its state" in each for each in result.cautions)
+    assert any("cannot save its state" in each for each in result.block_warnings)
 
 
 def forgetful(folder: Path) -> str:

@@ -14,7 +14,7 @@ def test_bytes_do_not_depend_on_the_compiler(name):
     graph = aloft.load(GRAPHS / f"{name}.yaml")
     compiled = graph.run(0.1, log=False)
     plain = graph.run(0.1, log=False, plain=True)
-    assert not compiled.cautions and not plain.cautions
+    assert not compiled.block_warnings and not plain.block_warnings
     assert compiled.run_hash == plain.run_hash
 
 

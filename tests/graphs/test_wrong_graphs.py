@@ -12,7 +12,7 @@ import pytest
 from aloft.files.problems import listing
 from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import ExitCode
-from aloft.runtime.language.fit import fix_without_robot
+from aloft.runtime.language.requirements import fix_without_robot
 from aloft.runtime.loading import Code, LoadError, Report, check, load
 
 FOLDER = Path(__file__).parent / "wrong"

@@ -1,4 +1,4 @@
-"""The capture point against the pendulum's motion, the choice of a foothold, and a foot's way."""
+"""The capture point against the pendulum's motion, the limits of a foothold, and the support."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from hypothesis import strategies as st
 from aloft.mathematics.capture_step import (
     approach,
     capture_point,
-    choose_foothold,
     farthest_foot,
     limit_foothold,
     nearest_in_foot,
     spread_to_feet,
     support_margin,
-    swing_points,
 )
 
 POINTS = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
@@ -56,22 +54,6 @@ def test_the_nearest_place_in_a_foot_is_nearest(x, y):
         assert farthest_foot(POINTS, FOOT, 2, place, np.zeros(2)) == (1 if y < 0 else 0)
 
 
-def test_the_foothold_is_where_the_capture_point_will_be():
-    xi, rate, left, out = np.array([-0.09, 0.02]), 6.0, 0.13, np.zeros(3)
-    choose_foothold(
-        xi, rate, left, 0.0, POINTS, FOOT, 1, 2, np.zeros(2), np.zeros(2), out
-    )  # fmt: skip
-    push, place, dt = np.array([-0.04, -0.08]), xi.copy(), 1e-5
-    for _ in range(round(left / dt)):
-        place += dt * rate * (place - push)
-    assert out[:2] == pytest.approx(place, abs=1e-4)
-    farther = np.zeros(3)
-    choose_foothold(
-        xi, rate, left, 0.5, POINTS, FOOT, 1, 2, np.zeros(2), np.zeros(2), farther
-    )  # fmt: skip
-    assert farther[:2] - push == pytest.approx(1.5 * (out[:2] - push))
-
-
 @pytest.mark.parametrize(
     ("wanted", "side", "found"),
     [
@@ -101,30 +83,6 @@ def test_a_foot_arrives_in_time_and_at_rest():
         speed += dt * acceleration
         place += dt * speed
     assert place == pytest.approx(0.1, abs=1e-4) and speed == pytest.approx(0.0, abs=0.01)
-
-
-def test_the_swinging_foot_rises_lands_flat_and_turns_to_its_heading():
-    offset = np.array([[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2)
-    goal, heading, dt, duration = np.array([-0.1, 0.1, 0.0]), 0.1, 1e-4, 0.13
-    position, velocity = POINTS.copy(), np.zeros((4, 3))
-    stance, stepping = np.ones(4, bool), np.zeros(4, bool)
-    highest = 0.0
-    for step in range(1100):
-        acceleration = np.zeros((4, 3))
-        swing_points(
-            1, FOOT, offset, goal, heading, step * dt, duration, 0.015, position, velocity, stance,
-            stepping, acceleration,
-        )  # fmt: skip
-        velocity += dt * acceleration
-        position += dt * velocity
-        highest = max(highest, float(position[2, 2]))
-    assert stance.tolist() == [True, True, False, False] == (~stepping).tolist()
-    assert (position[:2] == POINTS[:2]).all()
-    assert 0.012 < highest < 0.016
-    assert velocity[2:, 2].max() < -0.1  # it meets the ground moving
-    ahead = position[2, :2] - position[3, :2]
-    assert position[2:, :2].mean(axis=0) == pytest.approx(goal[:2], abs=0.01)
-    assert math.atan2(ahead[1], ahead[0]) == pytest.approx(heading, abs=0.02)
 
 
 def test_a_foot_that_stands_on_one_point_stands():

@@ -55,35 +55,35 @@ def test_propagate_falls_freely():
 
 
 @given(small, small, small)
-def test_turn_is_the_exponential_from_the_left(x, y, z):
+def test_rotate_in_world_is_the_exponential_from_the_left(x, y, z):
     q = quaternion_of((0.4, 0.5, -0.6))
     expected, turn = np.empty(4), quaternion_of((x, y, z))
     rotations.multiply(turn, q, expected)
-    inertial.turn(q, x, y, z)
+    inertial.rotate_in_world(q, x, y, z)
     assert np.abs(turn_between(q, expected)).max() < 1e-3
     assert np.linalg.norm(q) == pytest.approx(1.0)
 
 
 @given(angles, angles, st.floats(-3.0, 3.0))
-def test_upright_finds_the_tilt_from_gravity(roll, pitch, heading):
+def test_orientation_from_gravity_finds_the_tilt(roll, pitch, heading):
     lean = quaternion_of((roll, pitch, 0.0))
     q, found, up = np.empty(4), np.empty(4), np.empty(3)
     rotations.multiply(quaternion_of((0, 0, heading)), lean, q)
     force = turned_back(q, [0.0, 0.0, 9.7])
-    inertial.upright(force, found)
+    inertial.orientation_from_gravity(force, found)
     rotations.rotate(found, force, up)
     assert up == pytest.approx([0.0, 0.0, 9.7], abs=1e-12)
 
 
-def test_upright_without_a_force_and_upside_down():
+def test_orientation_from_gravity_without_a_force_and_upside_down():
     q = np.empty(4)
-    inertial.upright(np.zeros(3), q)
+    inertial.orientation_from_gravity(np.zeros(3), q)
     assert q.tolist() == [0, 0, 0, 1]
-    inertial.upright(np.array([0.0, 0.0, -9.81]), q)
+    inertial.orientation_from_gravity(np.array([0.0, 0.0, -9.81]), q)
     assert np.linalg.norm(q) == pytest.approx(1.0)
 
 
-def test_right_up_converges_to_upright_and_keeps_the_heading():
+def test_the_tilt_correction_converges_to_upright_and_keeps_the_heading():
     q = np.empty(4)
     rotations.multiply(quaternion_of((0.1, -0.2, 0)), quaternion_of((0, 0, 0.5)), q)
     before = rotations.yaw(q)
@@ -101,10 +101,10 @@ def test_misalignment_levels_the_feet_and_faces_forward(x, y, z):
     points = np.array([turned_back(true, row - [0.01, 0.02, 0.38]) for row in place])
     forward = turned_back(true, [2.0, 0.0, 0.0])
     q, error = true.copy(), np.empty(3)
-    inertial.turn(q, x, y, z)
+    inertial.rotate_in_world(q, x, y, z)
     for _ in range(10):
         assert inertial.misalignment(q, points, forward, error, np.empty(3))
-        inertial.turn(q, *error.tolist())
+        inertial.rotate_in_world(q, *error.tolist())
     assert np.abs(turn_between(q, true)).max() < 1e-9
 
 
@@ -130,7 +130,7 @@ def test_weights_fall_with_speed_and_are_zero_without_contact():
     rates = np.array([[-1.0, 0, 0], [-0.92, 0, 0], [0.0, 0, 0], [-1.0, 0, 0]])
     weights = np.empty(4)
     active = np.array([True, True, True, False])
-    largest = inertial.weigh(rates, active, np.array([1.0, 0, 0]), 0.08, weights)
+    largest = inertial.weigh_contacts(rates, active, np.array([1.0, 0, 0]), 0.08, weights)
     assert weights[0] == largest == 1.0
     assert weights[1] == pytest.approx(0.25)
     assert weights[2] < 1e-4
@@ -140,7 +140,7 @@ def test_weights_fall_with_speed_and_are_zero_without_contact():
 def stand(position, velocity, points, rates, weights, anchors, anchored, gain=0.1):
     active = np.ones(len(points), dtype=bool)
     standing = inertial.StandingPoints(points, rates, active, weights, anchors, anchored)
-    inertial.stand_on(standing, gain, gain, position, velocity)
+    inertial.correct_by_contacts(standing, gain, gain, position, velocity)
 
 
 def test_standing_points_pull_velocity_and_position():
@@ -171,5 +171,5 @@ def test_a_point_without_contact_loses_its_anchor():
         np.zeros((2, 3)), np.zeros((2, 3)), np.array([True, False]), np.array([1.0, 0.0]),
         np.zeros((2, 3)), anchored,
     )  # fmt: skip
-    inertial.stand_on(standing, 0.1, 0.1, np.zeros(3), np.zeros(3))
+    inertial.correct_by_contacts(standing, 0.1, 0.1, np.zeros(3), np.zeros(3))
     assert anchored.tolist() == [True, False]

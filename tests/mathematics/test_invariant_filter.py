@@ -10,7 +10,6 @@ from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.inertial_filter import propagate
 from aloft.mathematics.invariant_filter import (
     add_contact,
-    correct,
     error_transition,
     height_row,
     innovation,
@@ -20,8 +19,9 @@ from aloft.mathematics.invariant_filter import (
     place_jacobian,
     propagate_covariance,
     remove_contact,
+    squared_distance,
+    update_covariance,
     vector_deviation,
-    weigh,
     world_definition_jacobian,
 )
 from aloft.robots.contact_kinematics import ContactKinematics
@@ -319,8 +319,10 @@ def update(covariance, sensitivity, noise, residual):
     covariance = covariance.copy()
     seen, inverse, gain = np.empty((n, 3)), np.empty((3, 3)), np.empty((n, 3))
     correction = np.empty(n)
-    likelihood = weigh(covariance, sensitivity, noise, residual, seen, inverse, np.empty((3, 3)))
-    correct(covariance, sensitivity, noise, residual, seen, inverse, gain, correction)
+    likelihood = squared_distance(
+        covariance, sensitivity, noise, residual, seen, inverse, np.empty((3, 3))
+    )
+    update_covariance(covariance, sensitivity, noise, residual, seen, inverse, gain, correction)
     return likelihood, covariance, correction
 
 

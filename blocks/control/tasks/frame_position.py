@@ -30,7 +30,7 @@ class FramePosition(FeedbackTask):
     target = Input(PointTarget, text="where the frame should be, and how it should move")
 
     @classmethod
-    def misfits(cls, params: Params, robot: RobotDescription) -> Iterable[str]:
+    def unmet_requirements(cls, params: Params, robot: RobotDescription) -> Iterable[str]:
         if params.frame not in frames_of(robot):
             yield f"{robot.name} has no frame {params.frame!r}; it has {', '.join(frames_of(robot))}"
 

@@ -64,7 +64,9 @@ class Posture(FeedbackTask):
         return len(chosen_joints(robot, params))
 
     @classmethod
-    def misfits(cls, params: PostureParameters, robot: RobotDescription) -> Iterable[str]:
+    def unmet_requirements(
+        cls, params: PostureParameters, robot: RobotDescription
+    ) -> Iterable[str]:
         names = [joint.name for joint in robot.joints]
         weights = params.posture_weight
         for pattern in [*params.joints, *(weights if isinstance(weights, dict) else ())]:

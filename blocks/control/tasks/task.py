@@ -114,8 +114,8 @@ class Task:
         return cls.size
 
     @classmethod
-    def misfits(cls, params: Any, robot: RobotDescription) -> Iterable[str]:
-        """Sentences about misfits of these parameters and the robot, such as an unknown joint.
+    def unmet_requirements(cls, params: Any, robot: RobotDescription) -> Iterable[str]:
+        """Sentences about unmet requirements of these parameters and the robot, such as an unknown joint.
 
         Called at load, once for each kind of phase; the load report contains the sentences.
         """

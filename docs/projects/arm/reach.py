@@ -6,7 +6,7 @@ import numpy as np
 
 from aloft import Block, Field, Input, Output, Parameters, Signal, State, live_parameter, parameter
 from aloft.blocks.signals import CommandMode, JointCommand, JointState, JointTorque
-from aloft.runtime.language.block import Misfit
+from aloft.runtime.language.block import Context, UnmetRequirement
 
 
 class Departure(Signal):
@@ -40,18 +40,23 @@ class Reach(Block):
     departure = State(Departure, text="where the motion began")
 
     @classmethod
-    def requires(cls, params, robot) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """One target for every joint, inside its limits."""
+        robot = context.robot
         count = len(robot.joints)
         if len(params.target) != count:
             found = f"{len(params.target)} angles"
-            yield Misfit(f"{robot.name} has {count} joints", "target", f"{count} angles", found)
+            yield UnmetRequirement(
+                f"{robot.name} has {count} joints", "target", f"{count} angles", found
+            )
             return
         for joint, angle in zip(robot.joints, params.target, strict=True):
             low, high = joint.limits or (-np.inf, np.inf)
             if not low <= angle <= high:
                 bounds = f"{low:g} to {high:g} rad"
-                yield Misfit(f"{joint.name} cannot go there", "target", bounds, f"{angle:g} rad")
+                yield UnmetRequirement(
+                    f"{joint.name} cannot go there", "target", bounds, f"{angle:g} rad"
+                )
 
     @classmethod
     def example_parameters(cls) -> Mapping:

@@ -11,12 +11,12 @@ import numpy as np
 
 from ....files.nodes import ListNode, MapNode, Node
 from ....files.problems import Code, Position, Problems, listing, nearest
-from ...language.block import Block, Clock, Context, Input, Misfit, Output, Port
+from ...language.block import Block, Clock, Context, Input, Output, Port, UnmetRequirement
 from ...language.feedthrough import inputs_read_by_emit
-from ...language.fit import find_misfits, unmet_needs
 from ...language.layout import LARGEST
 from ...language.parameters import Parameters
 from ...language.quantities import UNCHECKED, Quantity, quantity_of
+from ...language.requirements import unmet_needs, unmet_requirements
 from ...language.signals import DTYPES, Field, Signal
 from ..flattening.flat import FlatBlock, FlatGraph
 from .settings import Settings
@@ -125,7 +125,7 @@ def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
 
 
 def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapping[str, str]:
-    """Report every misfit of one block, whose parameters have been checked.
+    """Report every unmet requirement of one block, whose parameters have been checked.
 
     Returns:
         The outputs that this robot cannot have, each with the reason.
@@ -143,16 +143,18 @@ def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapp
         folder=flat.folder,
         graph_folder=settings.folder,
     )
-    misfits = find_misfits(draft.block_type, draft.params, context)
-    for misfit in misfits:
-        report_misfit(draft, misfit, problems)
-    return {} if misfits else draft.block_type.absent_outputs(draft.params, settings.robot)
+    unmet = unmet_requirements(draft.block_type, draft.params, context)
+    for requirement in unmet:
+        report_requirement(draft, requirement, problems)
+    return {} if unmet else draft.block_type.absent_outputs(draft.params, settings.robot)
 
 
-def report_misfit(draft: BlockDraft, misfit: Misfit, problems: Problems) -> None:
-    """Report a misfit at the parameter it concerns, or else at the block."""
+def report_requirement(
+    draft: BlockDraft, requirement: UnmetRequirement, problems: Problems
+) -> None:
+    """Report an unmet requirement at the parameter it concerns, or else at the block."""
     flat = draft.flat
-    steps = misfit.parameter.split(".") if misfit.parameter else []
+    steps = requirement.parameter.split(".") if requirement.parameter else []
     node: Node = flat.parameters
     where = flat.where
     for step in steps:
@@ -161,14 +163,14 @@ def report_misfit(draft: BlockDraft, misfit: Misfit, problems: Problems) -> None
             break
         node, where = found, found.where
     problems.add(
-        Code.MISFIT,
-        f"{flat.path} ({flat.use}): {misfit.message}",
+        Code.UNMET_REQUIREMENT,
+        f"{flat.path} ({flat.use}): {requirement.message}",
         where,
         at=".".join([flat.path, *steps]),
-        expected=misfit.expected,
-        found=misfit.found,
-        nearest=misfit.nearest,
-        fix=misfit.fix,
+        expected=requirement.expected,
+        found=requirement.found,
+        nearest=requirement.nearest,
+        fix=requirement.fix,
     )
 
 

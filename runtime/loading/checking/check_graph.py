@@ -11,9 +11,9 @@ from ....files.problems import Code, Position, Problems, nearest
 from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
-from ...language.fit import fix_without_robot
 from ...language.importing import BlockImportError, UnknownModuleError
 from ...language.registry import find_block, nearest_names
+from ...language.requirements import fix_without_robot
 from ...language.schedule import ScheduleBlock, find_loops, order_blocks
 from ...language.signals import Signal
 from ...language.stages import BlockSpec, CheckedGraph, Wire
@@ -82,15 +82,15 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.params is None:
         return draft
     try:
-        draft.block_type = draft.block_type.fitted(
+        draft.block_type = draft.block_type.specialize(
             draft.params, flat.folder, settings.robot, graph.folder
         )
     except BlockError as error:
-        problems.add(Code.MISFIT, f"{flat.path}: {error}", flat.where, at=flat.path)
+        problems.add(Code.UNMET_REQUIREMENT, f"{flat.path}: {error}", flat.where, at=flat.path)
         draft.block_type = None
         return draft
     try:
-        local = draft.block_type.local_dimensions(draft.params, settings.robot)
+        local = draft.block_type.dimensions(draft.params, settings.robot)
     except Exception as error:  # noqa: BLE001  the block's own code must not hide others
         if settings.robot_known:
             problems.add(

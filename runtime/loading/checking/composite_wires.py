@@ -316,4 +316,4 @@ def wire_text(plain: object) -> str:
 def _of_one(field: Field) -> Field:
     """A field like this one for a single number."""
     unit = None if field.unit is None else field.unit.text
-    return Field((), unit=unit, dtype=field.dtype_name, carried=field.carried)
+    return Field((), unit=unit, dtype=field.dtype_name, inferred=field.inferred)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from ....files.problems import Code, Problems
 from ...language.block import Block
-from ...language.quantities import UNCHECKED, Given, Quantity, quantity_of
+from ...language.quantities import UNCHECKED, InputQuantities, Quantity, quantity_of
 from ...language.unit_algebra import over
 from .block_check import BlockDraft
 from .inserted import own_unit
@@ -114,7 +114,7 @@ class _QuantityInference:
                     return False
         return True
 
-    def given(self, draft: BlockDraft) -> Given:
+    def given(self, draft: BlockDraft) -> InputQuantities:
         """The quantities at a block's inputs."""
         found = {}
         for name, port in draft.inputs.items():
@@ -122,7 +122,7 @@ class _QuantityInference:
                 quantity = quantity_at_input(self.drafts, draft, name, field_name)
                 if quantity is not None:
                     found[f"{name}.{field_name}"] = quantity
-        return Given(found)
+        return InputQuantities(found)
 
 
 def quantity_at_input(
@@ -150,15 +150,15 @@ def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity
 
 
 def inferred_quantities(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> dict[str, Quantity]:
-    """What a block's carried fields are in this graph, by ``port.field``."""
+    """What a block's inferred fields are in this graph, by ``port.field``."""
     found = {}
     for name, output in draft.outputs.items():
         for field_name, field in output.signal.fields.items():
-            if field.carried:
+            if field.inferred:
                 found[f"{name}.{field_name}"] = draft.quantity(name, field_name)
     for name, port in draft.inputs.items():
         for field_name, field in port.signal.fields.items():
-            arrives = quantity_at_input(drafts, draft, name, field_name) if field.carried else None
+            arrives = quantity_at_input(drafts, draft, name, field_name) if field.inferred else None
             if arrives is not None:
                 found[f"{name}.{field_name}"] = arrives
     return found
@@ -179,37 +179,39 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
                     )
 
 
-def inferred_outputs(draft: BlockDraft, given: Given) -> dict[str, Quantity | None] | None:
-    """What the block says about its carried outputs, by ``port.field``; ``None`` if it fails."""
+def inferred_outputs(
+    draft: BlockDraft, inputs: InputQuantities
+) -> dict[str, Quantity | None] | None:
+    """What the block says about its inferred outputs, by ``port.field``; ``None`` if it fails."""
     block_type = draft.block_type
-    carried = [
+    inferred = [
         (name, field_name)
         for name, output in draft.outputs.items()
         for field_name, field in output.signal.fields.items()
-        if field.carried
+        if field.inferred
     ]
     if block_type is None or draft.params is None:
-        return {f"{name}.{field_name}": UNCHECKED for name, field_name in carried}
+        return {f"{name}.{field_name}": UNCHECKED for name, field_name in inferred}
     answers_by_name = {}
-    silent = block_type.carried.__func__ is Block.carried.__func__  # type: ignore[attr-defined]  # a class method
+    silent = block_type.infer_units.__func__ is Block.infer_units.__func__  # type: ignore[attr-defined]  # a class method
     if not silent:
         try:
-            answers_by_name = dict(block_type.carried(draft.params, given))
+            answers_by_name = dict(block_type.infer_units(draft.params, inputs))
         except Exception:  # noqa: BLE001  wrong parameters, which are reported; or a user's mistake
             silent = True
     return {
         f"{name}.{field_name}": UNCHECKED
         if silent
         else answers_by_name.get(f"{name}.{field_name}", answers_by_name.get(name))
-        for name, field_name in carried
+        for name, field_name in inferred
     }
 
 
-def _check(draft: BlockDraft, given: Given, problems: Problems) -> None:
+def _check(draft: BlockDraft, inputs: InputQuantities, problems: Problems) -> None:
     """Report where a block's inputs disagree, or an output contradicts what a ring said before."""
     flat = draft.flat
-    answers = inferred_outputs(draft, given) or {}
-    for item in given.disagreements:
+    answers = inferred_outputs(draft, inputs) or {}
+    for item in inputs.disagreements:
         name = item.port.partition(".")[0]
         wire = flat.wires.get(name)
         other = item.other.partition(".")[0]

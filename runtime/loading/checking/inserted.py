@@ -20,7 +20,7 @@ from ...language.block import Block, Input, Output
 from ...language.delay import DelayParameters, delay_block_type
 from ...language.errors import UnitError
 from ...language.parameters import Parameters, parameter
-from ...language.quantities import UNCHECKED, Carried, Given, Quantity
+from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities, Quantity
 from ...language.signals import Field, Signal
 from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
@@ -60,22 +60,22 @@ class Gather(Block):
     """The wire as the graph has it."""
 
     @classmethod
-    def carried(cls, params: Parameters, given: Given) -> Carried:
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """What the parts of a field have in common.
 
         They must be what the reader says. If it takes any and they differ, the unit of the whole is
         not checked.
         """
-        return {f"y.{name}": cls._quantity(name, given) for name in cls.wanted}
+        return {f"y.{name}": cls._quantity(name, inputs) for name in cls.wanted}
 
     @classmethod
-    def _quantity(cls, target: str, given: Given) -> Quantity | None:
+    def _quantity(cls, target: str, inputs: InputQuantities) -> Quantity | None:
         wanted = cls.wanted[target]
         names = [f"{p.port}.{p.field}" for p in cls.pieces if p.target == target and p.port]
-        found = [given[name] for name in names]
+        found = [inputs[name] for name in names]
         if wanted is not None:
             for name in names:
-                given.agree(name, wanted, f"the reader's {target} is {wanted}")
+                inputs.agree(name, wanted, f"the reader's {target} is {wanted}")
             return wanted
         known = [quantity for quantity in found if quantity is not None]
         if len(known) < len(found):
@@ -134,7 +134,7 @@ def gather_block_type(
 def part_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
     """A signal whose fields have these shapes and types, and carry their units."""
     body: dict[str, Any] = {
-        field: Field(shape, dtype=dtype, carried=True, text="what was selected")
+        field: Field(shape, dtype=dtype, inferred=True, text="what was selected")
         for field, (shape, dtype) in fields.items()
     }
     return type(name, (Signal,), {"__doc__": "Parts of other signals.", **body})
@@ -278,7 +278,7 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     if shape:
         expected = f"{expected}, or a list of shape [{', '.join(map(str, shape))}]"
     own = field.unit
-    if field.carried:
+    if field.inferred:
         own = own_unit(node) or ONE
     try:
         value = _numbers(node, own, types)

@@ -13,10 +13,10 @@ from typing import Any
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain
 from ....files.problems import Code, Problems, listing, nearest
 from ....files.validation import unit_of
-from ...language.block import Block, Clock, Context, Misfit
-from ...language.fit import find_misfits
+from ...language.block import Block, Clock, Context, UnmetRequirement
 from ...language.parameters import Parameters
 from ...language.registry import find_block
+from ...language.requirements import unmet_requirements
 from ..flattening.flat import FlatBlock, FlatGraph
 from .parameters import check_parameters
 from .settings import Settings
@@ -106,9 +106,9 @@ class _ReferenceResolver:
             )
             return None
         value, unit = exported[what]
-        if isinstance(value, Misfit):
+        if isinstance(value, UnmetRequirement):
             self.problems.add(
-                Code.MISFIT,
+                Code.UNMET_REQUIREMENT,
                 f"{at} cannot follow from {source.value}: {value.message}",
                 source.where,
                 at=at,
@@ -160,11 +160,11 @@ class _ReferenceResolver:
             graph=self.graph.plain(),
         )
         try:
-            exported = block_type.tells(params, context)
+            exported = block_type.exported_values(params, context)
         except Exception as error:  # noqa: BLE001  the block's own code must not hide others
-            if not find_misfits(block_type, params, context):
+            if not unmet_requirements(block_type, params, context):
                 self.problems.add(
-                    Code.MISFIT,
+                    Code.UNMET_REQUIREMENT,
                     f"{block.path} ({block.use}) cannot tell what follows from its parameters: "
                     + f"{type(error).__name__}: {error}",
                     block.where,

@@ -24,11 +24,11 @@ from ....files.problems import Code, LoadError, Position, Problems, listing, nea
 from ....files.validation import find_mistakes, path_text, unit_of
 from ....robots.description import RobotDescription
 from ...language.block import Block
-from ...language.fit import find_misfits
 from ...language.parameter_change import Adjustment
 from ...language.parameters import Parameters, is_live
 from ...language.per_joint import BY_POSITION, by_name
 from ...language.registry import block_name
+from ...language.requirements import unmet_requirements
 from ...language.signals import Field
 from ..flattening.flat import FlatBlock
 from ..reading.overrides import Override, Overrides, read_overrides
@@ -287,12 +287,12 @@ def _fits(path: str, block: Block, params: Parameters, where: Position, problems
     A port of another size would need another layout of the graph's memory.
     """
     kind, context = type(block), block.context
-    sizes = {**context.dimensions, **kind.local_dimensions(params, context.robot)}
-    for misfit in find_misfits(kind, params, context):
-        place = f"{path}.{misfit.parameter}" if misfit.parameter else path
+    sizes = {**context.dimensions, **kind.dimensions(params, context.robot)}
+    for requirement in unmet_requirements(kind, params, context):
+        place = f"{path}.{requirement.parameter}" if requirement.parameter else path
         problems.add(
-            Code.MISFIT, f"{path}: {misfit.message}", where, at=place, expected=misfit.expected,
-            found=misfit.found, nearest=misfit.nearest, fix=misfit.fix,
+            Code.UNMET_REQUIREMENT, f"{path}: {requirement.message}", where, at=place, expected=requirement.expected,
+            found=requirement.found, nearest=requirement.nearest, fix=requirement.fix,
         )  # fmt: skip
         return False
     for port in {**kind.inputs, **kind.outputs, **kind.states}.values():

@@ -11,7 +11,7 @@ from typing import Any
 from ....files.nodes import Entry, ScalarNode, kind, plain
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
-from ...language.fit import fix_without_robot
+from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
 from ..flattening.flat import ROBOT_FILES, FlatGraph
 from ..reading.written import CLOCK_KEYS, read_quantity, unknown_key

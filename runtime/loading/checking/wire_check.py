@@ -114,7 +114,7 @@ class WireCheck:
         reason = source.absent.get(wire.source_port)
         if reason is not None:
             self.problems.add(
-                Code.MISFIT,
+                Code.UNMET_REQUIREMENT,
                 f"{at} reads {wire.source}, which is not there: {reason}",
                 wire.where,
                 **other,

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from aloft.blocks.control.joint_pd import JointPD
+from aloft.blocks.control.joint_pd import (
+    JointPD,
+    add_friction,
+    add_soft_stops,
+    blend_feedback,
+    integrate_accelerations,
+)
 from aloft.blocks.signals import CommandMode, Phase
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
+
+from ...kernel_samples import records
 
 ROBOT = find_robot("bruce")
 FLIGHT_KP = np.tile([40.0, 60.0, 60.0, 60.0, 15.0], 2)
@@ -220,3 +230,82 @@ def test_joints_of_no_leg_follow_the_plan_while_all_legs_swing():
     alone = BlockBench(JointPD, GAINS, robot=one_leg, wired=["wbc", "legs", "phase", "joints"])
     command = settle(alone, Phase.FLIGHT, False)
     assert np.array_equal(command.position[:5], ROBOT.standing_position[:5])
+
+
+# Feedback, friction and soft stops
+
+RANDOM = np.random.default_rng(3)
+
+
+def torque(stiffness, position, damping, velocity, at):
+    return stiffness * (position - at.position) + damping * (velocity - at.velocity)
+
+
+def blended(weight, flight, stance, at):
+    """The command that blends two feedbacks, each a stiffness, position, damping and velocity."""
+    names = ("stiffness", "position", "damping", "velocity")
+    fields = {f"flight_{n}": v for n, v in zip(names, flight, strict=True)}
+    fields |= {f"stance_{n}": v for n, v in zip(names, stance, strict=True)}
+    out, record = records(dict.fromkeys(names, np.zeros(6)), {"airborne": weight, **fields})
+    blend_feedback(at, out, record, record)
+    return out
+
+
+def test_a_blend_is_the_weighted_sum_of_both_torques():
+    first, second = RANDOM.random((2, 4, 6))
+    weight = RANDOM.random(6)
+    position, velocity = RANDOM.normal(size=(2, 6))
+    (at,) = records({"position": position, "velocity": velocity})
+    out = blended(weight, first, second, at)
+    expected = weight * torque(*first, at) + (1.0 - weight) * torque(*second, at)
+    found = torque(out.stiffness, out.position, out.damping, out.velocity, at)
+    assert found == pytest.approx(expected)
+    out = blended(weight, np.zeros((4, 6)), np.zeros((4, 6)), at)
+    assert (out.position == at.position).all() and (out.velocity == at.velocity).all()
+
+
+def test_friction_has_the_sign_of_the_velocity():
+    joints, command, params, constants = records(
+        {"velocity": [10.0, 0.0, -10.0]},
+        {"torque": np.ones(3)},
+        {"friction_speed": 0.3},
+        {"friction": [0.1, 0.2, 0.3], "viscous_friction": [0.0, 0.1, 0.01]},
+    )
+    add_friction(joints, command, params, constants)
+    assert command.torque == pytest.approx([1.1, 1.0, 0.6])
+
+
+def test_integrated_targets_are_ahead_by_a_steady_acceleration():
+    rest = {"position": [0.0], "velocity": [0.0]}
+    joints, follower = records(rest, {**rest, "started": True})
+    for _ in range(500):
+        integrate_accelerations(np.array([10.0]), joints, follower, 0.02, 0.002)
+    assert follower.velocity[0] == pytest.approx(10.0 * 0.02, rel=0.15)
+    assert follower.position[0] == pytest.approx(10.0 * 0.02**2, rel=0.15)
+
+
+@given(
+    angle=st.floats(-2.5, 2.5),
+    rate=st.floats(-20, 20),
+    gains=st.tuples(*[st.floats(0, 100)] * 4),
+    targets=st.tuples(st.floats(-3, 3), st.floats(-3, 3)),
+)
+def test_a_soft_stop_adds_its_own_torque_to_any_feedback(angle, rate, gains, targets):
+    before = gains[0] * (targets[0] - angle) + gains[1] * (targets[1] - rate)
+    joints, command, params, constants = records(
+        {"position": [angle]},
+        {
+            "stiffness": [gains[0]], "position": [targets[0]], "damping": [gains[1]],
+            "velocity": [targets[1]],
+        },
+        {"stop_margin": 0.1, "stop_gain": 2.0},
+        {"limits": [[-1.0, 0.5]], "flight_stiffness": [gains[2]], "flight_damping": [gains[3]]},
+    )  # fmt: skip
+    add_soft_stops(joints, command, params, constants)
+    stiffness, damping = command.stiffness[0], command.damping[0]
+    after = stiffness * (command.position[0] - angle) + damping * (command.velocity[0] - rate)
+    edge = min(max(angle, -0.9), 0.4)
+    depth = abs(angle - edge) / 0.1
+    added = 2.0 * gains[2] * (edge - angle) - 2.0 * min(depth, 1.0) * gains[3] * rate
+    if stiffness > 1e-9 and damping > 1e-9:
+        assert after - before == pytest.approx(added, abs=1e-6, rel=1e-9)

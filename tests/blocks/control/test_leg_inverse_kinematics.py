@@ -10,16 +10,27 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aloft.blocks.control.leg_inverse_kinematics import LegInverseKinematics
-from aloft.blocks.signals import Phase
+from aloft.blocks.control.leg_inverse_kinematics import (
+    LOOKAHEAD,
+    LegInverseKinematics,
+    LegMemory,
+    excess_pitch,
+    keeps_acceleration,
+    planned_pitch,
+)
+from aloft.blocks.signals import JumpReference, Phase
+from aloft.mathematics.rotations import multiply, to_matrix
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
 from aloft.robots.limb import place_limb, read_limb
+from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
+from ...kernel_samples import records
 from ...robots.limbed_robots import humanoid, quadruped
+from ...turns import quaternion_of
 
 ROBOT = find_robot("bruce")
 LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
@@ -385,13 +396,164 @@ def test_a_joint_that_carries_two_feet_must_be_held():
     )
     params = LegInverseKinematics.Params()
     both = robot.model_copy(update={"joints": moved, "held": {}})
-    misfits = list(LegInverseKinematics.requires(params, both))
-    assert len(misfits) == 1
-    assert misfits[0].message == (
+    unmet = list(LegInverseKinematics.requires(params, Context("block", Clock(0.002), robot=both)))
+    assert len(unmet) == 1
+    assert unmet[0].message == (
         "joint waist of humanoid carries 2 feet; the inverse kinematics solves every leg by "
         "itself, so it can only hold such a joint"
     )
-    assert misfits[0].fix == "in the robot's description: held: {waist: 0.0}"
+    assert unmet[0].fix == "in the robot's description: held: {waist: 0.0}"
     assert not list(
-        LegInverseKinematics.requires(params, both.model_copy(update={"held": {"waist": 0.1}}))
+        LegInverseKinematics.requires(
+            params,
+            Context("block", Clock(0.002), robot=both.model_copy(update={"held": {"waist": 0.1}})),
+        )
     )
+
+
+def test_where_the_toes_land_first_no_sole_is_laid_flat_to_keep_its_height():
+    found = []
+    for beyond, toes_first in (("slide", True), ("turn", False), ("slide", False)):
+        bench = BlockBench(LegInverseKinematics, {"beyond": beyond}, robot="bruce")
+        turn = np.array([[0.825, 0.0, 0.565], [0.0, 1.0, 0.0], [-0.565, 0.0, 0.825]])
+        position = np.tile(LEGS[0].hip + turn @ np.array([-0.12, 0.0, -0.30]), (2, 1))
+        bench.set("feet", position=position, rotation=np.tile(turn, (2, 1, 1)), velocity=0.0)
+        bench.set("reference", toes_first=toes_first)
+        bench.step()
+        found.append(bench.get("target").position.tolist())
+    assert found[0] == found[1] != found[2]
+
+
+# Following the plan's joints
+
+
+def in_flight(params, **reference):
+    """The targets of a plan that is followed; the base has turned by 0.1 rad more about y."""
+    bench = BlockBench(LegInverseKinematics, {"follow": "plan", **params}, robot="bruce")
+    c, s = math.cos(0.1), math.sin(0.1)
+    bench.set("feet", rotation=[[[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]] * 2)
+    bench.set(
+        "reference", phase=int(Phase.FLIGHT), lift_off_time=1.0, touchdown_time=1.4,
+        orientation=[0.0, 0.0, 0.0, 1.0], joint_velocity=2.0, joint_acceleration=-50.0,
+        **{"joint_position": -0.3, **reference},
+    )  # fmt: skip
+    bench.step()
+    return bench.get("target")
+
+
+@pytest.mark.parametrize(
+    ("time", "ahead"), [(1.0, 0.0), (1.1, 0.005), (1.2, 0.01), (1.39, 0.01), (0.9, 0.01)]
+)
+def test_the_joints_are_ahead_of_the_plan_by_the_lead_from_mid_flight_on(time, ahead):
+    target = in_flight({"plan_lead": 0.01}, time=time)
+    assert target.position == pytest.approx(-0.3 + 2.0 * ahead - 25.0 * ahead**2)
+    assert target.velocity == pytest.approx(2.0 - 50.0 * ahead)
+
+
+def test_soles_become_level_by_the_ankles_before_touchdown():
+    names = [joint.name for joint in ROBOT.joints]
+    ankles = [names.index("right_ankle"), names.index("left_ankle")]
+    early, late = (in_flight({"level_time": 0.08}, time=time) for time in (1.31, 1.37))
+    assert early.position == pytest.approx(-0.3)
+    others = np.delete(late.position, ankles)
+    assert others == pytest.approx(-0.3)
+    flat = np.array([0.0, 0.5, 0.0, -1.0, 0.5] * 2)
+    level = in_flight({"level_time": 0.08}, time=1.37, joint_position=flat)
+    (_, before), (_, after) = feet_of(flat), feet_of(level.position)
+    for foot in range(2):
+        pitch = [math.atan2(-turn[foot, 2, 0], turn[foot, 0, 0]) for turn in (before, after)]
+        assert pitch[1] - pitch[0] == pytest.approx(-0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("late_time", [0.0, 0.005])
+def test_legs_that_land_late_go_on_as_in_the_flight(late_time):
+    bench = BlockBench(
+        LegInverseKinematics, {"follow": "plan", "late_time": late_time}, robot="bruce"
+    )
+    bench.set("feet", rotation=[np.eye(3)] * 2)
+    found = []
+    for tick, (phase, acceleration) in enumerate(
+        [(Phase.FLIGHT, -50.0), (Phase.FLIGHT, 700.0), *[(Phase.LANDING, 700.0)] * 3]
+    ):
+        bench.set(
+            "reference", phase=int(phase), lift_off_time=1.0, touchdown_time=1.398,
+            time=1.391 + 0.002 * tick + 0.002 * (tick > 0), orientation=[0.0, 0.0, 0.0, 1.0],
+            joint_position=-0.3, joint_velocity=2.0, joint_acceleration=acceleration,
+        )  # fmt: skip
+        bench.step()
+        found.append(bench.get("target").velocity.copy())
+    goes_on = [2.0 - 50.0 * since for since in (0.002, 0.004)]
+    law = found[4][0]
+    assert law != pytest.approx(2.0, abs=0.3)
+    expected = [2.0, 2.0, *(goes_on if late_time else [law, law]), law]
+    assert [velocity[0] for velocity in found] == pytest.approx(expected)
+
+
+def test_the_lead_reads_no_acceleration_of_the_landing():
+    for late_time, expected in ((0.0, 700.0), (0.005, -50.0)):
+        bench = BlockBench(
+            LegInverseKinematics,
+            {"follow": "plan", "late_time": late_time, "plan_lead": 0.01},
+            robot="bruce",
+        )
+        bench.set("feet", rotation=[np.eye(3)] * 2)
+        for time, acceleration in ((1.39, -50.0), (1.396, 700.0)):
+            bench.set(
+                "reference", phase=int(Phase.FLIGHT), lift_off_time=1.0, touchdown_time=1.398,
+                time=time, orientation=[0.0, 0.0, 0.0, 1.0], joint_position=-0.3,
+                joint_velocity=2.0, joint_acceleration=acceleration,
+            )  # fmt: skip
+            bench.step()
+        assert bench.get("target").velocity == pytest.approx(2.0 + 0.01 * expected)
+
+
+def signal(kind, **values):
+    """A signal with the values named."""
+    made = kind.allocate(ROBOT.dimensions)
+    for name, value in values.items():
+        getattr(made, name)[...] = value
+    return made
+
+
+@pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
+@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.2, 0.5)])
+def test_the_planned_pitch_is_the_turn_about_y_before_roll_and_yaw(pitch, other):
+    roll, yaw = other
+    found = planned_pitch(quaternion_of([0.0, pitch, 0.0]))
+    assert found == pytest.approx(pitch, abs=1e-12)
+    rolled = multiplied(quaternion_of([0.0, pitch, 0.0]), quaternion_of([roll, 0.0, 0.0]))
+    turned = multiplied(rolled, quaternion_of([0.0, 0.0, yaw]))
+    matrix = np.empty((3, 3))
+    to_matrix(turned, matrix)
+    # the x axis, seen in the plane of x and z
+    expected = math.atan2(-matrix[2, 0], matrix[0, 0])
+    assert planned_pitch(turned) == pytest.approx(expected, abs=1e-12)
+
+
+def multiplied(first, second):
+    out = np.empty(4)
+    multiply(first, second, out)
+    return out
+
+
+@pytest.mark.parametrize("pitch", [-2.9, -0.5, 0.0, 1.0, 3.0])
+@pytest.mark.parametrize("more", [-0.3, 0.0, 0.2])
+def test_how_far_the_base_has_turned_beyond_the_plan(pitch, more):
+    c, s = math.cos(pitch + more), math.sin(pitch + more)
+    level = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    assert excess_pitch(level, pitch) == pytest.approx(more, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("touchdown", "known", "late", "keeps"),
+    [
+        (1.0, True, 0.01, True), (1.0, False, 0.01, False), (1.0, True, 0.0, False),
+        (1.0 + 0.9 * LOOKAHEAD, True, 0.01, True), (1.0 + 1.1 * LOOKAHEAD, True, 0.01, False),
+        (1.0 - 0.9 * LOOKAHEAD, True, 0.01, True), (1.0 - 1.1 * LOOKAHEAD, True, 0.01, False),
+    ],
+)  # fmt: skip
+def test_accelerations_near_the_touchdown_are_those_of_before(touchdown, known, late, keeps):
+    (params,) = records({"late_time": late})
+    memory = signal(LegMemory, flew=known)
+    reference = signal(JumpReference, time=1.0, touchdown_time=touchdown)
+    assert keeps_acceleration(reference, params, memory) == keeps

@@ -3,17 +3,16 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.estimation.base_filter import Learning, forget_samples, learn_bias
+from aloft.blocks.estimation.inertial_estimator import BiasSamples, forget_samples, learn_bias
 
 BLOCK, PRIOR = 10, 5.0
 
 
-def nothing() -> tuple[Learning, np.ndarray]:
-    counts = (np.zeros((), dtype=np.int64) for _ in range(3))
-    return Learning(*counts, np.zeros(3), np.zeros(3)), np.zeros(3)
+def nothing() -> tuple[BiasSamples, np.ndarray]:
+    return BiasSamples.allocate(), np.zeros(3)
 
 
-def feed(learning: Learning, bias: np.ndarray, samples: np.ndarray) -> None:
+def feed(learning: BiasSamples, bias: np.ndarray, samples: np.ndarray) -> None:
     for sample in samples:
         learning.filling_sum[:] += sample
         learn_bias(learning, BLOCK, bias, PRIOR)

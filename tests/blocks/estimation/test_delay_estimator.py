@@ -55,7 +55,7 @@ def test_torques_that_do_not_follow_the_commands_tell_nothing():
     bench = drive(0.004, noise=2.0, told=0.001)
     assert not bool(bench.get("estimate").known)
     assert float(bench.get("estimate").delay) == 0.001
-    assert bench.block.cautions() == ()
+    assert bench.block.warnings() == ()
 
 
 def test_told_is_followed_if_the_graph_says_so():
@@ -66,13 +66,13 @@ def test_told_is_followed_if_the_graph_says_so():
 
 @pytest.mark.parametrize("follow", ["measured", "told"])
 def test_a_wrong_delay_is_reported(follow):
-    (text,) = drive(0.005, told=0.002, follow=follow).block.cautions()
+    (text,) = drive(0.005, told=0.002, follow=follow).block.warnings()
     done = "is compensated" if follow == "measured" else "is not compensated"
     assert text == (
         f"the delay from sensing to torque is 5.0 ms as measured, which {done}, and 2 ms as told; "
         "correct `told` or the robot's delay"
     )
-    assert drive(0.0032, told=0.002).block.cautions() == ()
+    assert drive(0.0032, told=0.002).block.warnings() == ()
 
 
 def test_the_measurement_ends_in_time():

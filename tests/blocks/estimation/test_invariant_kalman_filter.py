@@ -139,14 +139,16 @@ class Run:
 
 
 class Disturbed:
-    """What the leg kinematics of a block see is disturbed before they are used."""
+    """The points that a block tracks are elsewhere on their feet than it has been told."""
 
     def __init__(self, block, disturb):
-        self.block, self.disturb = block, disturb
-        block.kernel_calls = (*block.kernel_calls[:-1], self, block.kernel_calls[-1])
+        self.points, self.disturb = block.legs.tracked.centre, disturb
+        self.described = self.points.copy()
+        block.kernel_calls = (self, *block.kernel_calls)
 
     def take_turn(self):
-        self.disturb(self.block.seen.centres)
+        self.points[:] = self.described
+        self.disturb(self.points)
 
 
 @pytest.mark.parametrize("ground", ["level", "flat", "unknown"])

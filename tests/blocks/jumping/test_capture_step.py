@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.capture_step import CaptureStep
+from aloft.blocks.jumping.capture_step import CaptureStep, choose_foothold, swing_points
 from aloft.blocks.signals import Phase
 from aloft.runtime.testing import BlockBench
+
+from ...kernel_samples import records
 
 PERIOD = 0.002
 POINTS = np.array([
@@ -157,3 +161,59 @@ def test_another_flight_forgets_the_steps():
     assert not bench.get("phase").stepping.any()
     bench.now = 0.0
     assert np.any(run(bench, 0.12, velocity=(-0.6, 0.15)))
+
+
+SOLES = np.array([[0.05, -0.08, 0.0], [-0.04, -0.08, 0.0], [0.05, 0.08, 0.0], [-0.04, 0.08, 0.0]])
+FOOT = [0, 0, 1, 1]
+
+
+def foothold(capture, rate, left, beyond):
+    terms, params, constants, scratch = records(
+        {"contact_position": SOLES},
+        {"beyond": beyond},
+        {"foot_of_point": FOOT, "side": [-1.0, 1.0]},
+        {"capture": capture, "nearest": np.zeros(2), "other": np.zeros(2)},
+    )
+    out = np.zeros(3)
+    choose_foothold(terms, params, constants, scratch, 1, rate, left, out)
+    return out
+
+
+def test_the_foothold_is_where_the_capture_point_will_be():
+    xi, rate, left = np.array([-0.09, 0.02]), 6.0, 0.13
+    out = foothold(xi, rate, left, 0.0)
+    push, place, dt = np.array([-0.04, -0.08]), xi.copy(), 1e-5
+    for _ in range(round(left / dt)):
+        place += dt * rate * (place - push)
+    assert out[:2] == pytest.approx(place, abs=1e-4)
+    farther = foothold(xi, rate, left, 0.5)
+    assert farther[:2] - push == pytest.approx(1.5 * (out[:2] - push))
+
+
+def test_the_swinging_foot_rises_lands_flat_and_turns_to_its_heading():
+    goal, heading, dt = np.array([-0.1, 0.1, 0.0]), 0.1, 1e-4
+    terms, params, constants, memory, out = records(
+        {"contact_position": SOLES, "contact_velocity": np.zeros((4, 3))},
+        {"duration": 0.13, "height": 0.015},
+        {"foot_of_point": FOOT, "offset": [[0.045, 0.0, 0.0], [-0.045, 0.0, 0.0]] * 2},
+        {"elapsed": 0.0, "heading": heading, "foothold": [np.zeros(3), goal]},
+        {
+            "stance": np.ones(4, bool), "stepping": np.zeros(4, bool),
+            "step_acceleration": np.zeros((4, 3)),
+        },
+    )  # fmt: skip
+    position, velocity = terms.contact_position, terms.contact_velocity
+    highest = 0.0
+    for step in range(1100):
+        memory.elapsed[()] = step * dt
+        swing_points(terms, params, constants, memory, out, 1)
+        velocity += dt * out.step_acceleration
+        position += dt * velocity
+        highest = max(highest, float(position[2, 2]))
+    assert out.stance.tolist() == [True, True, False, False] == (~out.stepping).tolist()
+    assert (position[:2] == SOLES[:2]).all()
+    assert 0.012 < highest < 0.016
+    assert velocity[2:, 2].max() < -0.1  # it meets the ground moving
+    ahead = position[2, :2] - position[3, :2]
+    assert position[2:, :2].mean(axis=0) == pytest.approx(goal[:2], abs=0.01)
+    assert math.atan2(ahead[1], ahead[0]) == pytest.approx(heading, abs=0.02)

@@ -87,9 +87,9 @@ REDUCED = {"task": {"rise": "6 cm", "impact": True}, "formulation": "srbm", "sol
 def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Path) -> None:
     block = bench(**REDUCED, library=str(tmp_path), check="reported")
     assert block.block.metrics() == {"plan_valid": False, "plan_tests_failed": 9}
-    (caution,) = block.block.cautions()
-    assert caution.startswith("THE PLAN IS NOT VALID and is followed all the same")
-    assert "\nflight_rotation: the base's error at touchdown is" in caution
+    (warning,) = block.block.warnings()
+    assert warning.startswith("THE PLAN IS NOT VALID and is followed all the same")
+    assert "\nflight_rotation: the base's error at touchdown is" in warning
     kept = list(tmp_path.rglob("*.npz"))
     assert [path.parent for path in kept] == [tmp_path / "invalid"]
     # What the single rigid body believes of its momentum, not what the legs make of it.
@@ -100,7 +100,7 @@ def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Pat
     assert abs(momentum[-1]) < 0.01
     written = kept[0].stat().st_mtime_ns
     again = bench(**REDUCED, library=str(tmp_path), check="reported")
-    assert again.block.cautions() == block.block.cautions()
+    assert again.block.warnings() == block.block.warnings()
     assert kept[0].stat().st_mtime_ns == written, "it was solved anew"
     # It is kept, but for nobody else.
     with pytest.raises(AloftError, match="is not valid:\nangular_momentum: its error at the knots"):
@@ -111,7 +111,7 @@ def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Pat
 def test_a_valid_plan_has_nothing_to_report(tmp_path: Path) -> None:
     block = bench(task="tasks/in_situ.yaml", check="reported", library=str(tmp_path))
     assert block.block.metrics() == {"plan_valid": True, "plan_tests_failed": 0}
-    assert not block.block.cautions()
+    assert not block.block.warnings()
 
 
 def follow(block: BlockBench, slower: float) -> float:

@@ -20,6 +20,7 @@ from aloft.mathematics.landing_law import (
 from aloft.mathematics.rotations import exponential, multiply, rotate, to_matrix
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import foot_sides, standing_feet
+from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing import BlockBench
 
 from ...robots.limbed_robots import quadruped
@@ -132,12 +133,20 @@ def test_limits_are_about_the_stance_of_each_foot_where_asked_for():
 
 def test_limits_in_which_a_robot_cannot_stand_are_in_the_load_report():
     Params = LandingHeuristic.Params
-    assert not list(LandingHeuristic.requires(Params(), ROBOT))
-    (misfit,) = LandingHeuristic.requires(Params(), quadruped())
-    assert misfit.message.startswith("front_left of quadruped stands 0.")
-    assert misfit.message.endswith("beside the centre of mass, which is beyond p_max")
-    assert (misfit.parameter, misfit.fix) == ("p_max", "limits_about: stance")
-    assert not list(LandingHeuristic.requires(Params(limits_about="stance"), quadruped()))
+    assert not list(
+        LandingHeuristic.requires(Params(), Context("block", Clock(0.002), robot=ROBOT))
+    )
+    (unmet,) = LandingHeuristic.requires(
+        Params(), Context("block", Clock(0.002), robot=quadruped())
+    )
+    assert unmet.message.startswith("front_left of quadruped stands 0.")
+    assert unmet.message.endswith("beside the centre of mass, which is beyond p_max")
+    assert (unmet.parameter, unmet.fix) == ("p_max", "limits_about: stance")
+    assert not list(
+        LandingHeuristic.requires(
+            Params(limits_about="stance"), Context("block", Clock(0.002), robot=quadruped())
+        )
+    )
 
 
 def test_four_feet_land_where_planned_and_spread_when_pushed_aside():

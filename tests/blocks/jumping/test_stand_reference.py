@@ -8,6 +8,7 @@ import pytest
 from aloft.blocks.jumping.stand_reference import NEVER, StandReference, plan_stand
 from aloft.blocks.signals import Phase
 from aloft.robots.description import find_robot
+from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
@@ -72,6 +73,12 @@ def test_a_squat_too_deep_names_the_joint():
 def test_too_few_joints_are_in_the_load_report():
     robot = quadruped()
     held = robot.model_copy(update={"held": {"front_left_knee": -1.5}})
-    (misfit,) = StandReference.requires(StandReference.Params(), held)
-    assert "quadruped lacks 1 joints to move its centre of mass" in misfit.message
-    assert not list(StandReference.requires(StandReference.Params(), robot))
+    (unmet,) = StandReference.requires(
+        StandReference.Params(), Context("block", Clock(0.002), robot=held)
+    )
+    assert "quadruped lacks 1 joints to move its centre of mass" in unmet.message
+    assert not list(
+        StandReference.requires(
+            StandReference.Params(), Context("block", Clock(0.002), robot=robot)
+        )
+    )

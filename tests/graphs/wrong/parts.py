@@ -5,8 +5,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from aloft.robots.description import RobotDescription
-from aloft.runtime.language.block import Block, Input, Misfit, Output
+from aloft.runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.per_joint import PerJoint
 from aloft.runtime.language.signals import Field, Signal
@@ -160,11 +159,12 @@ class Picky(Block):
     height = Output(Height)
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        robot = context.robot
         assert isinstance(params, cls.Params) and robot is not None
         legs = len(robot.feet)
         if legs != params.legs:
-            yield Misfit(
+            yield UnmetRequirement(
                 f"{robot.name} has {legs} legs",
                 parameter="legs",
                 expected=f"{legs} legs",
@@ -181,7 +181,7 @@ class Clumsy(Block):
     height = Output(Height)
 
     @classmethod
-    def requires(cls, params: Parameters, robot: RobotDescription | None) -> Iterable[Misfit]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         raise ZeroDivisionError("division by zero")
 
     def step(self) -> None: ...

@@ -365,7 +365,7 @@ def test_commands_go_to_the_thread_or_to_the_next_exchanges() -> None:
 def test_the_control_period_is_a_whole_number_of_the_buss(period: float, fits: bool) -> None:
     params = BearRobot.Params(**BearRobot.example_parameters())
     context = SimpleNamespace(robot=ROBOT, period=period, folder=Path("/"), graph_folder=Path("/"))
-    found = list(BearRobot.requires_of_graph(params, context))  # type: ignore[arg-type]
+    found = list(BearRobot.requires(params, context))  # type: ignore[arg-type]
     assert (found == []) == fits
     assert fits or "does not divide the control period" in str(found[0])
 

@@ -28,5 +28,5 @@ def lift(robot: BlockBench[MujocoRobot], height: float = 3.0) -> None:
     data: Any = robot.block.plant.data
     data.qpos[2] += height
     data.qvel[:] = 0.0
-    robot.block.freeze()
-    robot.block.thaw()
+    robot.block.save_state()
+    robot.block.load_state()

@@ -278,8 +278,8 @@ def test_robust_world_is_drawn_from_the_seed_within_its_ranges() -> None:
 def test_platform_and_step_tell_the_ground_under_each_point() -> None:
     robot = bench(scene="platform", platform_height=0.35, platform_edge=0.08)
     robot.block.plant.data.qpos[0] += 0.06  # type: ignore[attr-defined]
-    robot.block.freeze()
-    robot.block.thaw()
+    robot.block.save_state()
+    robot.block.load_state()
     heights = truth(robot).ground_height
     np.testing.assert_array_equal(heights, [-0.35, 0.0, -0.35, 0.0])
     np.testing.assert_array_equal(truth(bench(scene="step")).ground_height, 0.0)

@@ -14,6 +14,7 @@ from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.unsupported import unsupported_motor
 from aloft.robots.description import RobotDescription
+from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing.bench import BlockBench
 
 Data = dict[str, Any]
@@ -130,8 +131,10 @@ def test_a_rotor_geared_to_two_limbs_is_reported_at_load(quadruped: Data) -> Non
         "motor front_left_hip_joint_motor is geared to front_left_hip_joint and "
         "front_right_hip_joint, and neither joint carries the other"
     )
-    (misfit,) = MujocoRobot.requires(MujocoRobot.Params(), robot)
-    assert misfit.message == unsupported_motor(robot)
+    (unmet,) = MujocoRobot.requires(
+        MujocoRobot.Params(), Context("block", Clock(0.002), robot=robot)
+    )
+    assert unmet.message == unsupported_motor(robot)
 
 
 def test_two_equal_motors_on_two_joints_need_no_tendon(quadruped: Data) -> None:

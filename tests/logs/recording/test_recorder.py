@@ -46,7 +46,7 @@ class Walk(Block):
         self.y.values[...] += self.rng.standard_normal(16)
         self.y.count[...] += 1
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         self.frozen += 1
         self.memory.count[...] = self.y.count
 

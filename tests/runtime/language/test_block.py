@@ -55,7 +55,7 @@ def test_a_default_makes_an_input_optional() -> None:
 
 
 def test_integer_parameters_are_dimensions_of_the_block() -> None:
-    assert Filter.local_dimensions(Filter.Params(order=3), None) == {"order": 3}
+    assert Filter.dimensions(Filter.Params(order=3), None) == {"order": 3}
 
 
 def test_time_is_derived_from_the_tick() -> None:

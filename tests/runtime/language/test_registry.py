@@ -57,7 +57,9 @@ def test_names_and_blocks_agree() -> None:
     for name, block_type in blocks.items():
         assert issubclass(block_type, Block)
         assert block_name(block_type) == name
-        follows = block_type.fitted.__func__ is not Block.fitted.__func__  # from its parameters
+        follows = (
+            block_type.specialize.__func__ is not Block.specialize.__func__
+        )  # from its parameters
         assert follows or block_type.inputs or block_type.outputs
 
 

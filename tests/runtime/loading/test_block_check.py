@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.runtime.language.block import Clock, Context, Misfit
-from aloft.runtime.language.fit import find_misfits, fix_without_robot, has
+from aloft.runtime.language.block import Clock, Context, UnmetRequirement
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.registry import find_block
+from aloft.runtime.language.requirements import fix_without_robot, has, unmet_requirements
 from aloft.runtime.loading import LoadError, load_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.memory import BoundGraph
@@ -46,7 +46,7 @@ def test_a_block_learns_the_period_and_the_folder() -> None:
         """Says what it was told."""
 
         @classmethod
-        def requires_of_graph(cls, params: Parameters, context: Context) -> list[Misfit]:
+        def requires(cls, params: Parameters, context: Context) -> list[UnmetRequirement]:
             seen.append(context)
             return []
 
@@ -71,7 +71,7 @@ def test_values_per_joint_may_change_while_a_graph_runs() -> None:
     with pytest.raises(LoadError) as caught:
         adjust(graph.blocks, ["soft.stiffness.*_kne=60"])
     text = str(caught.value)
-    assert "misfit: soft: stiffness: bruce has no joint '*_kne'" in text
+    assert "unmet-requirement: soft: stiffness: bruce has no joint '*_kne'" in text
     assert "nearest    *_knee" in text
     with pytest.raises(LoadError, match="by joint name, not by position"):
         adjust(graph.blocks, ["soft.stiffness=[1, 2, 3, 4, 5]"])
@@ -99,9 +99,9 @@ def test_the_profile_is_in_the_flattened_text() -> None:
     assert load_text(graph.text, WRONG / "graph.yaml").robot == graph.robot
 
 
-def test_find_misfits_needs_no_file() -> None:
+def test_unmet_requirements_needs_no_file() -> None:
     Picky = find_block("parts:Picky", WRONG)
     context = Context("picky", Clock(0.002), robot=BRUCE)
-    assert find_misfits(Picky, Picky.Params(), context) == ()
-    (misfit,) = find_misfits(Picky, Picky.Params(legs=4), context)
-    assert misfit.message == "bruce has 2 legs"
+    assert unmet_requirements(Picky, Picky.Params(), context) == ()
+    (unmet,) = unmet_requirements(Picky, Picky.Params(legs=4), context)
+    assert unmet.message == "bruce has 2 legs"

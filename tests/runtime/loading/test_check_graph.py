@@ -230,7 +230,7 @@ def test_a_crash_in_a_users_own_check_is_a_problem(tmp_path: Path) -> None:
         "    y = Output(Vector)\n"
         "    def step(self): pass\n"
         "    @classmethod\n"
-        "    def local_dimensions(cls, params, robot):\n"
+        "    def dimensions(cls, params, robot):\n"
         "        return {'n': robot.legs}\n"
     )
     (tmp_path / "graph.yaml").write_text(

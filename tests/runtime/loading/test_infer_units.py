@@ -223,5 +223,5 @@ def test_shipped_graphs_leave_no_unit_unchecked(name: str) -> None:
 
 def test_every_shipped_block_says_what_it_carries() -> None:
     for name, block in all_blocks().items():
-        carries = any(f.carried for o in block.outputs.values() for f in o.signal.fields.values())
-        assert not carries or block.carried.__func__ is not Block.carried.__func__, name
+        carries = any(f.inferred for o in block.outputs.values() for f in o.signal.fields.values())
+        assert not carries or block.infer_units.__func__ is not Block.infer_units.__func__, name

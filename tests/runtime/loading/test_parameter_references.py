@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from aloft.runtime.language.block import Block, Context, Misfit, Output
+from aloft.runtime.language.block import Block, Context, Output, UnmetRequirement
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
@@ -30,11 +30,11 @@ class Teller(Block):
     y = Output(Level, text="the height")
 
     @classmethod
-    def tells(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         assert isinstance(params, cls.Params)
         if params.height == 99.0:
             raise AloftError("99 is too much")
-        low = Misfit("nothing is below the ground", fix="height: 1 m")
+        low = UnmetRequirement("nothing is below the ground", fix="height: 1 m")
         return {"twice": 2.0 * params.height if params.height >= 0.0 else low}
 
     def step(self) -> None:
@@ -96,7 +96,7 @@ def test_a_change_of_the_teller_changes_the_told() -> None:
          f"a ({HERE}) tells no 'twise' -> {{from: a.twice}}"),
         ("{}", "{height: {from: twice}}", "there is no block ''"),
         ("{height: -1}", "{height: {from: a.twice}}",
-         "4: misfit: b.height cannot follow from a.twice: nothing is below the ground -> height: 1 m"),
+         "4: unmet-requirement: b.height cannot follow from a.twice: nothing is below the ground -> height: 1 m"),
         ("{height: {from: b.twice}}", "{height: {from: a.twice}}",
          "loop: the parameters of a -> b -> a follow from each other"),
         ("{height: {from: a.twice}}", "{}", "the parameters of a -> a follow from each other"),

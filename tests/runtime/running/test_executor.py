@@ -78,7 +78,7 @@ class Stopper(Block):
     y = Output(Vector, text="nothing")
 
     @classmethod
-    def local_dimensions(cls, params: Parameters, robot: object) -> dict[str, int]:
+    def dimensions(cls, params: Parameters, robot: object) -> dict[str, int]:
         return {"n": 1}
 
     def step(self) -> None:

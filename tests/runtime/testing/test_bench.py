@@ -29,10 +29,10 @@ class Meter(Block):
     def close(self) -> None:
         self.closed += 1
 
-    def freeze(self) -> None:
+    def save_state(self) -> None:
         self.frozen += 1
 
-    def thaw(self) -> None:
+    def load_state(self) -> None:
         self.thawed += 1
 
     def step(self) -> None:

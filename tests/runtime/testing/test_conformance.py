@@ -232,10 +232,10 @@ def test_a_block_that_remembers_in_secret() -> None:
     class Open(Secret):
         """A block."""
 
-        def freeze(self) -> None:
+        def save_state(self) -> None:
             np.copyto(self.x.value, self.memory)
 
-        def thaw(self) -> None:
+        def load_state(self) -> None:
             np.copyto(self.memory, self.x.value)
 
     assert failure(Secret, "restored") == (

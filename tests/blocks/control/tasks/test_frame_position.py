@@ -37,15 +37,15 @@ def test_it_is_the_error_of_the_origin_with_the_first_rows_of_the_jacobian():
 
 def test_its_target_is_an_input_of_the_controller_called_after_the_entry():
     link = {**KNEE, "gains": {"frame": "right_shank"}}
-    kind = WholeBodyController.fitted(
+    kind = WholeBodyController.specialize(
         WholeBodyController.Params.model_validate({"tasks": ["ContactPoints", link]}), "."
     )
     assert kind.__name__ == "WholeBodyController"
     assert set(kind.inputs) - set(WholeBodyController.inputs) == {"knee_target"}
     assert kind.inputs["knee_target"].signal is PointTarget
     again = WholeBodyController.Params.model_validate({"tasks": ["Posture", link]})
-    assert WholeBodyController.fitted(again, ".") is kind
-    assert WholeBodyController.fitted(WholeBodyController.Params(), ".") is WholeBodyController
+    assert WholeBodyController.specialize(again, ".") is kind
+    assert WholeBodyController.specialize(WholeBodyController.Params(), ".") is WholeBodyController
 
 
 def test_only_its_target_is_an_input_of_its_own():

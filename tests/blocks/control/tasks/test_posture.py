@@ -54,11 +54,13 @@ def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
     assert chosen_joints(held, PostureParameters()) == [5]
 
 
-def test_a_pattern_that_matches_no_joint_is_a_misfit():
+def test_a_pattern_that_matches_no_joint_is_an_unmet_requirement():
     entry = {"task": "Posture", "gains": {"joints": ["*_ankle", "tail"]}}
     with pytest.raises(BlockError, match="task Posture: no joint of bruce is called 'tail'; there"):
         BlockBench(WholeBodyController, {"tasks": [entry]}, robot=BRUCE)
-    assert not list(Posture.misfits(PostureParameters(posture_weight={"*_knee": 1.0}), BRUCE))
+    assert not list(
+        Posture.unmet_requirements(PostureParameters(posture_weight={"*_knee": 1.0}), BRUCE)
+    )
 
 
 def test_patterns_choose_joints_in_the_robots_order():

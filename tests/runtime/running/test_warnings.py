@@ -1,4 +1,4 @@
-"""Cautions: what a block wants the readers of its results to know."""
+"""Warnings: what a block wants the readers of its results to know."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class Waiver(Block):
     y = Output(Vector, text="nothing")
 
     @classmethod
-    def local_dimensions(cls, params: object, robot: object) -> dict[str, int]:
+    def dimensions(cls, params: object, robot: object) -> dict[str, int]:
         return {"n": 1}
 
     def step(self) -> None: ...
 
-    def cautions(self) -> list[str]:
+    def warnings(self) -> list[str]:
         return ["the check was waived"]
 
 
@@ -40,24 +40,24 @@ class Listener:
     def close(self) -> None: ...
 
 
-def test_a_caution_is_in_the_result_and_told_to_the_sinks() -> None:
+def test_a_warning_is_in_the_result_and_told_to_the_sinks() -> None:
     listener = Listener()
     result = run(checked_graph({"b0": BlockUse(Waiver, {})}, ticks=3), sinks=[listener])
     assert result.success
-    assert result.cautions == ("b0: the check was waived",)
-    assert result.to_json()["cautions"] == ["b0: the check was waived"]
-    (note,) = (note for note in listener.notes if note.kind == "caution")
+    assert result.block_warnings == ("b0: the check was waived",)
+    assert result.to_json()["block_warnings"] == ["b0: the check was waived"]
+    (note,) = (note for note in listener.notes if note.kind == "warning")
     assert (note.tick, note.level, note.text) == (0, "WARN", "b0: the check was waived")
 
 
 class Finder(Waiver):
     """Finds something out while it runs."""
 
-    def cautions(self) -> list[str]:
+    def warnings(self) -> list[str]:
         found = ["it ran"] if self.tick else []
-        return [*super().cautions(), *found]
+        return [*super().warnings(), *found]
 
 
 def test_what_a_block_has_found_out_in_the_run_is_added_once() -> None:
     result = run(checked_graph({"b0": BlockUse(Finder, {})}, ticks=3))
-    assert result.cautions == ("b0: the check was waived", "b0: it ran")
+    assert result.block_warnings == ("b0: the check was waived", "b0: it ran")

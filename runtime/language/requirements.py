@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pydantic import BaseModel
 
 from ...robots.description import RobotDescription, robot_names
-from .block import Block, Context, Misfit, Need
+from .block import Block, Context, Need, UnmetRequirement
 from .parameters import Parameters
 from .per_joint import PerJoint
 
@@ -42,13 +42,15 @@ def fix_without_robot() -> str:
     return f"robot: {first}" + (f"  # or {', '.join(others)}" if others else "")
 
 
-def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tuple[Misfit, ...]:
-    """One misfit for everything that the block needs of a robot and this robot does not have."""
+def unmet_needs(
+    block_type: type[Block], robot: RobotDescription | None
+) -> tuple[UnmetRequirement, ...]:
+    """One unmet requirement for everything that the block needs of a robot and this robot does not have."""
     if not block_type.needs:
         return ()
     if robot is None:
         return (
-            Misfit(
+            UnmetRequirement(
                 "it needs a robot, and the graph names none",
                 expected="a robot under the graph's key 'robot'",
                 found="nothing",
@@ -56,20 +58,20 @@ def unmet_needs(block_type: type[Block], robot: RobotDescription | None) -> tupl
             ),
         )
     return tuple(
-        Misfit(f"it needs a robot with {_NAMED[need]}; {robot.name} {_lack(robot, need)}")
+        UnmetRequirement(f"it needs a robot with {_NAMED[need]}; {robot.name} {_lack(robot, need)}")
         for need in block_type.needs
         if not has(robot, need)
     )
 
 
-def find_misfits(
+def unmet_requirements(
     block_type: type[Block], params: Parameters, context: Context
-) -> tuple[Misfit, ...]:
-    """All misfits between a block and the robot and graph it is in.
+) -> tuple[UnmetRequirement, ...]:
+    """All unmet requirements between a block and the robot and graph it is in.
 
     First come the entries of ``needs`` that the robot lacks. If it lacks none, there follow values
-    per joint that do not fit the robot's joints, and the misfits that ``requires`` and
-    ``requires_of_graph`` return. An error raised by the block's code is a misfit too.
+    per joint that do not fit the robot's joints, and the unmet requirements that ``requires``
+    returns. An error raised by the block's code is one too.
     """
     robot = context.robot
     unmet = unmet_needs(block_type, robot)
@@ -77,17 +79,18 @@ def find_misfits(
         return unmet
     try:
         return (
-            *(_per_joint_misfits(params, robot) if robot is not None else ()),
-            *block_type.requires(params, robot),
-            *block_type.requires_of_graph(params, context),
+            *(_per_joint_requirements(params, robot) if robot is not None else ()),
+            *block_type.requires(params, context),
         )
     except Exception as error:  # noqa: BLE001  the block's own code must not hide other problems
-        return (Misfit(f"asking what it requires failed: {type(error).__name__}: {error}"),)
+        return (
+            UnmetRequirement(f"asking what it requires failed: {type(error).__name__}: {error}"),
+        )
 
 
-def _per_joint_misfits(
+def _per_joint_requirements(
     params: BaseModel, robot: RobotDescription, prefix: str = ""
-) -> Iterator[Misfit]:
+) -> Iterator[UnmetRequirement]:
     """Patterns of ``PerJoint`` parameters that match no joint, and joints they give no value."""
     names = [joint.name for joint in robot.joints]
     for field in type(params).model_fields:
@@ -95,7 +98,7 @@ def _per_joint_misfits(
         if isinstance(value, PerJoint):
             for pattern in value.unmatched_patterns(robot):
                 near = get_close_matches(pattern, [*names, *_ends(names)], 3)
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{prefix}{field}: {robot.name} has no joint {pattern!r}",
                     parameter=f"{prefix}{field}.{pattern}",
                     expected=f"names or patterns of its joints: {', '.join(names)}",
@@ -105,14 +108,14 @@ def _per_joint_misfits(
                 )
             missing = value.joints_without_value(robot)
             if missing:
-                yield Misfit(
+                yield UnmetRequirement(
                     f"{prefix}{field} gives no value for {', '.join(missing)}",
                     parameter=f"{prefix}{field}",
                     expected="a value for every joint; '*' stands for all, and later entries win",
                     fix=f'"{missing[0]}": ...' if len(missing) == 1 else '"*": ..., first',
                 )
         elif isinstance(value, BaseModel):
-            yield from _per_joint_misfits(value, robot, f"{prefix}{field}.")
+            yield from _per_joint_requirements(value, robot, f"{prefix}{field}.")
 
 
 def _ends(names: Iterable[str]) -> tuple[str, ...]:
