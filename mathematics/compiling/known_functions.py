@@ -96,12 +96,6 @@ def _is_below_infinity(comparison: str) -> Translation:
     return write
 
 
-def _radians(factor: float) -> Translation:
-    return lambda code, arguments: code.operation(
-        "Mult", code.convert(arguments[0], FLOAT), number(factor)
-    )
-
-
 def _operation(name: str) -> Translation:
     return lambda code, arguments: code.operation(name, *arguments)
 
@@ -118,8 +112,8 @@ _MATH = _SAME | {
     "fabs": lambda code, arguments: _absolute(code, [code.convert(arguments[0], FLOAT)]),
     "log2": _function("llvm.log2.f64"), "floor": _to_whole(_FLOOR), "ceil": _to_whole(_CEILING),
     "trunc": _to_whole("llvm.trunc.f64"), "isnan": _is_nan, "isinf": _is_below_infinity("oeq"),
-    "isfinite": _is_below_infinity("olt"), "radians": _radians(math.pi / 180.0),
-    "degrees": _radians(180.0 / math.pi),
+    "isfinite": _is_below_infinity("olt"), "radians": lambda code, arguments: code.operation("Mult", arguments[0], number(math.pi / 180.0)),
+    "degrees": lambda code, arguments: code.operation("Mult", arguments[0], number(180.0 / math.pi)),
 }  # fmt: skip
 
 FUNCTIONS: dict[Any, Translation] = {

@@ -11,11 +11,12 @@ from typing import Any
 
 from .arguments import HEADER, ArgumentType, ArrayType
 from .equations import expanded_definition
+from .kernel_expressions import CompileError as CompileError  # noqa: PLC0414  also imported from here
+from .kernel_expressions import Translated
 from .kernel_registry import is_kernel, written_code
 from .llvm_code import leaves
 from .machine_code import ENTRY, optimised
-from .statements import CompileError as CompileError  # noqa: PLC0414  also imported from here
-from .statements import Translated, translate
+from .statements import translate
 
 
 class Translator:
