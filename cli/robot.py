@@ -168,6 +168,8 @@ def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, lis
 
 
 def _print_robot(out: Console, about: dict[str, Any]) -> None:
+    from ..robots.report import RATING_UNITS
+
     say(out, f"{about['name']}: {about['text']}" if about["text"] else about["name"])
     say(out, f"  {about['file']}" + (f" on {about['model_file']}" if about["model_file"] else ""))
     sizes = about["dimensions"]
@@ -177,17 +179,18 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
         f"{sizes['n_joints']} joints, {sizes['n_feet']} feet, {sizes['n_contacts']} contact points",
     )
     rows = [_link_row(link) for link in about["links"]]
-    columns = ("link", ">kg", "joint", "kind", "axis", "limits", ">stands at", ">shapes")
+    columns = ("link", ">kg", "joint", "kind", "axis", "limits rad", ">stands at", ">shapes")
     out.print(table("", columns, rows))
     rows = [
         (
             row["motor"] + _of_joints(row),
-            *(f"{row[key]:.5g}" for key in ("peak_torque", "corner_speed", "no_load_speed",
-                                           "continuous_torque", "rotor_inertia", "friction",
-                                           "damping")),
+            *(
+                f"{row[key]:.5g}" + (f" {row['units'][key]}" if row["units"][key] != unit else "")
+                for key, unit in RATING_UNITS.items()
+            ),
         )
         for row in about["motors"]
-    ]  # fmt: skip
+    ]
     columns = ("motor", ">peak N m", ">to rad/s", ">zero at rad/s", ">lasting N m",
                ">rotor kg m^2", ">friction N m", ">damping N m s")  # fmt: skip
     if rows:
@@ -214,9 +217,10 @@ def _of_joints(row: dict[str, Any]) -> str:
 def _link_row(link: dict[str, Any]) -> tuple[str, ...]:
     axis = " ".join(f"{value:.3g}" for value in link["axis"])
     limits = "none" if link["joint"] else ""
+    unit = " m" if link["unit"] == "m" else ""
     if link["limits"]:
-        limits = f"{link['limits'][0]:.4g} to {link['limits'][1]:.4g}"
-    stands = "" if link["stands_at"] is None else f"{link['stands_at']:.4g}"
+        limits = f"{link['limits'][0]:.4g} to {link['limits'][1]:.4g}{unit}"
+    stands = "" if link["stands_at"] is None else f"{link['stands_at']:.4g}{unit}"
     return (
         "  " * link["depth"] + link["link"],
         f"{link['mass_kg']:.4g}",
@@ -349,9 +353,13 @@ def _rows(
     for axis, offset in zip("xyz", body.com_offset, strict=True):
         rows.append(row(f"torso's CoM, offset {axis}", offset, 0.0, "mm", 1e3))
     for name, value in body.coulomb.items():
-        rows.append(row(f"friction of {name}", value, motors.friction[index[name]], "N m"))
+        k = index[name]
+        unit = robot.joints[k].unit("N m")
+        rows.append(row(f"friction of {name}", value, motors.friction[k], unit))
     for name, value in body.viscous.items():
-        rows.append(row(f"damping of {name}", value, motors.damping[index[name]], "N m s/rad"))
+        k = index[name]
+        unit = robot.joints[k].unit("N m s/rad")
+        rows.append(row(f"damping of {name}", value, motors.damping[k], unit))
     rows.append(row("delay from tick to torque", delay.delay, None, "ms", 1e3))
     return rows
 

@@ -50,7 +50,7 @@ def report_healthy(tick: Indices1D, base_period: float, health: RobotHealth) -> 
 
 
 _CLASSES: dict[tuple[Any, ...], type[Block]] = {}
-"""Robots with outputs for mounted sensors, by class and sensors."""
+"""Robots with outputs for mounted sensors, or without some, by class, sensors and reasons."""
 
 
 class Robot(Block, ABC):
@@ -88,7 +88,7 @@ class Robot(Block, ABC):
     although ``open`` has failed or was never called.
 
     A robot whose description says that it has no IMU, or no contact switches, publishes zeros at
-    that port; a wire from there is an error at load (``absent_outputs``).
+    that port; a wire from there is an error at load.
 
     Errors: ``open`` raises what the link raises, with the name of the device. When the link is lost
     during a run, the driver reports it by ``request_stop`` after its time-out.
@@ -110,19 +110,25 @@ class Robot(Block, ABC):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with an output for every sensor that the robot's description mounts."""
+        """The class with an output for every sensor that the robot's description mounts, and with
+        the reason at every output that the robot does not have."""
         sensors = mounted_sensors(robot, folder)
-        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors))
-        if not sensors or all(sensor.name in cls.outputs for sensor in sensors):
+        sensors = () if all(sensor.name in cls.outputs for sensor in sensors) else sensors
+        absent = {} if robot is None else cls._absent_outputs(robot)
+        if not sensors and all(cls.outputs[name].absent == why for name, why in absent.items()):
             return cls
+        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors), *absent.items())
         if key not in _CLASSES:
-            ports = cls.ports_of(sensors)
+            ports = cls.ports_of(sensors) if sensors else {}
             for name in ports:
                 if hasattr(cls, name) or not name.isidentifier():
                     raise BlockError(
                         f"sensor {name}: the output of a robot cannot be called {name!r}; give it "
                         "another name in the robot's description"
                     )
+            for name, reason in absent.items():
+                output = cls.outputs[name]
+                ports[name] = Output(output.signal, text=output.text, absent=reason)
             body = {"__doc__": cls.__doc__, "__module__": cls.__module__, **ports}
             _CLASSES[key] = type(cls.__name__, (cls,), body)
         return _CLASSES[key]
@@ -142,17 +148,15 @@ class Robot(Block, ABC):
         """The outputs of the mounted sensors, by name."""
         return {name: getattr(self, name) for name in self.robot.sensors.mounted}
 
-    @classmethod
-    def absent_outputs(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, str]:
-        """The sensors that the robot's description says it does not have."""
+    @staticmethod
+    def _absent_outputs(robot: RobotDescription) -> Mapping[str, str]:
+        """The outputs that a robot's description says it does not have, each with the reason."""
         absent: dict[str, str] = {}
-        if robot is not None and not robot.sensors.imu:
+        if not robot.sensors.imu:
             absent["imu"] = f"{robot.name} has no IMU"
-        if robot is not None and not robot.contacts:
+        if not robot.contacts:
             absent["contacts"] = f"{robot.name} has no contact points"
-        elif robot is not None and not robot.sensors.switches:
+        elif not robot.sensors.switches:
             absent["contacts"] = f"{robot.name} has no contact switches"
         return absent
 

@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+RATING_UNITS = {
+    "peak_torque": "N m", "corner_speed": "rad/s", "no_load_speed": "rad/s",
+    "continuous_torque": "N m", "rotor_inertia": "kg m^2", "friction": "N m",
+    "damping": "N m s/rad",
+}  # fmt: skip
+"""The units of a motor's ratings where it turns its joints."""
 SHAPES = {0: "point", 1: "line", 2: "flat"}
 
 
@@ -40,6 +46,7 @@ def report(read: ReadRobot) -> dict[str, Any]:
             "joint": mounted.name if mounted else "",
             "kind": mounted.kind if mounted else robot.base_joint,
             "axis": list(mounted.axis) if mounted else [],
+            "unit": mounted.unit("rad") if mounted else "",
             "limits": list(mounted.limits) if mounted and mounted.limits else None,
             "stands_at": _angle(robot, mounted.name) if mounted else None,
             "held": mounted.name in robot.held if mounted else False,
@@ -116,6 +123,7 @@ def _motors(robot: RobotDescription) -> list[dict[str, Any]]:
         rows.append({
             "motor": name,
             "joints": joints,
+            "units": {key: robot.motor_unit(k, unit) for key, unit in RATING_UNITS.items()},
             "peak_torque": float(motors.peak_torque[k]),
             "corner_speed": float(motors.corner_speed[k]),
             "no_load_speed": float(motors.no_load_speed[k]),

@@ -100,6 +100,13 @@ class Link(Part):
     shapes: tuple[Shape, ...] = ()
 
 
+SLIDE_UNITS: Mapping[str, str] = {
+    "rad": "m", "rad/s": "m/s", "rad/s^2": "m/s^2", "N m": "N", "N m s": "N s", "N m/rad": "N/m",
+    "N m s/rad": "N s/m", "kg m^2": "kg",
+}  # fmt: skip
+"""What a quantity of a joint that turns, or of its motor, is measured in where the joint slides."""
+
+
 class Joint(Part):
     """A joint from ``parent`` to ``child`` at ``origin`` [m, parent frame].
 
@@ -116,6 +123,10 @@ class Joint(Part):
     origin: Vector3
     axis: Vector3
     limits: tuple[float, float] | None = None
+
+    def unit(self, hinge: str) -> str:
+        """The unit of a quantity of this joint that a hinge has in the unit ``hinge``."""
+        return SLIDE_UNITS.get(hinge, hinge) if self.kind == "slide" else hinge
 
 
 class Foot(Part):
@@ -275,7 +286,7 @@ class RobotDescription(Part):
     """The profile in use; empty: the first."""
     sensors: Sensors = Sensors()
     standing: Mapping[str, float] = {}
-    """Joint angles [rad] by name of the pose the robot stands in. A joint that is not named is at
+    """Joint positions [rad, or m for a slide] by name of the pose the robot stands in. A joint that is not named is at
     its angle in ``held``, else at zero."""
     held: Mapping[str, float] = {}
     """Angles [rad] by name of joints that stand still while the robot is at work."""
@@ -361,15 +372,22 @@ class RobotDescription(Part):
         """Motor torque = this (n_joints, n_joints) times joint torque."""
         return np.ascontiguousarray(inverse(self.joint_to_motor).T)
 
+    def motor_unit(self, motor: int, hinge: str) -> str:
+        """As ``Joint.unit``, for a motor; one that moves slides only has their units."""
+        gears = self.joint_to_motor[motor].tolist()
+        units = {j.unit(hinge) for j, gear in zip(self.joints, gears, strict=True) if gear}
+        return units.pop() if len(units) == 1 else hinge
+
     @cached_property
     def standing_position(self) -> NDArray[np.float64]:
-        """The standing pose's joint angles [rad], (n_joints,)."""
+        """The joints' positions in the standing pose [rad, or m for a slide], (n_joints,)."""
         angles = {**self.held, **self.standing}
         return np.array([angles.get(joint.name, 0.0) for joint in self.joints])
 
     @cached_property
     def joint_limits(self) -> NDArray[np.float64]:
-        """Lower and upper joint limits [rad], (n_joints, 2); infinite where there are none."""
+        """Lower and upper joint limits [rad, or m for a slide], (n_joints, 2); infinite where there are
+        none."""
         free = (-np.inf, np.inf)
         return np.array([j.limits or free for j in self.joints]).reshape(-1, 2)
 

@@ -88,7 +88,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "ros2",
+        "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),

@@ -286,17 +286,19 @@ def check_limits(robot: RobotDescription, columns: dict[str, Array]) -> None:
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles).max(axis=0)
     worst = int(excess.argmax())
     if excess[worst] > 0.0:
+        joint = robot.joints[worst]
         raise BlockError(
-            f"this motion takes {robot.joints[worst].name} {excess[worst]:.3f} rad past its limit; "
+            f"this motion takes {joint.name} {excess[worst]:.3f} {joint.unit('rad')} past its limit; "
             + hint
         )
     speeds = np.abs(columns["joint_velocity"] @ robot.joint_to_motor.T).max(axis=0)
     most = robot.motors.no_load_speed
     worst = int((speeds - most).argmax())
     if speeds[worst] > most[worst]:
+        unit = robot.motor_unit(worst, "rad/s")
         raise BlockError(
-            f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} rad/s, "
-            f"but {robot.motors.profile} reaches {most[worst]:.1f} rad/s; {hint}"
+            f"this motion turns {robot.transmission.motors[worst]} at {speeds[worst]:.1f} {unit}, "
+            f"but {robot.motors.profile} reaches {most[worst]:.1f} {unit}; {hint}"
         )
 
 

@@ -30,7 +30,11 @@ class ImuReading(Signal):
 
 
 class JointState(Signal):
-    """What the joint encoders and drives report."""
+    """What the joint encoders and drives report.
+
+    A field has one unit. In all arrays with an element for each joint it is that of joints that turn; the
+    element of a joint that slides is in m for rad, m/s for rad/s and N for N m.
+    """
 
     position = Field("n_joints", unit="rad", text="joint angles")
     velocity = Field("n_joints", unit="rad/s", text="joint velocities")
@@ -128,7 +132,10 @@ class RobotHealth(Signal):
 
 
 class JointCommand(Signal):
-    """What the drives execute: mode, feedforward torque, joint targets and gains."""
+    """What the drives execute: mode, feedforward torque, joint targets and gains.
+
+    Units as in ``JointState``: the gains of a joint that slides are in N/m and N s/m.
+    """
 
     mode = Field(dtype="int64", values=CommandMode, text="see CommandMode")
     torque = Field("n_joints", unit="N m", text="feedforward joint torques")

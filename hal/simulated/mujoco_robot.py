@@ -48,7 +48,8 @@ class MujocoRobot(SimulatedRobot):
     Joints without a working motor are kept in the standing pose until the run begins. A fixed base
     is at the world's origin from the start, and a robot without feet lies on its lowest shape.
 
-    For a slide, metres and newtons stand for radians and newton metres in every parameter.
+    For a joint that slides, metres and newtons stand for radians and newton metres in every parameter
+    and signal.
 
     All random numbers follow from ``seed``. Every disturbance has a stream of its own, so setting
     one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.

@@ -172,12 +172,6 @@ class SimulatedRobot(Robot, ABC):
         return {**super().ports_of(sensors), "sensor_memory": memory}
 
     @classmethod
-    def terrain(cls, params: Parameters) -> Terrain | None:
-        """The scene's floor and boxes."""
-        assert isinstance(params, SimulatorParameters)
-        return params.build_scene()
-
-    @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """The number of named points that a force may act at; the seed is not a dimension."""
         return {"n_points": len(robot.points) if robot is not None else 0}

@@ -311,7 +311,10 @@ class StartCheck:
         for k, peak in enumerate(robot.motors.peak_torque.tolist()):
             if peak > 0.0 and float(needed[k]) > peak:
                 name, wanted = robot.transmission.motors[k], float(needed[k])
-                found.append(f"motor {name} has {peak:.3g} N m and would need {wanted:.3g} N m")
+                unit = robot.motor_unit(k, "N m")
+                found.append(
+                    f"motor {name} has {peak:.3g} {unit} and would need {wanted:.3g} {unit}"
+                )
         return _some(found)
 
     def _unloaded(self, load: Array) -> list[str]:

@@ -13,7 +13,7 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.language.terrain import Terrain
+from ...runtime.language.terrain import SupportsScene, Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 from .surroundings import contents, digests, files_read, parameter_files, project_state
@@ -76,7 +76,7 @@ def make_header(
         blocks=tuple(_block(spec) for spec in graph.blocks),
         order=graph.order,
         robot=graph.robot,
-        terrain=next((found for spec in graph.blocks if (found := terrain_of(spec))), None),
+        terrain=terrain_of(graph),
         files=digests(files),
         contents=contents(files),
         project=project_state(Path(graph.file).parent) if graph.file else "",
@@ -84,9 +84,10 @@ def make_header(
     )
 
 
-def terrain_of(spec: BlockSpec) -> Terrain | None:
-    """The ground that a block knows of."""
-    return spec.block_type.terrain(spec.params)
+def terrain_of(graph: CheckedGraph) -> Terrain | None:
+    """The ground of the first block that has a world."""
+    scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, SupportsScene))
+    return next((params.build_scene() for params in scenes), None)
 
 
 def _block(spec: BlockSpec) -> RecordedBlock:

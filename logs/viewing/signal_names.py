@@ -64,6 +64,12 @@ def element_names(field: RecordedField, robot: RobotDescription | None) -> list[
         for size, length in zip(field.dimensions, field.shape, strict=True)
     ]
     names = [" ".join(parts) for parts in product(*axes)]
+    if len(axes) == 1 and field.unit and robot is not None:
+        units = [unit_of_element(field, robot, k) for k in range(len(names))]
+        names = [
+            name if unit == field.unit else f"{name} [{unit}]"
+            for name, unit in zip(names, units, strict=True)
+        ]
     return names if len(axes) == 1 or len(names) <= MOST_NAMES else []
 
 
@@ -75,11 +81,24 @@ def unit_of(field: RecordedField) -> str:
 
 
 def unit_of_element(field: RecordedField, robot: RobotDescription | None, element: int) -> str:
-    """The unit of one element of a field, given by its place in C order."""
+    """The unit of one element of a field, given by its place in C order.
+
+    A field has one unit for all joints, which is that of those that turn; of a joint that slides, and of
+    a motor that moves it, m stands for rad and N for N m.
+    """
     unit = unit_of(field)
-    if robot is None or field.unit or not is_generalised(field) or ", " not in unit:
+    if robot is None:
+        return unit
+    if tuple(field.dimensions) == ("n_joints",) and element < len(robot.joints):
+        of_motor = "motor" in field.field_name
+        joint = robot.joints[element]
+        return robot.motor_unit(element, unit) if of_motor else joint.unit(unit)
+    if field.unit or not is_generalised(field) or ", " not in unit:
         return unit
     moves = {"floating": 3, "planar": 2, "fixed": 0}[robot.base_joint]
+    joint_number = element - len(BASE_NAMES[robot.base_joint])
+    if joint_number >= 0:
+        return robot.joints[joint_number].unit(unit.split(", ")[1])
     return unit.split(", ")[0 if element < moves else 1]
 
 

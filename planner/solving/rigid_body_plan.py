@@ -126,11 +126,11 @@ class WholeBodyPose:
         missed = float(np.abs(np.array(self._errors(q, given)[0])).max())
         over = np.maximum(q[6:] - limits[:, 1], limits[:, 0] - q[6:])
         if missed > 1e-8 or over.max() > 0.0:
-            joint = self.model.robot.joints[int(over.argmax())].name
+            joint = self.model.robot.joints[int(over.argmax())]
             raise PlanError(
                 "the legs cannot follow the single rigid body: "
                 + (f"a foot is missed by {missed:.2g} m" if missed > 1e-8 else
-                   f"{joint} would pass its limit by {over.max():.2g} rad")
+                   f"{joint.name} would pass its limit by {over.max():.2g} {joint.unit('rad')}")
                 + "; ask for a smaller jump, or use formulation: full",
                 family="leg length", violation=max(missed, float(over.max())),
             )  # fmt: skip

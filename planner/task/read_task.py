@@ -139,17 +139,16 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
         there = ", ".join(robot.profiles)
         yield "profile", f"{robot.name} has no actuator profile {task.profile!r}; there is {there}"
     joints = dict(zip((j.name for j in robot.joints), robot.joint_limits.tolist(), strict=True))
+    units = {joint.name: joint.unit("rad") for joint in robot.joints}
     for key, given in (("initial", task.initial), ("final", task.final)):
         for name, angle in given.items():
             if name not in joints:
                 near = ", ".join(nearest(name, joints) or joints)
                 yield f"{key}.{name}", f"{robot.name} has no joint {name}; the nearest is {near}"
             elif not joints[name][0] <= angle <= joints[name][1]:
-                low, high = joints[name]
-                yield (
-                    f"{key}.{name}",
-                    f"{angle:.4g} rad is outside the joint's limits, {low:.4g} to {high:.4g} rad",
-                )
+                (low, high), unit = joints[name], units[name]
+                limits = f"{low:.4g} to {high:.4g} {unit}"
+                yield f"{key}.{name}", f"{angle:.4g} {unit} is outside the joint's limits, {limits}"
     if task.margins is not None:
         for name in unknown_joints(task.margins, list(joints)):
             short = sorted({joint.partition("_")[2] for joint in joints} | set(joints))

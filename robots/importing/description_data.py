@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from ..robot_description import Joint, Link, RobotDescription
+from ...files.problems import listing
+from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
 from ..validation import RobotFault
-from ..validation.faults import listing, nearest
+from ..validation.faults import nearest
 from ..validation.find_faults import shown
 from .build import BodyFrame, LinkTree, build, tidy
 from .looks import link_looks
@@ -239,10 +240,14 @@ def rated_profile(
     values = {name: _values(joint, is_urdf) for name, joint in joints.items()}
     efforts = [n for n, j in joints.items() if math.isnan(j.effort) or (is_urdf and j.effort <= 0)]
     speeds = [n for n, j in joints.items() if not j.speed > 0 and values[n]["peak_torque"] > 0]
-    if efforts:
-        notes.append(f"no effort limit of {listing(efforts, 6)}: {EFFORT:g} N m is assumed")
-    if speeds:
-        notes.append(f"no speed limit of {listing(speeds, 6)}: {SPEED:g} rad/s is assumed")
+    for what, missing, value, hinge in (
+        ("effort", efforts, EFFORT, "N m"), ("speed", speeds, SPEED, "rad/s"),
+    ):  # fmt: skip
+        slides = [name for name in missing if joints[name].kind == "slide"]
+        turning = [name for name in missing if name not in slides]
+        for names, unit in ((turning, hinge), (slides, SLIDE_UNITS[hinge])):
+            if names:
+                notes.append(f"no {what} limit of {listing(names, 6)}: {value:g} {unit} is assumed")
     driven = [value for value in values.values() if value["peak_torque"] > 0] or [
         {**dict.fromkeys(KEYS, 0.0), "peak_torque": EFFORT, "continuous_torque": EFFORT,
          "corner_speed": CORNER * SPEED, "no_load_speed": SPEED}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
 
-from ..robot_description import ActuatorProfile, MotorRating, Transmission
-from .faults import Draft, Path, listing, nearest, number, read
+from ...files.problems import listing
+from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Transmission
+from .faults import Draft, Path, nearest, number, read
 
 LARGEST_CONDITION = 1e8
 """The largest condition number of a transmission; beyond it motor torques are rounding errors."""
@@ -37,7 +38,20 @@ def check_actuation(draft: Draft) -> None:
     for name, value in profiles.items():
         profile = read(ActuatorProfile, value)
         if profile is not None:
-            _check_profile(draft, name, profile, motors)
+            slides = _sliding_motors(draft, transmission) if transmission else frozenset()
+            _check_profile(draft, name, profile, motors, slides)
+
+
+def _sliding_motors(draft: Draft, transmission: Transmission) -> frozenset[str]:
+    """The motors that move slides only, whose torques are forces."""
+    kinds = [
+        joint.get("kind") for joint in draft.data.get("joints") or () if isinstance(joint, Mapping)
+    ]
+    moved = (
+        (motor, {kind for kind, gear in zip(kinds, row, strict=False) if gear})
+        for motor, row in zip(transmission.motors, transmission.joint_to_motor, strict=False)
+    )
+    return frozenset(motor for motor, of in moved if of == {"slide"})
 
 
 def _check_transmission(draft: Draft, transmission: Transmission) -> None:
@@ -86,21 +100,38 @@ def _check_transmission(draft: Draft, transmission: Transmission) -> None:
 
 
 def _check_profile(
-    draft: Draft, name: str, profile: ActuatorProfile, motors: tuple[str, ...]
+    draft: Draft,
+    name: str,
+    profile: ActuatorProfile,
+    motors: tuple[str, ...],
+    slides: frozenset[str],
 ) -> None:
     whole: Path = ("profiles", name)
-    _check_rating(draft, whole, f"profile {name}", profile, profile, passive=False)
+    units = _units(motors, slides)
+    _check_rating(draft, whole, f"profile {name}", profile, profile, units, passive=False)
     for pattern, rating in profile.motors.items():
         path = (*whole, "motors", pattern)
-        if motors and not any(fnmatchcase(motor, pattern) for motor in motors):
+        rated = [motor for motor in motors if fnmatchcase(motor, pattern)]
+        if motors and not rated:
             right = nearest(pattern, motors)
             draft.add(
                 path, f"profile {name}: no motor is called {pattern}", listing(motors), pattern,
                 f"{right}:" if right else "",
             )  # fmt: skip
-        _check_rating(
-            draft, path, f"profile {name}, motors {pattern}", rating, profile, passive=True
-        )
+        units = _units(rated, slides)
+        owner = f"profile {name}, motors {pattern}"
+        _check_rating(draft, path, owner, rating, profile, units, passive=True)
+
+
+def _units(motors: Sequence[str], slides: frozenset[str]) -> Mapping[str, str]:
+    """The units of torque and speed of these motors, by those of one that turns its joints."""
+    found = {}
+    for hinge in ("N m", "rad/s"):
+        slide = SLIDE_UNITS[hinge]
+        some = any(motor in slides for motor in motors)
+        mixed = f"{hinge} ({slide} for a slide)" if some else hinge
+        found[hinge] = slide if some and all(motor in slides for motor in motors) else mixed
+    return found
 
 
 def _check_rating(
@@ -109,6 +140,7 @@ def _check_rating(
     owner: str,
     rating: ActuatorProfile | MotorRating,
     profile: ActuatorProfile,
+    units: Mapping[str, str],
     *,
     passive: bool,
 ) -> None:
@@ -119,7 +151,7 @@ def _check_rating(
         zero = key == "corner_speed" or (passive and key.endswith("torque"))
         if value is None or value > 0.0 or (zero and value == 0.0):
             continue
-        unit = "N m" if key.endswith("torque") else "rad/s"
+        unit = units["N m" if key.endswith("torque") else "rad/s"]
         expected = f"a number of {unit} from 0" if zero else f"a positive number of {unit}"
         fix = f"{key}: {number(-value)}" if value < 0.0 else ""
         draft.add(
@@ -145,6 +177,6 @@ def _check_rating(
         draft.add(
             (*path, "corner_speed" if rating.corner_speed is not None else "no_load_speed"),
             f"{owner}: the torque falls from corner_speed to no_load_speed, which is not above it",
-            f"corner_speed below {number(free)} rad/s", number(corner),
+            f"corner_speed below {number(free)} {units['rad/s']}", number(corner),
             f"corner_speed: {number(0.6 * free)}",
         )  # fmt: skip

@@ -43,7 +43,6 @@ from .parameters import Parameters
 from .quantities import InputQuantities, OutputQuantities
 from .signals import Signal
 from .steps import PythonCall, declare_steps
-from .terrain import Terrain
 
 S = TypeVar("S", bound=Signal)
 Metric = float | int | bool | str
@@ -112,11 +111,16 @@ class Output(Port[S]):
     Args:
         truth: only a simulator knows this signal. A controller that reads it would not work on a
             robot, so a wire from this output needs ``allow: truth`` in the graph.
+        absent: why the block cannot have this output with its robot, such as ``go2 has no IMU``; see
+            ``Block.specialize``. It holds zeros, and a wire from it is reported at load.
     """
 
-    def __init__(self, signal: type[S], *, text: str = "", truth: bool = False) -> None:
+    def __init__(
+        self, signal: type[S], *, text: str = "", truth: bool = False, absent: str = ""
+    ) -> None:
         super().__init__(signal, text=text)
         self.truth = truth
+        self.absent = absent
 
 
 class State(Port[S]):
@@ -275,17 +279,6 @@ class Block:
         return {}
 
     @classmethod
-    def absent_outputs(
-        cls, params: Parameters, robot: RobotDescription | None
-    ) -> Mapping[str, str]:
-        """Outputs that the block cannot have with these parameters and this robot, with the reason.
-
-        Such an output keeps its place in memory and holds zeros. A wire from it is reported at load
-        with the reason, such as ``go2 has no IMU``. This is called when ``requires`` is.
-        """
-        return {}
-
-    @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """The units and frames of outputs whose fields are declared as ``inferred``.
 
@@ -306,11 +299,6 @@ class Block:
         memory and not when it is checked.
         """
         return {}
-
-    @classmethod
-    def terrain(cls, params: Parameters) -> Terrain | None:
-        """The ground of the block's world, if it has one; recordings draw it."""
-        return None
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
@@ -369,23 +357,15 @@ class Block:
     def prepare(self) -> None:
         """Write into ``constants`` what follows from the parameters.
 
-        Called after ``setup``, and again between two ticks when live parameters have changed. It
-        writes neither state nor outputs. If it raises, the old parameters are restored, and the
-        change is refused with the error's text.
+        Called after ``setup``, and again between two ticks, on the control thread, when live
+        parameters have changed. Afterwards the block must go on exactly as one that had these
+        parameters from the start and is in the same state, so it writes neither state nor outputs.
+        If it raises, the old parameters are restored, and the change is refused with the error's
+        text.
         """
 
     def on_event(self) -> None:
         """Do in Python what the last step asked for by returning true."""
-
-    def on_parameters(self) -> None:
-        """Take over live parameters that have changed in ``self.params``, between two ticks.
-
-        It recomputes whatever ``setup`` derived from the parameters; ``setup`` may call it for
-        that. Afterwards the block must go on exactly as one that had these parameters from the
-        start and is in the same state, so this method writes neither state nor outputs. It runs on
-        the control thread. If it raises, the old parameters are restored, and the change is refused
-        with the error's text.
-        """
 
     def start(self) -> None:
         """Open the devices and files that the run needs; called once before the first tick."""

@@ -36,7 +36,7 @@ def parameter(
     """Declare a parameter: its default, unit, bounds and text. Without a default it is required.
 
     ``live`` parameters may be changed while the graph runs: the block reads them from
-    ``self.params`` in every tick, or recomputes what depends on them in ``Block.on_parameters``.
+    ``self.params`` in every tick, or recomputes what depends on them in ``Block.prepare``.
     """
     extra: dict[str, Any] = {"unit": unit, **({"live": True} if live else {})}
     if default is not ... and isinstance(default, list):

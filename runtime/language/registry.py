@@ -31,18 +31,6 @@ PACKAGES = ("blocks", "hal", "ros2", "fmi")
 ENTRY_POINTS = "aloft.blocks"
 """The group in which other packages announce blocks."""
 
-MOVED = {
-    "hal.JumpScore": "blocks.JumpScore",
-    "hal.EstimatorScore": "blocks.EstimatorScore",
-    "runtime.Constant": "blocks.Constant",
-    "runtime.Gain": "blocks.Gain",
-    "runtime.Integrator": "blocks.Integrator",
-    "runtime.SineWave": "blocks.SineWave",
-    "runtime.Sum": "blocks.Sum",
-    "runtime.UnitDelay": "blocks.UnitDelay",
-}
-"""The names of blocks before version 0.2, and their names now."""
-
 _OURS = __name__.rpartition(".runtime.")[0]
 _ROOT = Path(__file__).parents[2]
 
@@ -105,8 +93,6 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
         module = _own_module(package, class_name)
         if module is not None:
             return _class_of(module, class_name, name)
-    if name in MOVED:
-        raise UnknownBlockError(f"{name} has been called {MOVED[name]} since version 0.2")
     point = _entry_points().get(name)
     if point is not None:
         module_name, _, class_name = point.partition(":")
@@ -176,8 +162,6 @@ def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tupl
     A name of the form ``module:Class`` means a user's own block, so a block of aloft is proposed
     only if its class has almost the same name.
     """
-    if name in MOVED:
-        return (MOVED[name],)
     package, class_name = _parts(name)
     own = ":" in name
     candidates = [(each, 0.85 if own else 0.6) for each in known_names()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True)
@@ -29,3 +30,11 @@ class Terrain:
             if top > height and x0 <= x <= x1 and y0 <= y <= y1:
                 height = top
         return height
+
+
+@runtime_checkable
+class SupportsScene(Protocol):
+    """Parameters of a block whose world has ground; recordings draw it."""
+
+    def build_scene(self) -> Terrain:
+        """The ground that these parameters describe."""

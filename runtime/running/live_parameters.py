@@ -81,7 +81,6 @@ class LiveParameters:
     def _take_over(self, block: Block) -> None:
         with collect_calls() as calls:
             refresh_parameters(block)
-            block.on_parameters()
             block.prepare()
         if self.compile is not None and calls:
             self.compile(calls)

@@ -270,7 +270,7 @@ def _live_parameters(subject: Subject) -> None:
         parameters.compile = compile_calls
         parameters.apply(Adjustment({path: params}, ()), WARM_UP)
         after = changed.snapshot()
-        subject.expect(before == after, f"on_parameters() writes state or outputs, for {name!r}")
+        subject.expect(before == after, f"prepare() writes state or outputs, for {name!r}")
         fresh = replace(subject, params=given).bench()
         fresh.restore(after)
         pairs = zip(subject.trace(changed, seed=1), subject.trace(fresh, seed=1), strict=True)
@@ -278,7 +278,7 @@ def _live_parameters(subject: Subject) -> None:
             subject.expect(
                 one == other,
                 f"{name!r} is live, but {tick + 1} ticks after a change the block differs from "
-                "one that had the new value from the start; derive anew in on_parameters()",
+                "one that had the new value from the start; derive anew in prepare()",
             )
 
 

@@ -54,10 +54,18 @@ def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert about["success"] and about["name"] == "cartpole" and about["base_joint"] == "fixed"
     assert [link["joint"] for link in about["links"]] == ["", "slider", "hinge"]
     assert about["links"][1]["limits"] == [-1.0, 1.0] and about["links"][2]["limits"] is None
+    assert [link["unit"] for link in about["links"]] == ["", "m", "rad"]
     assert about["motors"][0]["peak_torque"] == 10.0 and about["feet"] == []
+    assert about["motors"][0]["units"]["peak_torque"] == "N"
+    assert about["motors"][1]["units"]["peak_torque"] == "N m"
+    lines = [line.split() for line in run_here("robot", "show", "cart.xml").stdout.splitlines()]
+    (joint,) = (line for line in lines if "slide" in line)
+    assert joint[-7:] == ["-1", "to", "1", "m", "0", "m", "1"]
+    (motor,) = (line for line in lines if line[:1] == ["slider"])
+    assert motor[1:7] == ["10", "N", "12", "m/s", "20", "m/s"]
     assert about["sensors"] == {"encoders": 2, "imu": False, "switches": 0, "mounted": {}}
     assert about["missing"] == [
-        "no speed limit of slider: 20 rad/s is assumed",
+        "no speed limit of slider: 20 m/s is assumed",
         "rotor inertia is zero; write rotor_inertia under profiles",
     ]
 

@@ -152,7 +152,7 @@ def test_yaw_and_tilt_of_a_turn_then_a_lean(heading):
 
 
 @pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
-@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (-0.2, 0.5)])
+@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.2, 0.5)])
 def test_pitch_is_the_angle_of_the_x_axis_about_the_bodys_y_axis(pitch, other):
     roll, yaw = other
     about_y = np.array([0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2)])

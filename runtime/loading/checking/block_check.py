@@ -26,8 +26,7 @@ from .settings import Settings
 class BlockDraft:
     """A block while it is checked.
 
-    ``complete`` is true if all its dimensions are known. ``absent`` holds the outputs that it
-    cannot have with the graph's robot, each with the reason.
+    ``complete`` is true if all its dimensions are known.
     """
 
     flat: FlatBlock
@@ -35,7 +34,6 @@ class BlockDraft:
     params: Parameters | None = None
     dimensions: Mapping[str, int] = field(default_factory=dict)
     complete: bool = False
-    absent: Mapping[str, str] = field(default_factory=dict)
     quantities: dict[str, Quantity] = field(default_factory=dict)
     """Unit and frame of every output, by ``port.field``; those of blocks that take any are there
     once ``infer_quantities`` has been called."""
@@ -124,12 +122,8 @@ def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
     return bool(unmet_needs(draft.block_type, settings.robot))
 
 
-def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapping[str, str]:
-    """Report every unmet requirement of one block, whose parameters have been checked.
-
-    Returns:
-        The outputs that this robot cannot have, each with the reason.
-    """
+def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> None:
+    """Report every unmet requirement of one block, whose parameters have been checked."""
     assert draft.block_type is not None and draft.params is not None
     flat = draft.flat
     context = Context(
@@ -143,10 +137,8 @@ def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> Mapp
         folder=flat.folder,
         graph_folder=settings.folder,
     )
-    unmet = unmet_requirements(draft.block_type, draft.params, context)
-    for requirement in unmet:
+    for requirement in unmet_requirements(draft.block_type, draft.params, context):
         report_requirement(draft, requirement, problems)
-    return {} if unmet else draft.block_type.absent_outputs(draft.params, settings.robot)
 
 
 def report_requirement(

@@ -109,7 +109,7 @@ def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Prob
     if draft.complete:
         check_defaults(draft, problems)
     if settings.robot_known:
-        draft.absent = check_fit(draft, settings, problems)
+        check_fit(draft, settings, problems)
     return draft
 
 

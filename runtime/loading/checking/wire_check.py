@@ -111,8 +111,8 @@ class WireCheck:
                 if nearby
                 else allowed,
             )
-        reason = source.absent.get(wire.source_port)
-        if reason is not None:
+        reason = source.outputs[wire.source_port].absent
+        if reason:
             self.problems.add(
                 Code.UNMET_REQUIREMENT,
                 f"{at} reads {wire.source}, which is not there: {reason}",
@@ -236,7 +236,7 @@ class WireCheck:
                 continue
             for name, output in source.outputs.items():
                 path = f"{source.flat.path}.{name}"
-                if path in taken or name in source.absent:
+                if path in taken or output.absent:
                     continue
                 same = output.signal is port.signal
                 if not same and len(other) == 3:

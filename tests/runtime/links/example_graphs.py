@@ -35,7 +35,7 @@ class Failing(Block):
     u = Input(Read)
     y = Output(Number)
 
-    def on_parameters(self) -> None:
+    def prepare(self) -> None:
         if self.params.factor == 7.0:
             raise BlockError("seven is refused")
 

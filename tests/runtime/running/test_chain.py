@@ -68,9 +68,8 @@ class Smooth(KernelBlock):
 
     def setup(self) -> None:
         self.attended: list[int] = []
-        self.on_parameters()
 
-    def on_parameters(self) -> None:
+    def prepare(self) -> None:
         """The calls are made anew, which a chain must notice."""
         gain, limit = np.array([self.params.gain]), self.params.limit
         self.event = np.zeros(1, np.int64)

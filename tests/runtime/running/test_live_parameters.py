@@ -29,10 +29,7 @@ class Picky(Block):
     params: Params
     y = Output(Vector, text="half of it")
 
-    def setup(self) -> None:
-        self.on_parameters()
-
-    def on_parameters(self) -> None:
+    def prepare(self) -> None:
         if self.params.even % 2:
             raise BlockError(f"{self.params.even} is odd")
         self._half = self.params.even // 2

@@ -258,22 +258,22 @@ def test_a_block_that_does_not_take_over_a_live_parameter() -> None:
     class Fresh(Tuned):
         """A block."""
 
-        def on_parameters(self) -> None:
+        def prepare(self) -> None:
             self.half = np.array(self.params.gain)
 
     class Meddling(Fresh):
         """A block."""
 
-        def on_parameters(self) -> None:
-            super().on_parameters()
+        def prepare(self) -> None:
+            super().prepare()
             self.x.value[...] = 0.0
 
     assert failure(Tuned, "live parameters") == (
         "Tuned: 'gain' is live, but 1 ticks after a change the block differs from one that had "
-        "the new value from the start; derive anew in on_parameters()"
+        "the new value from the start; derive anew in prepare()"
     )
     assert failure(Meddling, "live parameters") == (
-        "Meddling: on_parameters() writes state or outputs, for 'gain'"
+        "Meddling: prepare() writes state or outputs, for 'gain'"
     )
     check_block(Fresh, cases=["live parameters"])
 
