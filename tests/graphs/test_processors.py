@@ -34,7 +34,7 @@ def run_for(processor: str, folder: Path | None) -> str:
 
 def run_with(changed: dict[str, str], graph: str) -> list[str]:
     """The processor of the kernels and the hash of a run, with those variables set."""
-    ours = ("NUMBA", "OPENBLAS_CORETYPE")
+    ours = ("ALOFT_CPU", "OPENBLAS_CORETYPE")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
     command = [sys.executable, "-c", RUN, str(ROOT / "graphs" / graph)]
     found = subprocess.run(
