@@ -444,21 +444,30 @@ class _Rewriter(Expressions):
         left, right = self._kind(node.left), self._kind(node.right)
         assert isinstance(left, ArrayKind) and isinstance(right, ArrayKind)
         own = left.rank - 1
-        j = ast.Name(self._name("j"), ast.Load())
         total = self._name("sum")
-        outer, self._ahead = self._ahead, []
-        a = self._element(copy.deepcopy(node.left), [*places[:own], j])
-        b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
-        product = ast.BinOp(a, ast.Mult(), b)
-        within = [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
+        outer = self._ahead
+
+        def term(j: ast.expr) -> list[ast.stmt]:
+            self._ahead = []
+            a = self._element(copy.deepcopy(node.left), [*places[:own], j])
+            b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
+            product = ast.BinOp(a, ast.Mult(), b)
+            return [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
+
+        statements: list[ast.stmt] = [ast.Assign([ast.Name(total, ast.Store())], ast.Constant(0.0))]
+        if any(isinstance(each, ast.Name) and each.id in self._products for each in ast.walk(node)):
+            # a cross product is three numbers, which no index finds
+            statements += [each for k in range(3) for each in term(ast.Constant(k))]
+        else:
+            size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
+            if size is None:
+                raise self._error(node, "the length of this product is not known")
+            j = self._name("j")
+            within = term(ast.Name(j, ast.Load()))
+            called = _called("range", size, node)
+            statements.append(ast.For(ast.Name(j, ast.Store()), called, within, [], None))
         self._ahead = outer
-        assert self._ahead is not None
-        size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
-        if size is None:
-            raise self._error(node, "the length of this product is not known")
-        begin = ast.Assign([ast.Name(total, ast.Store())], ast.Constant(0.0))
-        loop = ast.For(ast.Name(j.id, ast.Store()), _called("range", size, node), within, [], None)
-        for statement in (begin, loop):
+        for statement in statements:
             for each in ast.walk(statement):
                 if not hasattr(each, "lineno"):
                     ast.copy_location(each, node)
