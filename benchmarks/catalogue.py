@@ -16,6 +16,7 @@ import numpy as np
 from .agreement import agreement
 from .driver import driver
 from .frontier.frontier import frontier
+from .general_blocks import general_blocks
 from .jumps.jumps import jumps
 from .links.link_delays import link_delays
 from .links.links import links
@@ -32,6 +33,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,
+    "general_blocks": general_blocks,
     "planner": planner,
     "recorder": recorder,
     "links": links,
