@@ -17,20 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..blocks.control.whole_body_controller import WholeBodyController
-from ..blocks.control.whole_body_program import WholeBodyProgram, rows_without_pyramids
 from ..mathematics.active_set import INFEASIBLE
 from ..mathematics.arrays import Array, Flags, Indices
 from ..mathematics.compiling.compile_calls import compile_calls
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.quadratic_program import SOLVED as CLARABEL_SOLVED
-from ..mathematics.quadratic_program import ConeProgramSolver
-from ..mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
-from ..mathematics.whole_body_qp import RigidBodyTerms, TaskRows, joint_torque
-from ..mathematics.whole_body_solution import SOLVED, WholeBodySolution
+from ..mathematics.quadratic_program import Clarabel, cone_rows
+from ..mathematics.whole_body_cones import PLANES, cone_memory, solve_with_cones
+from ..mathematics.whole_body_qp import SOLVED, RigidBodyTerms, TaskRows, WholeBodySolution
+from ..mathematics.whole_body_reduction import reduce_program, reduction_memory
+from ..mathematics.whole_body_solution import active_set_program, solve_with_pyramids
 from ..runtime.graph import load
 from ..runtime.loading.reading.files import FOLDER
 from ..runtime.running.executor import Executor
 from ..runtime.running.memory import BoundGraph
+from .full_program import FullMatrices, FullProgram, rows_without_pyramids
 from .rows import Row
 
 Long = NDArray[np.longdouble]
@@ -51,7 +52,7 @@ class Proposal(NamedTuple):
     places: Indices
 
 
-def proved_minimum(program: WholeBodyProgram, proposal: Proposal, friction: float) -> Array | None:
+def proved_minimum(program: FullMatrices, proposal: Proposal, friction: float) -> Array | None:
     """The minimiser, or ``None`` if the proposal is not right.
 
     Args:
@@ -365,43 +366,51 @@ class Methods:
         self._solution = WholeBodySolution(
             np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
         )
-        arguments = block._solve.arguments
-        self._own = KernelCall(block._solve.kernel, *arguments[:-1], self._solution)
+        self.full, program = FullProgram(block), block._program
+        reduction = reduction_memory(n, contacts)
+        self._active_set = active_set_program(n, contacts)
+        planes = active_set_program(n, contacts, PLANES)
+        self._reduce = KernelCall(reduce_program, program, reduction, self._solution)
+        self._own = KernelCall(
+            solve_with_pyramids, program, reduction, self._active_set, self._solution
+        )
         self._cones = KernelCall(
-            solve_whole_body_cones, *arguments[:-2], cone_solution_memory(n, contacts),
-            self._solution,
-        )  # fmt: skip
-        refused = compile_calls([self._own, self._cones])
+            solve_with_cones, program, reduction, cone_memory(contacts), planes, self._solution
+        )
+        refused = compile_calls([self.full.limit, self._reduce, self._own, self._cones])
         if refused:
             raise AssertionError(f"the kernels are not compiled: {refused}")
-        self._clarabel = ConeProgramSolver(CLARABEL_TOLERANCE)
-        self._coarser = ConeProgramSolver()
-        self._force, self._product = np.zeros((contacts, 3)), np.zeros(n - 6)
+        self._clarabel = Clarabel(CLARABEL_TOLERANCE)
+        self._coarser = Clarabel()
+
+    def solve(self, call: KernelCall) -> None:
+        """Reduce the present program and solve it by ``_own`` or ``_cones``."""
+        self._reduce.run()
+        call.run()
 
     def compare(self, states: Iterable[State]) -> Found:
         """Solve all programs."""
         found = Found()
         for state in states:
             show_state(self._block, state)
-            self._block._limit.run()
+            self.full.limit.run()
             active = np.flatnonzero(state.stance)
-            program = self._block._other.assemble(active)
+            program = self.full.assemble(active)
             found.programs += 1
             self._pyramids(found, program, active)
             self._round(found, program, active, state.friction)
         return found
 
-    def _pyramids(self, found: Found, program: WholeBodyProgram, active: Indices) -> None:
-        self._own.run()
+    def _pyramids(self, found: Found, program: FullMatrices, active: Indices) -> None:
+        self.solve(self._own)
         code, own = int(self._solution.code[0]), self._solution.torque.copy()
         guess = np.hstack((self._solution.acceleration, self._solution.force[active].ravel()))
         x, pressed = _by_daqp(program)
-        memory = self._own.arguments[-2]
         best = None
         if x is not None:
             best = proved_minimum(program, Proposal(x, pressed, NO_PLACES), 0.0)
         if best is None and code == SOLVED:
-            held = memory.memory.is_active[: len(pressed)].copy()
+            held = self._active_set.memory.is_active[: len(pressed)].copy()
             best = proved_minimum(program, Proposal(guess, held, NO_PLACES), 0.0)
             found.by_own["pyramids"] = found.by_own.get("pyramids", 0) + (best is not None)
         if best is None:
@@ -409,21 +418,20 @@ class Methods:
             counts = found.impossible if nothing else found.unproved
             counts["pyramids"] = counts.get("pyramids", 0) + 1
             return
-        torque = self._torque(best, active)
+        torque = self.full.torque(best, active)
         slack = program.limits.bound - program.limits.matrix @ best
         found.limited += bool(slack.min(initial=1.0) < 1e-6)
         self._note(found, OWN, own if code == SOLVED else None, torque)
-        self._note(found, DAQP, None if x is None else self._torque(x, active), torque)
+        self._note(found, DAQP, None if x is None else self.full.torque(x, active), torque)
 
-    def _round(
-        self, found: Found, program: WholeBodyProgram, active: Indices, friction: float
-    ) -> None:
-        self._cones.run()
+    def _round(self, found: Found, program: FullMatrices, active: Indices, friction: float) -> None:
+        self.solve(self._cones)
         code, own = int(self._solution.code[0]), self._solution.torque.copy()
         guess = np.hstack((self._solution.acceleration, self._solution.force[active].ravel()))
         (p, q), (a, b), (g, h) = program.cost, program.equality, program.inequality
         kept = rows_without_pyramids(len(active), len(h))
-        problem = p, q, g[kept], h[kept], a, b, friction, len(active)
+        cones = cone_rows(len(active), len(q), self._n, friction)
+        problem = p, q, g[kept], h[kept], a, b, cones
         answer = self._clarabel.answer(*problem)
         solved = str(answer.status) in CLARABEL_SOLVED
         best = None
@@ -440,9 +448,9 @@ class Methods:
             counts = found.impossible if nothing else found.unproved
             counts["round"] = counts.get("round", 0) + 1
             return
-        torque = self._torque(best, active)
+        torque = self.full.torque(best, active)
         self._note(found, CONES, own if code == SOLVED else None, torque)
-        other = self._torque(np.asarray(answer.x), active) if solved else None
+        other = self.full.torque(np.asarray(answer.x), active) if solved else None
         self._note(found, CLARABEL, other, torque)
 
     @staticmethod
@@ -466,9 +474,7 @@ class Methods:
         return Proposal(x, active, places)
 
     @staticmethod
-    def _from_cones(
-        program: WholeBodyProgram, x: Array, friction: float, count: int
-    ) -> Array | None:
+    def _from_cones(program: FullMatrices, x: Array, friction: float, count: int) -> Array | None:
         """The minimum that the own method proposes."""
         kept = rows_without_pyramids(count, len(program.inequality.bound))
         g, h = program.inequality.matrix[kept], program.inequality.bound[kept]
@@ -490,15 +496,8 @@ class Methods:
         scale = max(1.0, float(np.abs(best).max()) / LARGE)
         found.errors.setdefault(name, []).append(float(np.abs(torque - best).max()) / scale)
 
-    def _torque(self, x: Array, active: Indices) -> Array:
-        torque = np.zeros(self._n - 6)
-        self._force.fill(0.0)
-        self._force[active] = x[self._n :].reshape(-1, 3)
-        joint_torque(self._block._model, x[: self._n].copy(), self._force, self._product, torque)
-        return torque
 
-
-def _by_daqp(program: WholeBodyProgram) -> tuple[Array | None, Flags]:
+def _by_daqp(program: FullMatrices) -> tuple[Array | None, Flags]:
     """DAQP's solution, and the inequalities that it says are active."""
     import daqp
 

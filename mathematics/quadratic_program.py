@@ -1,8 +1,8 @@
 """Quadratic and cone programs: one call, any installed solver, no exceptions.
 
-DAQP is called directly; any other solver is called through qpsolvers, which imports SciPy and every
-solver that is installed: about 0.4 s that no process pays that does without them. Programs with round
-friction cones go to Clarabel, an interior-point method.
+DAQP and Clarabel are called directly; any other solver is called through qpsolvers, which imports SciPy
+and every solver that is installed: about 0.4 s that no process pays that does without them. Programs with
+round friction cones go to Clarabel, an interior-point method.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .arrays import Array
 
 Solve = Callable[[Array, Array, Array, Array, Array, Array], Array | None]
 
-DAQP = "daqp"
+DAQP, CLARABEL = "daqp", "clarabel"
 EQUALITY = 5
 """DAQP's mark of a row that is an equality."""
 UNBOUNDED = -1e30
@@ -26,11 +26,14 @@ UNBOUNDED = -1e30
 class QuadraticProgramSolver:
     """Minimises 1/2 x'Px + q'x subject to Gx <= h and Ax = b, from a cold start every time.
 
+    With Clarabel also subject to s_1 >= |(s_2, s_3)| for every three elements of s = Cx.
+
     A cold start makes the answer a function of the problem alone; with an active-set solver such
     as DAQP or quadprog it is also exact and the same in every process.
 
     Args:
-        name: ``daqp``, or any solver that qpsolvers finds installed and that takes dense matrices.
+        name: ``daqp``, ``clarabel``, or any solver that qpsolvers finds installed and that takes dense
+            matrices.
         options: passed to the solver, e.g. its tolerances.
 
     Raises:
@@ -41,10 +44,10 @@ class QuadraticProgramSolver:
     def check_name(name: str) -> None:
         """Raise ``LookupError`` if no such solver is installed; the message names those that are.
 
-        For the usual solver this takes microseconds. For any other one qpsolvers is imported, which
+        For the usual solvers this takes microseconds. For any other one qpsolvers is imported, which
         takes about 0.3 s.
         """
-        if name == DAQP and find_spec("daqp") is not None:
+        if name in (DAQP, CLARABEL) and find_spec(name) is not None:
             return
         from qpsolvers import available_solvers
 
@@ -57,13 +60,27 @@ class QuadraticProgramSolver:
     def __init__(self, name: str, options: dict[str, float] | None = None) -> None:
         self.check_name(name)
         self.name = name
-        make = _daqp if name == DAQP else _any_solver
-        self._solve: Solve = make(name, dict(options or {}))
+        given = dict(options or {})
+        self._clarabel = Clarabel(**given) if name == CLARABEL else None
+        self._solve: Solve = (
+            self._clarabel.solve
+            if self._clarabel is not None
+            else (_daqp if name == DAQP else _any_solver)(name, given)
+        )
 
-    def solve(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
-        """The minimiser x (n,), or ``None`` if the solver found none or failed."""
+    def solve(
+        self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array | None = None
+    ) -> Array | None:
+        """The minimiser x (n,), or ``None`` if the solver found none or failed.
+
+        Args:
+            c: the rows C of cones, (3 k, n); only for Clarabel.
+        """
         try:
-            x = self._solve(p, q, g, h, a, b)
+            if c is not None and self._clarabel is not None:
+                x = self._clarabel.solve(p, q, g, h, a, b, c)
+            else:
+                x = self._solve(p, q, g, h, a, b)
         except Exception:  # noqa: BLE001
             # On an infeasible problem solvers raise errors of many types. The caller has a defined
             # fallback for all of them, so each means that there is no solution.
@@ -74,16 +91,15 @@ class QuadraticProgramSolver:
 
 
 def _daqp(_: str, options: Mapping[str, float]) -> Solve:
-    """DAQP's own function."""
+    """DAQP's own function. With equalities in the last rows it calls some programs infeasible that are not."""
     import daqp
 
     def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
-        upper = np.concatenate([h, b])
+        upper = np.concatenate([b, h])
+        lower = np.concatenate([b, np.full(len(h), UNBOUNDED)])
         kinds = np.zeros(len(upper), np.intc)
-        kinds[len(h) :] = EQUALITY
-        x, _, flag, _ = daqp.solve(
-            p, q, np.concatenate([g, a]), upper, np.full(len(upper), UNBOUNDED), kinds, **options
-        )
+        kinds[: len(b)] = EQUALITY
+        x, _, flag, _ = daqp.solve(p, q, np.concatenate([a, g]), upper, lower, kinds, **options)
         return x if flag > 0 else None
 
     return solve
@@ -101,16 +117,15 @@ def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
 
 
 TOLERANCE = 1e-9
-"""Of Clarabel's gap and residuals. The cost hardly depends on forces that do not move the base: at 1e-8 they are
-tenths of a newton wrong; much below 1e-9 Clarabel sometimes ends early, with worse ones."""
+"""Of Clarabel's gap and residuals. Much below 1e-9 it sometimes ends early, with worse answers."""
+INFEASIBILITY = 1e-12
+"""Of Clarabel's proof that there is no solution. At its own 1e-8 it finds proofs for programs that have one."""
 SOLVED = ("Solved", "AlmostSolved", "InsufficientProgress")
 """What it may say where its answer is as good as rounding allows at that tolerance."""
 
 
-class ConeProgramSolver:
-    """Minimises 1/2 x'Px + q'x subject to Ax = b, Gx <= h and |f_t| <= mu f_z for the forces f at the end of x.
-
-    Every call sets the solver up anew, so the answer depends on the problem alone.
+class Clarabel:
+    """Clarabel, set up anew in every call, so the answer depends on the problem alone.
 
     Args:
         tolerance: of the gap and the residuals.
@@ -126,56 +141,36 @@ class ConeProgramSolver:
         self._settings.verbose = False
         for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
             setattr(self._settings, name, tolerance)
+        for name in ("tol_infeas_abs", "tol_infeas_rel"):
+            setattr(self._settings, name, INFEASIBILITY)
         self._settings.max_threads = 1
 
-    def answer(
-        self,
-        p: Array,
-        q: Array,
-        g: Array,
-        h: Array,
-        a: Array,
-        b: Array,
-        friction: float,
-        count: int,
-    ) -> Any:
+    def answer(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array) -> Any:
         """All that Clarabel says of the program: its ``status``, the minimiser ``x``, slacks ``s`` and
-        multipliers ``z`` of the equations, then of the inequalities, then of the cones.
-
-        Args:
-            friction: mu.
-            count: the number of forces, three elements each, at the end of x.
-        """
-        n = len(q)
-        cones = np.zeros((3 * count, n))
-        for point in range(count):
-            column = n - 3 * (count - point)
-            cones[3 * point, column + 2] = -friction
-            cones[3 * point + 1, column] = cones[3 * point + 2, column + 1] = -1.0
-        matrix = self._sparse.csc_matrix(np.vstack((a, g, cones)))
-        bound = np.hstack((b, h, np.zeros(3 * count)))
+        multipliers ``z`` of the equations, then of the inequalities, then of the cones."""
+        matrix = self._sparse.csc_matrix(np.vstack((a, g, -c)))
+        bound = np.hstack((b, h, np.zeros(len(c))))
         kinds = [
             self._clarabel.ZeroConeT(len(b)),
             self._clarabel.NonnegativeConeT(len(h)),
-            *(self._clarabel.SecondOrderConeT(3) for _ in range(count)),
+            *(self._clarabel.SecondOrderConeT(3) for _ in range(len(c) // 3)),
         ]
         square = self._sparse.triu(self._sparse.csc_matrix(p), format="csc")
         return self._clarabel.DefaultSolver(square, q, matrix, bound, kinds, self._settings).solve()
 
     def solve(
-        self,
-        p: Array,
-        q: Array,
-        g: Array,
-        h: Array,
-        a: Array,
-        b: Array,
-        friction: float,
-        count: int,
+        self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array | None = None
     ) -> Array | None:
-        """The minimiser x (n,), or ``None`` if the solver found none; arguments as for ``answer``."""
-        answer = self.answer(p, q, g, h, a, b, friction, count)
-        if str(answer.status) not in SOLVED:
-            return None
-        x = np.asarray(answer.x)
-        return x if np.isfinite(x).all() else None
+        """The minimiser x (n,), or ``None`` if the solver found none."""
+        answer = self.answer(p, q, g, h, a, b, np.zeros((0, len(q))) if c is None else c)
+        return np.asarray(answer.x) if str(answer.status) in SOLVED else None
+
+
+def cone_rows(count: int, n: int, first: int, friction: float) -> Array:
+    """Rows C of ``QuadraticProgramSolver`` for |f_t| <= mu f_z of ``count`` forces from column ``first`` on."""
+    rows = np.zeros((3 * count, n))
+    for point in range(count):
+        column = first + 3 * point
+        rows[3 * point, column + 2] = friction
+        rows[3 * point + 1, column] = rows[3 * point + 2, column + 1] = 1.0
+    return rows

@@ -1,4 +1,4 @@
-"""The whole-body controller's program with round friction cones |f_t| <= mu f_z, from its terms to torques, as a kernel.
+"""The own method for the whole-body program with round friction cones |f_t| <= mu f_z.
 
 It is ``whole_body_solution`` with other constraints: planes that touch the cones. They are added where the
 solution leaves a cone until it does so by little; then Newton steps make it exact.
@@ -27,31 +27,23 @@ from .active_set import (
     TOO_LONG,
     ActiveSetMemory,
     QuadraticProgram,
-    active_set_memory,
     fulfil,
     polish,
     recompute_multipliers,
     solve_program,
 )
-from .arrays import Array, Array1D, Array2D, Array3D, Flags, Indices, Indices1D
+from .arrays import Array1D, Array2D, Array3D, Indices1D
 from .kernel import kernel
-from .whole_body_qp import PYRAMID_ROWS, RigidBodyTerms, TaskRows, TorqueLimits
+from .whole_body_qp import PYRAMID_ROWS, WholeBodyProgram, WholeBodySolution
 from .whole_body_reduction import (
     Reduction,
     force_gradient,
     force_program,
-    recover_acceleration,
-    recover_torque,
-    reduction_memory,
-)
-from .whole_body_solution import (
-    ProgramWeights,
-    WholeBodySolution,
-    exceeds_limits,
     limit_rows,
-    reduce_program,
+    recover_motion,
     write_forces,
 )
+from .whole_body_solution import ActiveSetProgram, exceeds_limits
 
 PLANES = 8
 """Planes of a cone at the same time, besides those of its pyramid. At most three are active."""
@@ -273,160 +265,117 @@ ENOUGH = 1e-9
 """The same where rounding errors let it turn no less."""
 
 
-class ConeSolutionMemory(NamedTuple):
-    """Memory for intermediate results; ``unknowns`` are the forces and the e of the reduction."""
-
-    reduction: Reduction
-    program: QuadraticProgram
-    memory: ActiveSetMemory
-    cones: Cones
-    unknowns: Array
-    gradient: Array
-    active: Indices
-
-
-def cone_solution_memory(n_velocities: int, n_contacts: int) -> ConeSolutionMemory:
-    """Zero memory for a robot of that size."""
-    joints = n_velocities - 6
-    n, m = 3 * n_contacts + joints, (PYRAMID_ROWS + PLANES) * n_contacts + 2 * joints
-    return ConeSolutionMemory(
-        reduction_memory(n_velocities, 3 * n_contacts),
-        QuadraticProgram(np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)),
-        active_set_memory(n, m),
-        cone_memory(n_contacts),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros(n_contacts, dtype=np.int64),
-    )
-
-
 @kernel
-def solve_whole_body_cones(
-    tasks: TaskRows,
-    terms: RigidBodyTerms,
-    stance: Flags,
-    joint_velocity: Array,
-    weights: ProgramWeights,
-    limits: int,
-    motors: TorqueLimits,
-    memory: ConeSolutionMemory,
+def solve_with_cones(
+    program: WholeBodyProgram,
+    reduction: Reduction,
+    cones: Cones,
+    own: ActiveSetProgram,
     solution: WholeBodySolution,
 ) -> None:
-    """``solve_whole_body`` with the round cone |f_t| <= mu f_z in the place of the pyramid."""
-    reduction, active = memory.reduction, memory.active
-    count = reduce_program(
-        tasks, terms, stance, joint_velocity, weights, limits, motors, reduction, active, solution
-    )
+    """``solve_with_pyramids`` with the round cone |f_t| <= mu f_z in the place of the pyramid."""
+    count = reduction.n_active[0]
     if count == 0:
         return
     for point in range(count):
-        memory.cones.used[point] = 0
-    code = solve_cone_forces(terms, weights, motors, count, 0, memory, solution)
-    if code >= 0 and exceeds_limits(limits, motors, reduction, solution):
+        cones.used[point] = 0
+    code = solve_cone_forces(program, reduction, 0, cones, own, solution)
+    if code >= 0 and exceeds_limits(program, reduction, solution):
         joints = solution.torque.shape[0]
-        code = solve_cone_forces(terms, weights, motors, count, joints, memory, solution)
-    write_forces(code, active, count, memory.unknowns, solution)
+        code = solve_cone_forces(program, reduction, joints, cones, own, solution)
+    write_forces(code, reduction, own.unknowns, solution)
 
 
 @kernel
 def solve_cone_forces(
-    terms: RigidBodyTerms,
-    weights: ProgramWeights,
-    motors: TorqueLimits,
-    count: int,
+    program: WholeBodyProgram,
+    reduction: Reduction,
     extra: int,
-    memory: ConeSolutionMemory,
+    cones: Cones,
+    own: ActiveSetProgram,
     solution: WholeBodySolution,
 ) -> int:
     """``solve_forces`` with round cones. Returns a negative code of ``active_set`` where it fails."""
-    active, program, reduction, cones = (
-        memory.active, memory.program, memory.reduction, memory.cones,
-    )  # fmt: skip
-    friction, force_weight = weights.friction[0], weights.force[0]
-    n, x = 3 * count + extra, memory.unknowns
-    first = limit_rows(terms, weights, motors, count, extra, reduction, active, program)
+    friction, count, x = program.weights.friction[0], reduction.n_active[0], own.unknowns
+    n = 3 * count + extra
+    first = limit_rows(program, reduction, extra, own.qp)
     tolerance, code, solved = FIRST, TOO_LONG, False
     for _ in range(APPROACHES):
-        force_program(reduction, 3 * count, extra, force_weight, program.hessian, program.gradient)
-        rows = write_planes(count, n, first, friction, cones, program)
-        code, held = approach(n, rows, count, first, friction, tolerance, memory)
+        force_program(program.weights.force[0], reduction, extra, own.qp)
+        write_planes(count, n, first, friction, cones, own.qp)
+        code, held = approach(count, extra, first, friction, tolerance, cones, own)
         if code < 0:
             return code
-        solved = refine(terms, rows, count, extra, first, held, friction, force_weight, memory)
+        solved = refine(program, reduction, extra, first, held, cones, own)
         if solved:
             break
         tolerance *= 0.01
     if not solved:
         return TOO_LONG
-    recover_acceleration(reduction, 3 * count, extra, x, solution.acceleration)
-    recover_torque(terms, active, count, solution.acceleration, x, solution.torque)
+    recover_motion(program, reduction, extra, x, solution)
     return code
 
 
 @kernel
 def approach(
-    n: int,
-    rows: int,
     count: int,
+    extra: int,
     first: int,
     friction: float,
     tolerance: float,
-    memory: ConeSolutionMemory,
+    cones: Cones,
+    own: ActiveSetProgram,
 ) -> tuple[int, int]:
     """Solve the program, and add planes until no force leaves its cone by more than that share.
 
     Returns a negative code where it fails, and the number of active constraints.
     """
-    program, x = memory.program, memory.unknowns
-    code = solve_program(n, rows, program, memory.memory, x)
+    n, rows, x = 3 * count + extra, first + PLANES * count, own.unknowns
+    code = solve_program(n, rows, own.qp, own.memory, x)
     held = 0
     for row in range(rows):
-        held += 1 if memory.memory.is_active[row] else 0
+        held += 1 if own.memory.is_active[row] else 0
     for _ in range(CUTS):
         if code < 0:
             return code, held
-        if cut(count, first, friction, tolerance, memory.cones, program, memory.memory, x) == 0:
+        if cut(count, first, friction, tolerance, cones, own.qp, own.memory, x) == 0:
             return code, held
-        code, held = fulfil(n, rows, held, program, memory.memory, x)
+        code, held = fulfil(n, rows, held, own.qp, own.memory, x)
     return TOO_LONG, held
 
 
 @kernel
 def refine(
-    terms: RigidBodyTerms,
-    rows: int,
-    count: int,
+    program: WholeBodyProgram,
+    reduction: Reduction,
     extra: int,
     first: int,
     held: int,
-    friction: float,
-    force_weight: float,
-    memory: ConeSolutionMemory,
+    cones: Cones,
+    own: ActiveSetProgram,
 ) -> bool:
     """Newton steps from the solution with planes; returns whether they have become exact."""
-    reduction, program, cones, x = memory.reduction, memory.program, memory.cones, memory.unknowns
-    size, n = 3 * count, 3 * count + extra
+    friction, count, x = program.weights.friction[0], reduction.n_active[0], own.unknowns
+    n, rows = 3 * count + extra, first + PLANES * count
     before = 4.0
     for _ in range(STEPS):
-        multiplier_curvature(count, held, first, cones, memory.memory, x)
+        multiplier_curvature(count, held, first, cones, own.memory, x)
         touch(count, friction, EXACT, cones, x)
-        write_planes(count, n, first, friction, cones, program)
-        force_program(reduction, size, extra, force_weight, program.hessian, program.gradient)
-        add_curvature(count, cones, program.hessian)
-        if solve_program(n, rows, program, memory.memory, x) < 0:
+        write_planes(count, n, first, friction, cones, own.qp)
+        force_program(program.weights.force[0], reduction, extra, own.qp)
+        add_curvature(count, cones, own.qp.hessian)
+        if solve_program(n, rows, own.qp, own.memory, x) < 0:
             return False
         held = 0
         for row in range(rows):
-            held += 1 if memory.memory.is_active[row] else 0
+            held += 1 if own.memory.is_active[row] else 0
         for turn in range(2):
-            force_gradient(
-                reduction, terms, memory.active, count, extra, force_weight, x, memory.gradient
-            )
-            add_bending(count, cones, x, memory.gradient)
+            force_gradient(program, reduction, extra, x, own.gradient)
+            add_bending(count, cones, x, own.gradient)
             if turn == 0:
-                polish(n, memory.gradient, memory.memory, x)
+                polish(n, own.gradient, own.memory, x)
             else:
-                recompute_multipliers(n, held, memory.gradient, memory.memory)
+                recompute_multipliers(n, held, own.gradient, own.memory)
         angle = turned(count, friction, cones, x)
         if angle <= EXACT or (angle <= ENOUGH and angle > 0.5 * before):
             return True

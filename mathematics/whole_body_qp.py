@@ -1,29 +1,38 @@
-"""The whole-body controller's quadratic program as pure functions over arrays.
+"""The whole-body controller's program: its data, its limits and its solution.
 
 The unknowns are the generalised acceleration a (n_velocities) and the forces f on the points in
 stance (3 each, world). Tasks are rows J a = d, each with a weight; the program is
 
     minimise    sum_i w_i (J_i a - d_i)^2 + w_a |a|^2 + w_f |f|^2
-    subject to  M_b a + h_b - J_b' f = 0        (the six rows of the floating base)
-                G [a; f] <= b                   (friction pyramids, force and torque limits)
+    subject to  M_b a + h_b - J_b' f = 0          (the six rows of the floating base)
+                |f_x| <= mu f_z, |f_y| <= mu f_z  (friction; with round cones |f_t| <= mu f_z)
+                force_min <= f_z <= force_max
+                lower <= T tau <= upper           (torque limits), tau = M_j a + h_j - J_j' f
 
-which is the paper's problem (section V, wbc_qp). Every function writes into arrays that its caller
-owns and allocates nothing. Arrays that belong together are passed as a named tuple, which the
-caller makes once.
+which is the paper's problem (section V, wbc_qp). ``whole_body_reduction`` eliminates a. Kernels write
+into arrays that their caller owns and allocate nothing.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from .arrays import Array1D, Array2D, Array3D, Indices1D, Rows3
+from .arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Rows3
 from .kernel import kernel
 
 PYRAMID_ROWS = 6
 """Inequality rows of a point in stance: four of its pyramid, two bounds of its normal force."""
+
+NO_CONTACT = 0
+"""Result where no point is in stance: nothing to solve."""
+SOLVED = 1
+ILL_POSED = -4
+"""The terms or the tasks are not finite, or leave no positive definite matrix."""
+NOT_FOUND = -5
+"""A library's solver found no solution."""
+
+NO_LIMITS, JOINT_LIMITS, MOTOR_LIMITS = 0, 1, 2
+"""Kinds of torque limits."""
 
 
 class TaskRows(NamedTuple):
@@ -46,45 +55,31 @@ class RigidBodyTerms(NamedTuple):
     jacobian: Array3D
 
 
-class Cost(NamedTuple):
-    """1/2 x' hessian x + gradient' x over x = [a; f]."""
+class ProgramWeights(NamedTuple):
+    """Numbers that may change during a run, each an array of one element.
 
-    hessian: Array2D
-    gradient: Array1D
+    ``acceleration`` w_a and ``force`` w_f are weights, ``friction`` is mu, and ``force_min`` and
+    ``force_max`` [N] bound the normal force of a point.
+    """
 
-
-class CostScratch(NamedTuple):
-    """Memory for intermediate results of ``assemble_cost``: (n_rows, n_v), (n_v, n_v), (n_v,)."""
-
-    weighted: Array2D
-    block: Array2D
-    vector: Array1D
-
-
-class Constraints(NamedTuple):
-    """Rows of ``matrix`` x = ``bound``, or of ``matrix`` x <= ``bound``."""
-
-    matrix: Array2D
-    bound: Array1D
-
-
-class TorqueScratch(NamedTuple):
-    """Memory for intermediate results of ``torque_limits``: (n_joints, n_x) twice, (n_joints,)."""
-
-    rows: Array2D
-    product: Array2D
-    offset: Array1D
+    acceleration: Array1D
+    force: Array1D
+    friction: Array1D
+    force_min: Array1D
+    force_max: Array1D
 
 
 class TorqueLimits(NamedTuple):
     """The limits of the torques, those of motors or of joints, (n,) each.
 
-    A motor has its ``peak`` torque [N m] up to the ``corner`` speed [rad/s]; from there the torque
-    falls linearly to zero at the ``no_load`` speed [rad/s]. At the present ``speed`` the torques must
-    be within ``lower`` and ``upper``. ``to_speed`` and ``to_torque`` (n, n) are products with joint
-    velocities and joint torques; ``to_torque`` is the identity where joints are limited.
+    ``kind`` is NO_LIMITS, JOINT_LIMITS or MOTOR_LIMITS. A motor has its ``peak`` torque [N m] up to the
+    ``corner`` speed [rad/s]; from there the torque falls linearly to zero at the ``no_load`` speed
+    [rad/s]. At the present ``speed`` the torques must be within ``lower`` and ``upper``. ``to_speed`` and
+    ``to_torque`` T (n, n) are products with joint velocities and joint torques; ``to_torque`` is the
+    identity where joints are limited.
     """
 
+    kind: int
     to_speed: Array2D
     to_torque: Array2D
     peak: Array1D
@@ -95,95 +90,118 @@ class TorqueLimits(NamedTuple):
     upper: Array1D
 
 
-@kernel
-def assemble_cost(
-    tasks: TaskRows,
-    acceleration_weight: float,
-    force_weight: float,
-    scratch: CostScratch,
-    cost: Cost,
-) -> None:
-    """The cost: the tasks' weighted squared errors plus the two regularisation terms."""
-    n = tasks.jacobian.shape[1]
-    for i in range(tasks.jacobian.shape[0]):
-        np.multiply(tasks.jacobian[i], tasks.weights[i], scratch.weighted[i])
-    np.dot(tasks.jacobian.T, scratch.weighted, scratch.block)
-    np.dot(scratch.weighted.T, tasks.desired, scratch.vector)
-    cost.hessian[:, :] = 0.0
-    cost.hessian[0:n, 0:n] = scratch.block
-    cost.gradient[:] = 0.0
-    np.negative(scratch.vector, cost.gradient[0:n])
-    for i in range(n):
-        cost.hessian[i, i] += acceleration_weight
-    for i in range(n, cost.hessian.shape[0]):
-        cost.hessian[i, i] = force_weight
+class WholeBodyProgram(NamedTuple):
+    """The data of a tick's program: ``stance`` (n_contacts,) are the points in stance, and
+    ``joint_velocity`` (n_joints,) [rad/s] is that at which the motors' limits are taken."""
+
+    tasks: TaskRows
+    terms: RigidBodyTerms
+    stance: Flags1D
+    joint_velocity: Array1D
+    weights: ProgramWeights
+    motors: TorqueLimits
 
 
-@kernel
-def base_dynamics(terms: RigidBodyTerms, active: Indices1D, rows: Constraints) -> None:
-    """The six equations of motion of the floating base (paper, base_dyn): matrix x = bound.
+class WholeBodySolution(NamedTuple):
+    """The result: torques (n_joints,), accelerations (n,), forces (n_contacts, 3); ``code`` (1,).
 
-    Args:
-        active: the points in stance, in the order of their forces in x.
+    ``code`` is SOLVED, NO_CONTACT, ILL_POSED, NOT_FOUND or a negative code of ``active_set``. Only with
+    SOLVED the others are of use.
     """
-    n = terms.mass_matrix.shape[0]
-    rows.matrix[:, 0:n] = terms.mass_matrix[0:6, :]
-    np.negative(terms.nonlinear[0:6], rows.bound)
-    for j in range(active.shape[0]):
-        point = active[j]
-        for k in range(3):
-            np.negative(terms.jacobian[point, k, 0:6], rows.matrix[:, n + 3 * j + k])
+
+    torque: Array1D
+    acceleration: Array1D
+    force: Rows3
+    code: Indices1D
 
 
 @kernel
-def friction_pyramids(
-    count: int, first: int, friction: float, force_min: float, force_max: float, rows: Constraints
-) -> None:
-    """``PYRAMID_ROWS`` rows for each of ``count`` points (paper, cone), whose forces begin in
-    column ``first``:
+def friction_rows(
+    count: int, n: int, weights: ProgramWeights, matrix: Array2D, bound: Array1D
+) -> int:
+    """``PYRAMID_ROWS`` rows of n elements for each of ``count`` points (paper, cone), whose forces are
+    the first unknowns: |f_x| <= mu f_z, |f_y| <= mu f_z, force_min <= f_z <= force_max.
 
-    |f_x| <= mu f_z, |f_y| <= mu f_z, force_min <= f_z <= force_max.
+    Returns the number of rows.
     """
-    matrix, bound = rows.matrix, rows.bound
-    matrix[0 : PYRAMID_ROWS * count, :] = 0.0
+    for row in range(PYRAMID_ROWS * count):
+        for k in range(n):
+            matrix[row, k] = 0.0
+        bound[row] = 0.0
     for j in range(count):
-        row, column = PYRAMID_ROWS * j, first + 3 * j
+        row, column = PYRAMID_ROWS * j, 3 * j
         for k in range(2):
             matrix[row + 2 * k, column + k], matrix[row + 2 * k + 1, column + k] = 1.0, -1.0
         for k in range(4):
-            matrix[row + k, column + 2] = -friction
-            bound[row + k] = 0.0
-        matrix[row + 4, column + 2], bound[row + 4] = 1.0, force_max
-        matrix[row + 5, column + 2], bound[row + 5] = -1.0, -force_min
+            matrix[row + k, column + 2] = -weights.friction[0]
+        matrix[row + 4, column + 2], bound[row + 4] = 1.0, weights.force_max[0]
+        matrix[row + 5, column + 2], bound[row + 5] = -1.0, -weights.force_min[0]
+    return PYRAMID_ROWS * count
 
 
 @kernel
-def torque_limits(
-    terms: RigidBodyTerms,
-    active: Indices1D,
+def torque_rows(
     motors: TorqueLimits,
-    scratch: TorqueScratch,
-    rows: Constraints,
-) -> None:
-    """Rows that keep T tau within its limits, with T = ``motors.to_torque`` and tau affine in x = [a; f].
+    n: int,
+    torque_map: Array2D,
+    torque_rest: Array1D,
+    first: int,
+    matrix: Array2D,
+    bound: Array1D,
+) -> int:
+    """Two rows for each limited torque, from row ``first`` on; returns the number of rows in all.
 
     Args:
-        active: the points in stance, in the order of their forces in x.
-        rows: out, (2 n_joints, n_x) and (2 n_joints,).
+        n: the number of unknowns.
+        torque_map: with ``torque_rest`` the joint torques as an affine function of the unknowns.
     """
-    n = terms.mass_matrix.shape[0]
-    joints = n - 6
-    scratch.rows[:, 0:n] = terms.mass_matrix[6:, :]
-    for j in range(active.shape[0]):
-        point = active[j]
-        for k in range(3):
-            np.negative(terms.jacobian[point, k, 6:], scratch.rows[:, n + 3 * j + k])
-    np.dot(motors.to_torque, scratch.rows, scratch.product)
-    np.dot(motors.to_torque, terms.nonlinear[6:], scratch.offset)
-    rows.matrix[0:joints, :] = scratch.product
-    np.negative(scratch.product, rows.matrix[joints:, :])
-    np.subtract(motors.upper, scratch.offset, rows.bound[0:joints])
-    np.subtract(scratch.offset, motors.lower, rows.bound[joints:])
+    joints = torque_rest.shape[0]
+    for motor in range(joints):
+        high, low = first + motor, first + joints + motor
+        for i in range(n):
+            matrix[high, i] = 0.0
+        torque = 0.0
+        for j in range(joints):
+            share = motors.to_torque[motor, j]
+            if share != 0.0:
+                torque += share * torque_rest[j]
+                for i in range(n):
+                    matrix[high, i] = matrix[high, i] + share * torque_map[j, i]
+        for i in range(n):
+            matrix[low, i] = -matrix[high, i]
+        bound[high] = motors.upper[motor] - torque
+        bound[low] = torque - motors.lower[motor]
+    return int(first + 2 * joints)
+
+
+@kernel
+def within_limits(torque: Array1D, motors: TorqueLimits) -> bool:
+    """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
+    for motor in range(torque.shape[0]):
+        total = 0.0
+        for j in range(torque.shape[0]):
+            total += motors.to_torque[motor, j] * torque[j]
+        if total > motors.upper[motor] + 1e-10:
+            return False
+        if total < motors.lower[motor] - 1e-10:
+            return False
+    return True
+
+
+@kernel
+def limit_torques(joint_velocity: Array1D, motors: TorqueLimits) -> None:
+    """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
+    for i in range(motors.speed.shape[0]):
+        if motors.kind == JOINT_LIMITS:
+            motors.upper[i] = motors.peak[i]
+            motors.lower[i] = -motors.peak[i]
+            continue
+        total = 0.0
+        for j in range(joint_velocity.shape[0]):
+            total += motors.to_speed[i, j] * joint_velocity[j]
+        motors.speed[i] = total
+    if motors.kind == MOTOR_LIMITS:
+        motor_limits(motors)
 
 
 @kernel
@@ -199,35 +217,3 @@ def motor_limits(motors: TorqueLimits) -> None:
         driving = peak * min(max(share, 0.0), 1.0)
         motors.upper[i] = driving if value > 0.0 else peak
         motors.lower[i] = -driving if value < 0.0 else -peak
-
-
-@kernel
-def joint_torque(
-    terms: RigidBodyTerms, acceleration: Array1D, force: Rows3, product: Array1D, torque: Array1D
-) -> None:
-    """The joint torques, from the joints' rows of the equation of motion (paper, opt_torque):
-    tau = M_j a + h_j - sum J_j' f, (n_joints,) [N m].
-
-    Args:
-        acceleration: a, the generalised acceleration, (n_velocities,).
-        force: f on every contact point [N, world], (n_contacts, 3), zero where there is none.
-        product: scratch (n_joints,).
-    """
-    np.dot(terms.mass_matrix[6:, :], acceleration, torque)
-    np.add(torque, terms.nonlinear[6:], torque)
-    for i in range(force.shape[0]):
-        for k in range(3):
-            np.multiply(terms.jacobian[i, k, 6:], force[i, k], product)
-            np.subtract(torque, product, torque)
-
-
-@kernel
-def share_weight(stance: NDArray[np.bool_], weight: float, force: Array2D) -> None:
-    """Share the robot's weight [N] equally among the points in stance, as upward forces."""
-    force[:, :] = 0.0
-    loaded = 0
-    for i in range(stance.shape[0]):
-        loaded += 1 if stance[i] else 0
-    for i in range(stance.shape[0]):
-        if stance[i]:
-            force[i, 2] = weight / loaded

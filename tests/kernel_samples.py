@@ -362,8 +362,5 @@ UNUSED = {
     ),
     "aloft.mathematics.rotations.from_euler": (POSE[1], np.zeros(4)),
     "aloft.mathematics.rotations.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
-    "aloft.mathematics.whole_body_qp.share_weight": (
-        np.array([True, False, True, True]), 50.0, np.zeros((4, 3)),
-    ),
 }  # fmt: skip
 """Arguments of kernels that ``graphs/jump.yaml`` does not call with either estimator."""

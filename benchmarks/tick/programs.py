@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blocks.control.whole_body_controller import WholeBodyController
-from ...blocks.control.whole_body_program import FullProgram, WholeBodyProgram
 from ...mathematics.arrays import Array, Indices
-from ...mathematics.whole_body_qp import (
-    friction_pyramids,
-)
+from ...mathematics.whole_body_qp import NOT_FOUND, SOLVED
+from ...runtime.language.steps import PythonCall
 from ...runtime.running.timing import block_times
+from ..full_program import FullMatrices, FullProgram
 from ..rows import Row, compare
 from .controller import RecordedController
 from .tsid import INSTALL, TORQUE_ERROR, TsidCheck
@@ -35,53 +34,18 @@ _EQUALITY = 5
 
 
 class PeerProgram(FullProgram):
-    """The program with its matrices assembled by NumPy, as a user of these solvers would do it."""
-
-    def __init__(self, block: WholeBodyController) -> None:
-        self._limited = block.params.limits != "none"
-        super().__init__(
-            "daqp", block._rows, block._model, block._motors, block._weights,
-            limited=self._limited, n_contacts=len(block.robot.contacts),
-        )  # fmt: skip
-
-    def assemble(self, active: Indices) -> WholeBodyProgram:
-        """The program for the points ``active`` in stance."""
-        program, rows, model, w = self.programs[len(active)], self._rows, self._model, self._weights
-        n, joints = self._n, self._n - 6
-        weighted = rows.weights[:, None] * rows.jacobian
-        program.cost.hessian[:n, :n] = rows.jacobian.T @ weighted
-        program.cost.gradient[:n] = -(rows.desired @ weighted)
-        diagonal = program.cost.hessian.reshape(-1)[:: program.cost.hessian.shape[0] + 1]
-        diagonal[:n] += w.acceleration[0]
-        diagonal[n:] = w.force[0]
-        transposed = -model.jacobian[active].reshape(-1, n).T
-        program.equality.matrix[:, :n] = model.mass_matrix[:6]
-        program.equality.matrix[:, n:] = transposed[:6]
-        program.equality.bound[:] = -model.nonlinear[:6]
-        friction_pyramids(
-            len(active), n, float(w.friction[0]), float(w.force_min[0]), float(w.force_max[0]),
-            program.cones,
-        )  # fmt: skip
-        if self._limited:
-            turn, limits = self._motors.to_torque, program.limits
-            limits.matrix[:joints, :n] = turn @ model.mass_matrix[6:]
-            limits.matrix[:joints, n:] = turn @ transposed[6:]
-            limits.matrix[joints:] = -limits.matrix[:joints]
-            offset = turn @ model.nonlinear[6:]
-            limits.bound[:joints] = self._motors.upper - offset
-            limits.bound[joints:] = offset - self._motors.lower
-        return program
+    """The full program and a peer that solves it."""
 
     def solve(self, active: Indices) -> Array | None:
         """The accelerations and then the forces of the points ``active``; none if it fails."""
         return self.solve_assembled(self.assemble(active), len(active))
 
-    def solve_assembled(self, program: WholeBodyProgram, count: int) -> Array | None:
+    def solve_assembled(self, program: FullMatrices, count: int) -> Array | None:
         """The same, for a program with ``count`` points in stance whose matrices are ready."""
         raise NotImplementedError
 
 
-def stacked(program: WholeBodyProgram) -> tuple[Array, Array, Array]:
+def stacked(program: FullMatrices) -> tuple[Array, Array, Array]:
     """Equalities and inequalities as lower <= matrix x <= upper."""
     equality, inequality = program.equality, program.inequality
     matrix = np.vstack((equality.matrix, inequality.matrix))
@@ -106,7 +70,7 @@ class OsqpProgram(PeerProgram):
         places[0][...] |= matrix != 0.0
         places[1][...] |= square != 0.0
 
-    def solve_assembled(self, program: WholeBodyProgram, count: int) -> Array | None:
+    def solve_assembled(self, program: FullMatrices, count: int) -> Array | None:
         """See ``PeerProgram``."""
         from scipy import sparse
 
@@ -135,7 +99,7 @@ class OsqpProgram(PeerProgram):
 class DaqpProgram(PeerProgram):
     """The program solved by DAQP, which begins with the last tick's active constraints."""
 
-    def solve_assembled(self, program: WholeBodyProgram, count: int) -> Array | None:
+    def solve_assembled(self, program: FullMatrices, count: int) -> Array | None:
         """See ``PeerProgram``."""
         matrix, lower, upper = stacked(program)
         cost, models = program.cost, vars(self).setdefault("models", {})
@@ -156,26 +120,38 @@ class DaqpProgram(PeerProgram):
 class OsqpController(WholeBodyController):
     """The whole-body controller with OSQP in the place of its own method.
 
-    While ``learning`` is true, the whole program's usual solver does the work."""
+    While ``learning`` is true, the own method does the work."""
 
     learning = True
 
     def setup(self) -> None:
         super().setup()
-        usual = self._other
-        self._own = False
-        self._arrange()
-        program = OsqpProgram(self)
-        solve = program.solve
+        self._osqp, own = OsqpProgram(self), (self._reduce, self._solve)
 
-        def solve_or_learn(active: Indices) -> Array | None:
+        def solve_or_learn() -> None:
             if self.learning:
-                program.learn(active)
-                return usual.solve(active)
-            return solve(active)
+                self._osqp.limit.run()
+                self._osqp.learn(np.flatnonzero(self.phase.stance))
+                for call in own:
+                    call.run()
+            else:
+                self._solve_by_osqp()
 
-        program.solve = solve_or_learn  # type: ignore[method-assign]  # a recorder in its place
-        self._other = program
+        self._solve = PythonCall(solve_or_learn, ())
+        self._arrange()
+        self.kernel_calls = tuple(call for call in self.kernel_calls if call is not self._reduce)
+
+    def _solve_by_osqp(self) -> None:
+        """Write OSQP's solution of the present program."""
+        command, active = self.command, np.flatnonzero(self.phase.stance)
+        self._osqp.limit.run()
+        x, n = self._osqp.solve(active), len(command.acceleration)
+        self._code[0] = NOT_FOUND if x is None else SOLVED
+        if x is not None:
+            command.acceleration[...] = x[:n]
+            command.force.fill(0.0)
+            command.force[active] = x[n:].reshape(-1, 3)
+            command.torque[...] = self._osqp.torque(x, active)
 
 
 def _complete(matrix: Any, places: NDArray[np.bool_], dense: Array) -> Any:

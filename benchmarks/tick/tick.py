@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 
 from ...blocks.control.dynamics import Dynamics
 from ...blocks.control.whole_body_controller import WholeBodyController
-from ...blocks.control.whole_body_program import WholeBodyProgram
-from ...mathematics.whole_body_qp import joint_torque
 from ...runtime.language.errors import AloftError
+from ..full_program import FullMatrices
 from ..rows import Row
 from ..startup import time_process
 from .controller import (
@@ -285,11 +284,15 @@ class _Programs:
         self._block = block
         self._acceleration = np.zeros_like(block.command.acceleration)
         self._force = np.zeros_like(block.command.force)
-        self._torque, self._product = np.zeros((2, block.command.torque.shape[0]))
+        self._torque = np.zeros(block.command.torque.shape[0])
         self._daqp = DaqpProgram(block)
         self._osqp = OsqpProgram(block) if with_osqp else None
         self.times: Times = {}
         self._found: list[dict[str, float]] = []
+
+    def _own(self) -> None:
+        self._block._reduce.run()
+        self._block._solve.run()
 
     def learn(self, tick: int) -> None:
         """Show a state to OSQP."""
@@ -304,7 +307,7 @@ class _Programs:
             return
         prepared = self._daqp.assemble(active)
         cases: dict[str, Callable[[], object]] = {
-            QP: self._block._solve.run,
+            QP: self._own,
             QP_DAQP: lambda: self._solve(self._daqp, active, prepared),
         }
         if self._osqp is not None:
@@ -322,18 +325,14 @@ class _Programs:
         if self._block.command.solved and apart > TORQUE_ERROR:
             raise AssertionError(f"tick {tick}: DAQP's torque is {apart:.2g} N m from the own one")
 
-    def _solve(
-        self, peer: PeerProgram, active: NDArray[np.int64], program: WholeBodyProgram
-    ) -> None:
+    def _solve(self, peer: PeerProgram, active: NDArray[np.int64], program: FullMatrices) -> None:
         """From the program's matrices, which are ready, to accelerations, forces and torques."""
         answer, n = peer.solve_assembled(program, len(active)), self._acceleration.shape[0]
         if answer is not None:
             self._acceleration[...] = answer[:n]
             self._force.fill(0.0)
             self._force[active] = answer[n:].reshape(-1, 3)
-            joint_torque(
-                self._block._model, self._acceleration, self._force, self._product, self._torque
-            )
+            self._torque[...] = peer.torque(answer, active)
 
 
 def _programs(own: RecordedController, *, with_osqp: bool) -> _Programs:

@@ -38,13 +38,9 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.whole_body_solution import (
-    NO_LIMITS,
-    SOLVED,
-    WholeBodySolution,
-    solution_memory,
-    solve_whole_body,
-)
+from ...mathematics.whole_body_qp import NO_LIMITS, SOLVED, WholeBodySolution
+from ...mathematics.whole_body_reduction import reduce_program, reduction_memory
+from ...mathematics.whole_body_solution import active_set_program, solve_with_pyramids
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.errors import AloftError
 from .controller import RecordedController
@@ -415,12 +411,22 @@ class TsidCheck:
         self._found = WholeBodySolution(
             np.zeros(n - 6), np.zeros(n), np.zeros((contacts, 3)), np.zeros(1, np.int64)
         )
-        self._solve = KernelCall(
-            solve_whole_body, block._rows, block._model._replace(mass_matrix=self._mass),
-            block.phase.stance, block.joints.velocity, block._weights, NO_LIMITS, block._motors,
-            solution_memory(n, contacts), self._found,
-        )  # fmt: skip
-        compile_calls([self._solve])
+        program = block._program._replace(
+            terms=block._model._replace(mass_matrix=self._mass),
+            motors=block._motors._replace(kind=NO_LIMITS),
+        )
+        reduction = reduction_memory(n, contacts)
+        self._calls = [
+            KernelCall(reduce_program, program, reduction, self._found),
+            KernelCall(
+                solve_with_pyramids,
+                program,
+                reduction,
+                active_set_program(n, contacts),
+                self._found,
+            ),
+        ]
+        compile_calls(self._calls)
         self.errors: list[float] = []
 
     def compare(self, tick: int) -> None:
@@ -441,7 +447,8 @@ class TsidCheck:
         if program.kind == "thrust":
             return
         self._mass[...] = block._model.mass_matrix - program.coupling
-        self._solve.run()
+        for call in self._calls:
+            call.run()
         if int(self._found.code[0]) != SOLVED or not program.solve():
             raise AssertionError(f"tick {tick}: TSID or the own method found no solution")
         force = self._found.force

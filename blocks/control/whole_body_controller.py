@@ -13,27 +13,19 @@ from ...mathematics.arrays import Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ...mathematics.quadratic_program import QuadraticProgramSolver
-from ...mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
 from ...mathematics.whole_body_qp import (
-    RigidBodyTerms,
-    TaskRows,
-    TorqueLimits,
-    joint_torque,
-    share_weight,
-)
-from ...mathematics.whole_body_solution import (
     JOINT_LIMITS,
     MOTOR_LIMITS,
-    NO_CONTACT,
     NO_LIMITS,
     SOLVED,
     ProgramWeights,
+    RigidBodyTerms,
+    TaskRows,
+    TorqueLimits,
+    WholeBodyProgram,
     WholeBodySolution,
-    limit_motors,
-    solution_memory,
-    solve_whole_body,
 )
+from ...mathematics.whole_body_reduction import reduce_program, reduction_memory
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
@@ -58,14 +50,12 @@ from .tasks.task import (
     choose_tasks,
     own_tasks,
 )
-from .whole_body_program import FullProgram, RoundProgram
+from .whole_body_solver import ACTIVE_SET, FALLBACKS, check_solver, solver_call
 
 PAPER_TASKS = (
     "ContactPoints", "LinearMomentum", "TorsoOrientation", "AngularMomentum", "Posture",
 )  # fmt: skip
 """The tasks of a controller whose graph names none; the controller has their gains in common."""
-OWN_SOLVER = "active_set"
-"""The name of the method that needs no library."""
 
 
 class TaskGains(*(own_tasks()[name].Gains for name in reversed(PAPER_TASKS))):  # type: ignore[misc]
@@ -112,13 +102,12 @@ class WholeBodyController(KernelBlock):
     the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
     torque-speed curve at its present speed, which is exact also for differential joints.
 
-    **Solution.** By default (``active_set``) accelerations and torques are eliminated, which leaves
-    a program in the contact forces, and a dual active-set method solves it from a cold start, so
-    the solution is exact up to rounding and depends on the inputs alone
-    (``mathematics/whole_body_reduction``). Where it finds none, the whole program is given to DAQP.
-    With another ``solver`` every tick's whole program is given to that one. With ``cones: round`` the
-    own method solves the program with the cones themselves, as exactly (``mathematics/whole_body_cones``), and
-    where it finds no solution Clarabel gets the whole program; of the other solvers only Clarabel takes it.
+    **Solution.** Accelerations are eliminated exactly (``mathematics/whole_body_reduction``), and ``solver``
+    finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
+    solution is exact up to rounding and depends on the inputs alone; with ``cones: round`` it solves
+    the program with the cones themselves, as exactly (``mathematics/whole_body_cones``). Any other name is
+    that of a library's solver; of these only Clarabel takes round cones. Where the chosen solver finds no
+    solution, DAQP is tried, or Clarabel with round cones.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
@@ -135,7 +124,7 @@ class WholeBodyController(KernelBlock):
 
     array_allocations = 14
     allocation_reason = (
-        "where the own method fails, qpsolvers and the solver behind it return new arrays"
+        "solvers of libraries, which follow where the own method fails, return new arrays"
     )
 
     class Params(Parameters):
@@ -145,7 +134,7 @@ class WholeBodyController(KernelBlock):
             text="the tasks, each an objective for the acceleration",
         )
         solver: str = parameter(
-            OWN_SOLVER, text="active_set, or any dense solver that qpsolvers finds installed"
+            ACTIVE_SET, text="active_set, or any dense solver that qpsolvers finds installed"
         )
         cones: Literal["pyramid", "round"] = parameter(
             "pyramid", text="shape of the friction cones; the paper's are pyramids"
@@ -214,17 +203,11 @@ class WholeBodyController(KernelBlock):
                 f"{robot.name} has no contact points, so its feet can carry no load"
             )
         try:
-            if params.solver != OWN_SOLVER:
-                QuadraticProgramSolver.check_name(params.solver)
+            check_solver(params.solver, params.cones)
         except LookupError as error:
             yield UnmetRequirement(
-                str(error), parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}"
+                str(error), parameter="solver", found=params.solver, fix=f"solver: {ACTIVE_SET}"
             )
-        if params.cones == "round" and params.solver not in (OWN_SOLVER, "clarabel"):
-            yield UnmetRequirement(
-                f"{params.solver} cannot solve a program with round cones; {OWN_SOLVER} and clarabel can",
-                parameter="solver", found=params.solver, fix=f"solver: {OWN_SOLVER}",
-            )  # fmt: skip
         for foot in robot.feet:
             if foot.link == robot.base:
                 yield UnmetRequirement(
@@ -263,15 +246,17 @@ class WholeBodyController(KernelBlock):
         self._weight = robot.total_mass * GRAVITY
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
         self._weights = ProgramWeights(*(np.zeros(1) for _ in ProgramWeights._fields))
-        limited, by_motor = p.limits != "none", p.limits == "motor"
-        limits = MOTOR_LIMITS if by_motor else JOINT_LIMITS if limited else NO_LIMITS
-        motors = robot.motors
+        by_motor = p.limits == "motor"
+        motors, kinds = (
+            robot.motors,
+            {"none": NO_LIMITS, "joint": JOINT_LIMITS, "motor": MOTOR_LIMITS},
+        )
         self._motors = TorqueLimits(
-            robot.joint_to_motor, robot.torque_to_motor if by_motor else np.eye(n_joints),
+            kinds[p.limits], robot.joint_to_motor,
+            robot.torque_to_motor if by_motor else np.eye(n_joints),
             np.zeros(n_joints), motors.corner_speed, motors.no_load_speed,
             *(np.zeros(n_joints) for _ in range(3)),
         )  # fmt: skip
-        self._product, self._zero_acceleration = np.zeros(n_joints), np.zeros(n)
         self._model = RigidBodyTerms(
             terms.mass_matrix, terms.nonlinear_effects, terms.contact_jacobian
         )
@@ -279,26 +264,26 @@ class WholeBodyController(KernelBlock):
             p.tasks, (self.context.graph_folder, self.context.folder)
         )
         self._make_tasks(n)
-        self._code = np.zeros(1, dtype=np.int64)
-        is_round = p.cones == "round"
-        self._solve = KernelCall(
-            solve_whole_body_cones if is_round else solve_whole_body,
-            self._rows, self._model, self.phase.stance, self.joints.velocity, self._weights, limits,
-            self._motors, (cone_solution_memory if is_round else solution_memory)(n, n_contacts),
-            WholeBodySolution(command.torque, command.acceleration, command.force, self._code),
+        self._program = WholeBodyProgram(
+            self._rows, self._model, self.phase.stance, self.joints.velocity, self._weights,
+            self._motors,
         )  # fmt: skip
-        self._limit = KernelCall(limit_motors, self.joints.velocity, limits, self._motors)
+        self._code = np.zeros(1, dtype=np.int64)
+        reduction = reduction_memory(n, n_contacts)
+        solution = WholeBodySolution(
+            command.torque, command.acceleration, command.force, self._code
+        )
+        self._reduce = KernelCall(reduce_program, self._program, reduction, solution)
+        problem = self._program, reduction, solution
+        self._solve = solver_call(p.solver, p.cones, *problem)
+        fallback = FALLBACKS[p.cones]
+        self._fallback = solver_call(fallback, p.cones, *problem) if fallback != p.solver else None
         self._active_calls = ActiveCalls(*(np.zeros(1, np.int64) for _ in ActiveCalls._fields))
         self._unsolved = np.zeros(1, np.int64)
         self._activate = signal_call(activate_calls, self.phase, self._active_calls)
         self._keep = signal_call(
             keep_solution, self._active_calls.loaded, self._code, command, self.memory,
             self._unsolved,
-        )  # fmt: skip
-        self._own = p.solver == OWN_SOLVER
-        self._other = (RoundProgram if is_round else FullProgram)(
-            "daqp" if self._own else p.solver, self._rows, self._model, self._motors,
-            self._weights, limited=limited, n_contacts=n_contacts,
         )  # fmt: skip
         self._arrange()
 
@@ -343,84 +328,46 @@ class WholeBodyController(KernelBlock):
                 task.change(each)
 
     def _arrange(self) -> None:
-        """Let the step be kernels alone if the tasks and the solver are; else leave it to ``on_event``."""
-        self._task_calls = {
-            kind: [call for task in tasks for call in task.calls()]
-            for kind, tasks in self._tasks.items()
-        }
-        calls = [call for kind in PHASE_KINDS for call in self._task_calls[kind]]
-        if not self._own or any(isinstance(call, PythonCall) for call in calls):
-            self.kernel_calls, self.event = (), np.ones(1, np.int64)
-            return
+        """Put the calls of a step in order."""
+        calls: list[KernelCall | PythonCall] = []
         for kind in PHASE_KINDS:
-            for call in self._task_calls[kind]:
-                call.when = getattr(self._active_calls, kind)
-        for call in (*self._frames.calls, self._solve):
+            for task in self._tasks[kind]:
+                for call in task.calls():
+                    call.when = getattr(self._active_calls, kind)
+                    calls.append(call)
+        for call in (*self._frames.calls, self._reduce, self._solve):
             call.when = self._active_calls.loaded
-        self.kernel_calls = (self._activate, *self._frames.calls, *calls, self._solve, self._keep)
+        self.kernel_calls = (
+            self._activate, *self._frames.calls, *calls, self._reduce, self._solve, self._keep,
+        )  # fmt: skip
         self.event = self._unsolved
 
     def on_event(self) -> None:
-        """Do what is left to Python: other solvers and other tasks, and ticks without a solution."""
-        if not self.kernel_calls and self._step_in_python():
-            return
-        memory, command = self.memory, self.command
-        solved = self._solve_otherwise()
-        if solved:
-            memory.torque[...] = command.torque
-            memory.failed[()] = 0
-        else:
-            self._fall_back()
-        command.solved[()] = solved
-        command.failures[()] = memory.failures
+        """Try the other solver where the chosen one has found no solution."""
+        if self._fallback is not None:
+            self._fallback.run()
+            self._keep.run()
+        if self._unsolved[0]:
+            self._hold_torque()
 
-    def _step_in_python(self) -> bool:
-        """The same step where a task or the solver is no kernel; returns whether all is done."""
-        active = self._active_calls
-        self._activate.run()
-        if active.loaded[0]:
-            for frame in self._frames.calls:
-                frame.run()
-        for kind in PHASE_KINDS:
-            if getattr(active, kind)[0]:
-                for call in self._task_calls[kind]:
-                    call.run()
-        self._code[0] = NO_CONTACT
-        if self._own and active.loaded[0]:
-            self._solve.run()
-        self._keep.run()
-        return not self._unsolved[0]
-
-    def _solve_otherwise(self) -> bool:
-        """Solve the program in accelerations and forces by the chosen solver, or where the own
-        method has failed by DAQP. Returns whether it was solved."""
-        command, n = self.command, self._zero_acceleration.shape[0]
-        command.force.fill(0.0)
-        command.acceleration.fill(0.0)
-        active = np.flatnonzero(self.phase.stance)
-        self._limit.run()
-        answer = self._other.solve(active)
-        if answer is None:
-            return False
-        command.acceleration[...] = answer[:n]
-        command.force[active] = answer[n:].reshape(-1, 3)
-        joint_torque(
-            self._model, command.acceleration, command.force, self._product, command.torque
-        )
-        return True
-
-    def _fall_back(self) -> None:
+    def _hold_torque(self) -> None:
+        """The last solved torque, which decays, and then the torque that carries the weight."""
         p, memory, command = self.params, self.memory, self.command
         memory.failed[()] += 1
         memory.failures[()] += 1
+        command.solved[()] = False
+        command.failures[()] = memory.failures
+        command.force.fill(0.0)
+        command.acceleration.fill(0.0)
         failed = int(memory.failed)
         if failed <= p.fallback_ticks:
             np.multiply(memory.torque, p.fallback_decay**failed, out=command.torque)
             return
-        share_weight(self.phase.stance, self._weight, command.force)
-        joint_torque(
-            self._model, self._zero_acceleration, command.force, self._product, command.torque
-        )
+        stance, model = self.phase.stance, self._model
+        command.force[stance, 2] = self._weight / np.count_nonzero(stance)
+        command.torque[...] = model.nonlinear[6:]
+        for point in np.flatnonzero(stance):
+            command.torque -= command.force[point, 2] * model.jacobian[point, 2, 6:]
 
 
 @cache

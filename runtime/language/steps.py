@@ -187,11 +187,11 @@ def _update(self: Block) -> None:
 class PythonCall:
     """The call of a step in plain Python that names what it takes."""
 
-    when: None = None
     compiled: None = None
 
     def __init__(self, function: Callable[..., object], arguments: tuple[Any, ...]) -> None:
         self.run = partial(function, *arguments)
+        self.when: NDArray[np.int64] | None = None
 
     @property
     def addresses(self) -> tuple[int, int]:
@@ -199,8 +199,9 @@ class PythonCall:
         raise ValueError("a step in plain Python has no machine code")
 
     def take_turn(self) -> None:
-        """Perform the call."""
-        self.run()
+        """Perform the call, unless ``when`` leaves it out."""
+        if self.when is None or self.when[0]:
+            self.run()
 
 
 def bind_steps(block: Block) -> None:

@@ -17,8 +17,10 @@ from aloft.benchmarks.agreement import (
     recorded_states,
     show_state,
 )
-from aloft.mathematics.whole_body_cones import cone_solution_memory, solve_whole_body_cones
-from aloft.mathematics.whole_body_solution import SOLVED, WholeBodySolution
+from aloft.mathematics.whole_body_cones import PLANES, cone_memory, solve_with_cones
+from aloft.mathematics.whole_body_qp import SOLVED, WholeBodySolution
+from aloft.mathematics.whole_body_reduction import reduce_program, reduction_memory
+from aloft.mathematics.whole_body_solution import active_set_program
 
 pytestmark = pytest.mark.filterwarnings("ignore:Converted matrix")
 
@@ -65,7 +67,7 @@ def test_round_cones_are_stateless_and_plain_python_has_the_same_bytes(
 
     def solve(state: State) -> bytes:
         show_state(block, state)
-        call.run()
+        methods.solve(call)
         code = methods._solution.code.tobytes()
         return (
             methods._solution.torque.tobytes() + code
@@ -82,8 +84,10 @@ def test_round_cones_are_stateless_and_plain_python_has_the_same_bytes(
     )
     for state, expected in zip(chosen[:6], first, strict=False):
         show_state(block, state)
-        memory = cone_solution_memory(n, contacts)
-        solve_whole_body_cones(*call.arguments[:-2], memory, plain)
+        program, reduction = block._program, reduction_memory(n, contacts)
+        own = active_set_program(n, contacts, PLANES)
+        reduce_program(program, reduction, plain)
+        solve_with_cones(program, reduction, cone_memory(contacts), own, plain)
         if int(plain.code[0]) == SOLVED:
             assert plain.torque.tobytes() + plain.code.tobytes() == expected
 
@@ -95,7 +99,7 @@ def test_forces_lie_in_their_cones_and_reach_further_than_the_pyramid_inside(
     edges = 0
     for state in random_states(states, 60, 9):
         show_state(methods._block, state)
-        methods._cones.run()
+        methods.solve(methods._cones)
         if int(methods._solution.code[0]) != SOLVED:
             continue
         forces = methods._solution.force[state.stance]
@@ -111,10 +115,10 @@ def test_a_wrong_proposal_is_not_proved(recorded: tuple[Methods, list[State]]) -
     block = methods._block
     for state in random_states(states, 40, 11):
         show_state(block, state)
-        block._limit.run()
+        methods.full.limit.run()
         active = np.flatnonzero(state.stance)
-        program = block._other.assemble(active)
-        methods._own.run()
+        program = methods.full.assemble(active)
+        methods.solve(methods._own)
         if int(methods._solution.code[0]) != SOLVED:
             continue
         x = np.hstack((methods._solution.acceleration, methods._solution.force[active].ravel()))

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
-from aloft.mathematics.whole_body_solution import SOLVED
+from aloft.mathematics.whole_body_qp import SOLVED
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 
@@ -48,6 +49,7 @@ class Watch:
     """Compares after every step, and counts."""
 
     def __init__(self, block, every):
+        self.full = FullProgram(block)
         self.block, self.every, self.step = block, every, block.step
         self.errors, self.limited, self.stances, self.ticks = [], 0, {}, 0
 
@@ -59,8 +61,7 @@ class Watch:
         if not len(active) or self.ticks % self.every:
             return
         assert int(block._code[0]) == SOLVED
-        block._limit.run()
-        program = block._other.assemble(active)
+        program = self.full.assemble(active)
         x, optimal = polished(program)
         assert optimal
         n = len(block.command.acceleration)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aloft.benchmarks.full_program import rows_without_pyramids
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.control.whole_body_controller import WholeBodyController
-from aloft.blocks.control.whole_body_program import rows_without_pyramids
 from aloft.blocks.signals import Phase
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
-from aloft.mathematics.whole_body_solution import ILL_POSED
+from aloft.mathematics.whole_body_qp import ILL_POSED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -55,7 +55,7 @@ def test_the_cone_is_round(terms):
 def test_clarabel_finds_the_same_with_the_whole_program(terms):
     own, other = solved(terms, cones="round"), solved(terms, cones="round", solver="clarabel")
     assert bool(other.get("command").solved)
-    assert other.get("command").torque == pytest.approx(own.get("command").torque, abs=1e-3)
+    assert other.get("command").torque == pytest.approx(own.get("command").torque, abs=1e-5)
 
 
 @kernel
@@ -73,7 +73,7 @@ def test_where_the_own_method_fails_clarabel_follows(terms):
     )
     bench.step()
     assert bool(bench.get("command").solved) and int(bench.get("command").failures) == 0
-    assert bench.get("command").torque == pytest.approx(exact, abs=1e-3)
+    assert bench.get("command").torque == pytest.approx(exact, abs=1e-5)
 
 
 def test_other_solvers_are_refused():

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.control.whole_body_controller import (
     ActiveCalls,
@@ -19,9 +20,10 @@ from aloft.blocks.control.whole_body_controller import (
     keep_solution,
 )
 from aloft.blocks.signals import Phase
-from aloft.mathematics.whole_body_solution import ILL_POSED, SOLVED
+from aloft.mathematics.whole_body_qp import ILL_POSED, NOT_FOUND, SOLVED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
+from aloft.runtime.language.steps import PythonCall
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
@@ -83,7 +85,7 @@ def residual(terms, command):
 def cost(bench, command, active):
     """The program's cost, recomputed from its own matrices."""
     block = bench.block
-    program = block._other.assemble(active)
+    program = FullProgram(block).assemble(active)
     x = np.concatenate([command["acceleration"], command["force"][active].ravel()])
     return 0.5 * x @ program.cost.hessian @ x + program.cost.gradient @ x, program, x
 
@@ -296,9 +298,10 @@ def test_the_fallback_is_the_defined_one(dynamics):
     bench.step()
     command = bench.get("command")
     last = command.torque.copy()
-    works, bench.block._own = bench.block._other, False
-    bench.block._arrange()
-    bench.block._other = type("Broken", (), {"solve": lambda self, *args: None})()
+    block = bench.block
+    own, daqp = block._solve, block._fallback
+    block._solve = block._fallback = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
+    block._arrange()
     for failed in (1, 2, 3):
         bench.step()
         assert command.torque == pytest.approx(0.8**failed * last, abs=1e-12)
@@ -313,13 +316,13 @@ def test_the_fallback_is_the_defined_one(dynamics):
     assert command.torque == pytest.approx(wanted, abs=1e-10)
     assert command.force == pytest.approx(np.tile(quarter, (4, 1)))
     assert int(command.failures) == 4
-    bench.block._other = works  # DAQP, as where the own method fails
+    block._fallback = daqp  # as where the own method fails
     bench.step()
     assert bool(command.solved)
     assert int(command.failures) == 4
     assert command.torque == pytest.approx(last, abs=1e-5)
-    bench.block._own = True
-    bench.block._arrange()
+    block._solve = own
+    block._arrange()
     bench.step()
     assert command.torque.tolist() == last.tolist()
 
@@ -327,7 +330,9 @@ def test_the_fallback_is_the_defined_one(dynamics):
 def test_the_fallback_survives_a_snapshot(dynamics):
     bench = make(model(dynamics))
     bench.step()
-    bench.block._solver = type("Broken", (), {"solve": lambda self, *args: None})()
+    block = bench.block
+    block._solve = block._fallback = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
+    block._arrange()
     bench.step(2)
     snapshot = bench.snapshot()
     bench.step()

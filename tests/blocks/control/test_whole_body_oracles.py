@@ -14,11 +14,11 @@ import pytest
 import quadprog
 
 import aloft
+from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.mathematics.active_set import INFEASIBLE
 from aloft.mathematics.quadratic_program import QuadraticProgramSolver
-from aloft.mathematics.whole_body_qp import joint_torque
-from aloft.mathematics.whole_body_solution import SOLVED
+from aloft.mathematics.whole_body_qp import SOLVED
 from aloft.robots.description import find_robot
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "jump.yaml"
@@ -75,7 +75,7 @@ class Solvers:
     """All solvers on one state at a time, in the memory of the controller of a jump that is over."""
 
     def __init__(self, block: WholeBodyController) -> None:
-        self.block = block
+        self.block, self.full = block, FullProgram(block)
         self.daqp, self.clarabel = map(QuadraticProgramSolver, ("daqp", "clarabel"))
 
     def set(self, state: State, stance: np.ndarray) -> None:
@@ -85,22 +85,26 @@ class Solvers:
                 write(array, value)
         write(block.phase.stance, stance)
         write(block.joints.velocity, state.velocity)
-        block._limit.run()
+        self.full.limit.run()
         self.active = np.flatnonzero(stance)
-        self.program = block._other.assemble(self.active)
+        self.program = self.full.assemble(self.active)
 
     def own(self):
         """The code and the torque of the controller's own method."""
+        self.block._reduce.run()
         self.block._solve.run()
         return int(self.block._code[0]), self.block.command.torque.copy()
 
     def torque(self, x):
         """The joint torque of a solution of the full program."""
-        n = 6 + len(ROBOT.joints)
-        force, torque = np.zeros((4, 3)), np.zeros(n - 6)
-        force[self.active] = x[n:].reshape(-1, 3)
-        joint_torque(self.block._model, x[:n].copy(), force, np.zeros(n - 6), torque)
-        return torque
+        return self.full.torque(x, self.active)
+
+    def fallback(self):
+        """The torque by DAQP on the reduced program; none if it fails."""
+        self.block._reduce.run()
+        self.block._fallback.run()
+        solved = int(self.block._code[0]) == SOLVED
+        return self.block.command.torque.copy() if solved else None
 
     def by(self, solver):
         program = self.program
@@ -162,9 +166,10 @@ def compare(solvers, states, turns):
             continue
         assert code == SOLVED
         best = solvers.torque(x)
-        daqp = solvers.by(solvers.daqp)
-        assert daqp is not None
-        errors.append((np.abs(torque - best).max(), np.abs(solvers.torque(daqp) - best).max()))
+        daqp, reduced = solvers.by(solvers.daqp), solvers.fallback()
+        assert daqp is not None and reduced is not None
+        found = torque, solvers.torque(daqp), reduced
+        errors.append([np.abs(each - best).max() for each in found])
         if k % 10 == 0:
             other, cost = solvers.by(solvers.clarabel), solvers.cost(x)
             gaps.append(abs(solvers.cost(other) - cost) / (1.0 + abs(cost)))
@@ -177,9 +182,9 @@ def check(monkeypatch, jumps, *, duration, every):
         block, states = states_of_a_jump(monkeypatch, overrides, duration=duration, every=every)
         assert block._solve.compiled is not None
         for turns in (False, True):
-            count, infeasible, (own, daqp), gap = compare(Solvers(block), states, turns)
+            count, infeasible, (own, daqp, reduced), gap = compare(Solvers(block), states, turns)
             assert infeasible == 0
-            assert own < 1e-6 and daqp < 1e-6, (overrides, own, daqp)
+            assert max(own, daqp, reduced) < 1e-6, (overrides, own, daqp, reduced)
             assert gap < 1e-6, (overrides, gap)
         total += count
     return total
