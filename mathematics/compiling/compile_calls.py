@@ -29,8 +29,7 @@ LONGEST_WAIT = 300.0
 _BETWEEN_LOOKS = 0.2
 
 _one_at_a_time = threading.Lock()
-"""Held while kernels are compiled: ``linked_once`` changes numba for the whole process, so a second
-thread would have its kernels linked, or put in memory, in a mixture of both ways."""
+"""Held while kernels are compiled, so that a second thread finds what the first has made."""
 _loaded: dict[str, MachineCode] = {}
 _names: dict[tuple[Callable[..., None], tuple[ArgumentType, ...]], str] = {}
 
