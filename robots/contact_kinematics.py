@@ -25,14 +25,13 @@ from ..mathematics.body_dynamics import (
     place_of,
     velocity_at,
 )
-from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.rotations import rotate_back
 from .kinematics import ball_feet, body_tree, contact_centres, link_poses_in_base
 from .robot_description import RobotDescription
 
 
-class Contacts(NamedTuple):
+class ContactGeometry(NamedTuple):
     """The feet and the round rubber of their contact points.
 
     ``body`` and ``sole`` (n_feet, 3) are a foot's body and the centre of its sole [m, body]; ``ball``
@@ -61,7 +60,7 @@ class ContactMotion(NamedTuple):
     com_velocity: Vector3
 
 
-class Rigid(NamedTuple):
+class RigidBodies(NamedTuple):
     """The robot's bodies, their motion while the base only turns, and scratch: three places (3, 3)."""
 
     tree: BodyTree
@@ -69,49 +68,51 @@ class Rigid(NamedTuple):
     scratch: Matrix3
 
 
-class Measured(NamedTuple):
-    """The base's ``orientation``, which gives the vertical, and ``angular_velocity`` [rad/s, body], and
-    the joints' ``position`` and ``velocity`` [rad, rad/s]."""
-
-    orientation: Array1D
-    angular_velocity: Vector3
-    position: Array1D
-    velocity: Array1D
-
-
 @kernel
 def contact_motion(
-    rigid: Rigid, contacts: Contacts, measured: Measured, seen: ContactMotion
+    bodies: RigidBodies,
+    contacts: ContactGeometry,
+    orientation: Array1D,
+    angular_velocity: Vector3,
+    position: Array1D,
+    velocity: Array1D,
+    out: ContactMotion,
 ) -> None:
-    """The contact points as seen from the base, which is held in place but turns."""
-    tree, motion, down, arm = rigid.tree, rigid.motion, rigid.scratch[0], rigid.scratch[1]
-    motion.velocity[0, 3:6] = measured.angular_velocity
+    """The contact points as seen from the base, which is held in place but turns.
+
+    Args:
+        orientation: the base's quaternion, which gives the vertical.
+        angular_velocity: of the base [rad/s, body].
+        position, velocity: of the joints [rad, rad/s], (n_joints,).
+    """
+    tree, motion, down, arm = bodies.tree, bodies.motion, bodies.scratch[0], bodies.scratch[1]
+    motion.velocity[0, 3:6] = angular_velocity
     down[:] = 0.0
-    place_bodies(tree, measured.position, motion)
-    move_bodies(tree, measured.velocity, motion)
+    place_bodies(tree, position, motion)
+    move_bodies(tree, velocity, motion)
     down[2] = -1.0
-    rotate_back(measured.orientation, down, down)
+    rotate_back(orientation, down, down)
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
-        point = seen.points[i]
+        point = out.points[i]
         place_of(motion, body, contacts.centre[i], point)
         point[:] = point + contacts.radius[i] * down
-        velocity_at(motion, body, point, seen.rates[i])
-    seen.forward[:] = 0.0
+        velocity_at(motion, body, point, out.rates[i])
+    out.forward[:] = 0.0
     for foot in range(contacts.body.shape[0]):
         body, ball = contacts.body[foot], contacts.ball[foot]
-        place_of(motion, body, contacts.sole[foot], seen.soles[foot])
+        place_of(motion, body, contacts.sole[foot], out.soles[foot])
         for k in range(3):
-            seen.forward[k] = seen.forward[k] + motion.rotation[body, k, 0]
+            out.forward[k] = out.forward[k] + motion.rotation[body, k, 0]
             if ball >= 0:
-                seen.soles[foot, k] = seen.points[ball, k]
+                out.soles[foot, k] = out.points[ball, k]
     if contacts.patterned:
-        see_pattern(contacts.pattern, seen.points, down, arm, seen.forward)
-    see_com_velocity(rigid, seen.com_velocity)
+        pattern_direction(contacts.pattern, out.points, down, arm, out.forward)
+    relative_com_velocity(bodies, out.com_velocity)
 
 
 @kernel
-def see_pattern(
+def pattern_direction(
     pattern: Array2D, points: Rows3, down: Vector3, aside: Vector3, forward: Vector3
 ) -> None:
     """The direction ahead (3,), from where the points are: see ``_pattern``.
@@ -133,9 +134,9 @@ def see_pattern(
 
 
 @kernel
-def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
+def relative_com_velocity(bodies: RigidBodies, out: Vector3) -> None:
     """The velocity (3,) of the centre of mass relative to the base's origin [m/s, body]."""
-    tree, motion, place, velocity = rigid.tree, rigid.motion, rigid.scratch[1], rigid.scratch[2]
+    tree, motion, place, velocity = bodies.tree, bodies.motion, bodies.scratch[1], bodies.scratch[2]
     total = 0.0
     out[0] = out[1] = out[2] = 0.0
     for body in range(tree.mass.shape[0]):
@@ -149,24 +150,24 @@ def see_com_velocity(rigid: Rigid, out: Vector3) -> None:
 
 @kernel
 def differentiate_contacts(
-    rigid: Rigid, contacts: Contacts, centres: Array2D, jacobians: Array3D
+    bodies: RigidBodies, contacts: ContactGeometry, centres: Array2D, jacobians: Array3D
 ) -> None:
     """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
     (n_contacts, 3, n_joints), with the bodies where ``contact_motion`` has left them."""
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
         centre, jacobian = centres[i], jacobians[i]
-        place_of(rigid.motion, body, contacts.centre[i], centre)
+        place_of(bodies.motion, body, contacts.centre[i], centre)
         for k in range(jacobian.shape[1]):
             jacobian[0, k] = jacobian[1, k] = jacobian[2, k] = 0.0
         x, y, z = centre[0], centre[1], centre[2]
         while body > 0:
-            joint = rigid.motion.joint[body - 1]
+            joint = bodies.motion.joint[body - 1]
             u, v, w = joint[3], joint[4], joint[5]
             jacobian[0, body - 1] = joint[0] + (v * z - w * y)
             jacobian[1, body - 1] = joint[1] + (w * x - u * z)
             jacobian[2, body - 1] = joint[2] + (u * y - v * x)
-            body = rigid.tree.parent[body - 1]
+            body = bodies.tree.parent[body - 1]
 
 
 class ContactKinematics:
@@ -190,7 +191,7 @@ class ContactKinematics:
             no heading.
 
     ``centres`` and ``jacobians`` are updated by ``differentiate`` only. A kernel that calls
-    ``contact_motion`` itself takes ``rigid``, ``contacts`` and ``seen``.
+    ``contact_motion`` itself takes ``bodies``, ``contacts`` and ``motion``.
     """
 
     def __init__(self, robot: RobotDescription) -> None:
@@ -200,8 +201,8 @@ class ContactKinematics:
         ball_of_foot = {ball.foot: ball.point for ball in balls}
         self._foot_of_point, self._centres = owners, list(contact_centres(robot))
         self._pattern = _pattern(robot) if len(balls) == len(robot.feet) > 1 else None
-        self.rigid = Rigid(body_tree(robot), body_motion(n_joints), np.zeros((3, 3)))
-        self.contacts = Contacts(
+        self.bodies = RigidBodies(body_tree(robot), body_motion(n_joints), np.zeros((3, 3)))
+        self.contacts = ContactGeometry(
             np.array([bodies[foot.link] for foot in robot.feet], dtype=np.int64),
             np.array([foot.sole for foot in robot.feet], dtype=np.float64).reshape(-1, 3),
             np.array([ball_of_foot.get(k, -1) for k in range(len(robot.feet))], dtype=np.int64),
@@ -214,16 +215,11 @@ class ContactKinematics:
         self.points, self.rates = np.zeros((n_contacts, 3)), np.zeros((n_contacts, 3))
         self.soles = np.zeros((len(robot.feet), 3))
         self.forward, self.com_velocity = np.zeros(3), np.zeros(3)
-        self.seen = ContactMotion(
+        self.motion = ContactMotion(
             self.points, self.rates, self.soles, self.forward, self.com_velocity
         )
-        self._measured = Measured(np.zeros(4), np.zeros(3), np.zeros(n_joints), np.zeros(n_joints))
-        self._see = KernelCall(contact_motion, self.rigid, self.contacts, self._measured, self.seen)
         self.centres = np.zeros((n_contacts, 3))
         self.jacobians = np.zeros((n_contacts, 3, n_joints))
-        self._differentiate = KernelCall(
-            differentiate_contacts, self.rigid, self.contacts, self.centres, self.jacobians
-        )
         self.heading_levers = self._find_heading_levers()
 
     def _find_heading_levers(self) -> Array:
@@ -250,17 +246,22 @@ class ContactKinematics:
             angular_velocity: of the base [rad/s, body], (3,).
             position, velocity: of the joints [rad, rad/s], (n_joints,).
         """
-        measured = self._measured
-        measured.orientation[...], measured.position[...] = orientation, position
-        measured.angular_velocity[...], measured.velocity[...] = angular_velocity, velocity
-        self._see.run()
+        contact_motion(
+            self.bodies,
+            self.contacts,
+            orientation,
+            angular_velocity,
+            position,
+            velocity,
+            self.motion,
+        )
 
     def differentiate(self) -> None:
         """Update ``centres`` and ``jacobians`` for the joints of the last ``evaluate``.
 
         The centre of the rubber is its radius above the ground, whatever the base's orientation.
         """
-        self._differentiate.run()
+        differentiate_contacts(self.bodies, self.contacts, self.centres, self.jacobians)
 
 
 def _pattern(robot: RobotDescription) -> Array:

@@ -168,8 +168,8 @@ UNUSED = {
                 "centre": POSE[0], "radius": 0.05, "axis": 1, "turn_time": 2.0, "start": 0.5,
                 "growth": 1.0,
             },
-            {"tick": 400, "base_period": 0.002},
         ),
+        record_type("Clock", ("tick", "base_period"))(np.array(400), 0.002),
     ),
     "aloft.blocks.jumping.plan_progress.follow_fall": (1.23, *FALLING),
     "aloft.blocks.jumping.plan_progress.time_to_fall": (0.35, -0.8),
@@ -186,7 +186,6 @@ UNUSED = {
         FOLLOWED[1], FOLLOWED[3], FOLLOWED[5],
     ),
     "aloft.blocks.control.leg_inverse_kinematics.lead_share": FOLLOWED[1:2],
-    "aloft.blocks.control.leg_inverse_kinematics.planned_pitch": (np.array([0.02, 0.2, -0.03, 0.98]),),
     "aloft.blocks.control.leg_inverse_kinematics.excess_pitch": (np.eye(3), 0.1),
     "aloft.blocks.control.leg_inverse_kinematics.level_sole": (1, *FOLLOWED[:5], 0.1),
     "aloft.blocks.control.balance_target.correct_place": PLACE,
@@ -300,7 +299,7 @@ UNUSED = {
         np.array([0.01, 0.0, -0.2]), 0.022, np.eye(3), np.zeros(3),
     ),
     "aloft.blocks.control.dynamics.rolling_drift": (MOVING, 1, POSE[0], POSE[1], np.zeros(3)),
-    "aloft.robots.contact_kinematics.see_pattern": (POSE[1:3], REGULAR, *np.ones((3, 3))),
+    "aloft.robots.contact_kinematics.pattern_direction": (POSE[1:3], REGULAR, *np.ones((3, 3))),
     "aloft.blocks.control.joint_pd.add_friction": (
         *records(
             {"velocity": POSE[0]}, {"torque": np.ones(3)}, {"friction_speed": 0.3},

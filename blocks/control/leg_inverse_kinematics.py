@@ -7,10 +7,11 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Literal
 
-from ...mathematics.arrays import Array1D, Matrix3, Vector4
+from ...mathematics.arrays import Array1D, Matrix3
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import pitch_angle
 from ...robots.five_joint_leg import Leg, find_leg
 from ...robots.five_joint_track import (
     FootMotion,
@@ -110,7 +111,7 @@ class LegConstants(Signal):
     sole_highest = Field("n_feet", unit="rad", text="its highest position")
 
 
-class LegScratch(Signal):
+class LegKinematicsScratch(Signal):
     """Room for a step of ``LegInverseKinematics``."""
 
     slides = Field(dtype="bool", text="whether a foot out of reach slides in its sole's plane")
@@ -176,11 +177,11 @@ class LegInverseKinematics(KernelBlock):
 
     Params = LegParams
     Constants = LegConstants
-    Scratch = LegScratch
+    Scratch = LegKinematicsScratch
     needs = ("feet",)
     params: LegParams
     constants: LegConstants
-    scratch: LegScratch
+    scratch: LegKinematicsScratch
 
     feet = Input(FootTarget, text="where the feet should be, relative to the base")
     joints = Input(JointState, text="measured joints, where the least squares begin")
@@ -285,7 +286,7 @@ def begin_targets(
     target: JointTarget,
     params: LegParams,
     constants: LegConstants,
-    scratch: LegScratch,
+    scratch: LegKinematicsScratch,
 ) -> None:
     """Set held joints to their position and all others to the measured one.
 
@@ -332,7 +333,7 @@ def follow_plan(
 ) -> None:
     """Set the plan's joints, ahead of time and with level soles, and remember them for a late landing."""
     ahead = params.plan_lead * lead_share(reference)
-    pitch = planned_pitch(reference.orientation)
+    pitch = pitch_angle(reference.orientation)
     if not keeps_acceleration(reference, params, memory):
         memory.flown_acceleration[:] = reference.joint_acceleration
     extrapolate(
@@ -396,13 +397,6 @@ def lead_share(reference: JumpReference) -> float:
     if since < 0.0 or duration <= 0.0:
         return 1.0
     return float(min(2.0 * since / duration, 1.0))
-
-
-@kernel
-def planned_pitch(orientation: Vector4) -> float:
-    """The angle [rad] about its y axis by which a quaternion x, y, z, w turns the base."""
-    x, y, z, w = orientation[0], orientation[1], orientation[2], orientation[3]
-    return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel

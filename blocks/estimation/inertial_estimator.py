@@ -18,11 +18,10 @@ from ...mathematics.inertial_filter import (
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate
 from ...robots.contact_kinematics import (
+    ContactGeometry,
     ContactKinematics,
     ContactMotion,
-    Contacts,
-    Measured,
-    Rigid,
+    RigidBodies,
     contact_motion,
 )
 from ...runtime.language.block import Block, Input, Output, State
@@ -119,9 +118,8 @@ class InertialScratch(Signal):
 class LegKinematics(NamedTuple):
     """Where the contact points are: see ``ContactKinematics`` and ``StandingPoints``."""
 
-    rigid: Rigid
-    contacts: Contacts
-    measured: Measured
+    bodies: RigidBodies
+    contacts: ContactGeometry
     motion: ContactMotion
     points: StandingPoints
 
@@ -158,13 +156,9 @@ class InertialEstimator(Block):
         estimate, scratch = self.estimate, self.scratch
         kinematics = ContactKinematics(self.robot)
         self.legs = LegKinematics(
-            kinematics.rigid,
+            kinematics.bodies,
             kinematics.contacts,
-            Measured(
-                estimate.orientation, estimate.angular_velocity, self.joints.position,
-                scratch.joint_rates,
-            ),
-            kinematics.seen,
+            kinematics.motion,
             StandingPoints(
                 scratch.place, scratch.rate, self.contacts.active, scratch.weight,
                 estimate.anchor, estimate.anchored,
@@ -199,14 +193,17 @@ def predict(
     scratch.last_rate[:] = estimate.angular_velocity
     estimate.angular_velocity[:] = scratch.gyro - estimate.gyro_bias
     if not estimate.started:
-        start(estimate, legs, constants, scratch)
+        start(joints, estimate, legs, constants, scratch)
         return 0.0
     propagate(
         estimate.orientation, estimate.position, estimate.velocity, scratch.last_rate,
         estimate.angular_velocity, scratch.force, constants.period, scratch.middle,
         scratch.acceleration,
     )  # fmt: skip
-    contact_motion(legs.rigid, legs.contacts, legs.measured, legs.motion)
+    contact_motion(
+        legs.bodies, legs.contacts, estimate.orientation, estimate.angular_velocity, joints.position,
+        scratch.joint_rates, legs.motion,
+    )  # fmt: skip
     return watch_motion(estimate, legs, constants, scratch)
 
 
@@ -218,6 +215,7 @@ def limit(values: Array1D, largest: float, out: Array1D) -> None:
 
 @kernel
 def start(
+    joints: JointState,
     estimate: BaseEstimate,
     legs: LegKinematics,
     constants: InertialConstants,
@@ -226,7 +224,10 @@ def start(
     """Start with the robot standing on level ground at the origin, its feet heading along x."""
     motion, error, vector = legs.motion, scratch.error, scratch.vector
     orientation_from_gravity(scratch.force, estimate.orientation)
-    contact_motion(legs.rigid, legs.contacts, legs.measured, motion)
+    contact_motion(
+        legs.bodies, legs.contacts, estimate.orientation, estimate.angular_velocity, joints.position,
+        scratch.joint_rates, motion,
+    )  # fmt: skip
     for _ in range(20):
         misalignment(estimate.orientation, motion.points, motion.forward, error, vector)
         limit(error, 0.2, error)
@@ -351,7 +352,7 @@ def use_contacts(
         legs.points, support * params.velocity_gain, support * params.position_gain,
         estimate.position, estimate.velocity,
     )  # fmt: skip
-    if params.flight == "ballistic" and estimate.flight_ticks > 0:
+    if params.flight == "ballistic":
         fall_freely(estimate, legs, constants, scratch)
     base.position[:] = estimate.position
     base.linear_velocity[:] = estimate.velocity
@@ -368,6 +369,8 @@ def fall_freely(
 ) -> None:
     """In flight, let the centre of mass fall freely and the base follow from the joints."""
     ticks, velocity, change = estimate.flight_ticks, scratch.vector, scratch.acceleration
+    if ticks == 0:
+        return
     rotate(estimate.orientation, legs.motion.com_velocity, velocity)
     velocity[:] += estimate.velocity
     velocity[2] += GRAVITY * constants.period * ticks  # as it was at the start of the fall

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Array1D
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     misalignment,
@@ -27,11 +27,10 @@ from ...mathematics.invariant_filter import (
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, to_matrix
 from ...robots.contact_kinematics import (
+    ContactGeometry,
     ContactKinematics,
     ContactMotion,
-    Contacts,
-    Measured,
-    Rigid,
+    RigidBodies,
     contact_motion,
     differentiate_contacts,
 )
@@ -61,12 +60,13 @@ _START_PLACE = 0.02
 
 
 class TrackedContacts(NamedTuple):
-    """Where the contact points are: see ``ContactKinematics``. ``tracked`` are those of the filter."""
+    """Where the contact points are: see ``ContactKinematics``. ``tracked`` are those of the filter,
+    which does without ``joint_rates``: they are zero."""
 
-    rigid: Rigid
-    contacts: Contacts
-    tracked: Contacts
-    measured: Measured
+    bodies: RigidBodies
+    contacts: ContactGeometry
+    tracked: ContactGeometry
+    joint_rates: Array1D
     motion: ContactMotion
 
 
@@ -150,20 +150,17 @@ class InvariantKalmanFilter(Block):
         return {"n_vectors": 2 + n, "n_errors": 15 + 3 * n + len(robot.joints)}
 
     def setup(self) -> None:
-        robot, constants, scratch = self.robot, self.constants, self.scratch
+        robot, constants = self.robot, self.constants
         kinematics = ContactKinematics(robot)
         points, constants.height[:] = tracked_points(robot)
         constants.foot[:] = robot.foot_of_contact()
         constants.heading_levers[:] = kinematics.heading_levers
         self.legs = TrackedContacts(
-            kinematics.rigid,
+            kinematics.bodies,
             kinematics.contacts,
             kinematics.contacts._replace(centre=points),
-            Measured(
-                self.estimate.orientation, self.estimate.angular_velocity, scratch.angles,
-                np.zeros(len(robot.joints)),
-            ),
-            kinematics.seen,
+            np.zeros(len(robot.joints)),
+            kinematics.motion,
         )  # fmt: skip
 
     def prepare(self) -> None:
@@ -196,8 +193,11 @@ class InvariantKalmanFilter(Block):
             orientation_from_gravity(scratch.force, estimate.orientation)
         scratch.used_offset[:] = estimate.encoder_offset
         scratch.angles[:] = joints.position - scratch.used_offset
-        contact_motion(legs.rigid, legs.contacts, legs.measured, legs.motion)
-        differentiate_contacts(legs.rigid, legs.tracked, scratch.centres, scratch.centre_jacobians)
+        contact_motion(
+            legs.bodies, legs.contacts, estimate.orientation, estimate.angular_velocity,
+            scratch.angles, legs.joint_rates, legs.motion,
+        )  # fmt: skip
+        differentiate_contacts(legs.bodies, legs.tracked, scratch.centres, scratch.centre_jacobians)
         to_matrix(estimate.orientation, scratch.rotation)
         if not estimate.started:
             start(estimate, legs.motion, params, constants, scratch)

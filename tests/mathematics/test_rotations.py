@@ -133,11 +133,9 @@ def test_integrate_turns_on_the_right(q, rate, duration):
 
 
 @given(vectors, vectors)
-def test_cross_and_skew_agree_with_numpy(a, b):
-    out, k = np.empty(3), np.empty((3, 3))
-    rotations.cross(a, b, out)
+def test_skew_agrees_with_the_cross_product_of_numpy(a, b):
+    k = np.empty((3, 3))
     rotations.skew(a, k)
-    assert np.allclose(out, np.cross(a, b), atol=1e-15, rtol=0)
     assert np.allclose(k @ b, np.cross(a, b), atol=1e-15, rtol=0)
 
 
@@ -152,7 +150,7 @@ def test_yaw_and_tilt_of_a_turn_then_a_lean(heading):
 
 
 @pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
-@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (-0.2, 0.5)])
+@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.2, 0.5)])
 def test_pitch_is_the_angle_of_the_x_axis_about_the_bodys_y_axis(pitch, other):
     roll, yaw = other
     about_y = np.array([0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2)])

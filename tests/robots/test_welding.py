@@ -1,12 +1,15 @@
 """A robot without its held joints moves as the whole one does while they are held."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.robots.description import find_robot
+from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.robots.welding import welded
 
+from .example_robots import needs_robots
 from .limbed_robots import humanoid
 
 ROBOT = humanoid().changed(held={"waist": 0.4, "left_hip_yaw": 0.3, "right_hip_roll": -0.2})
@@ -43,6 +46,28 @@ def test_mass_places_and_motion_are_the_whole_robots() -> None:
     found[1][-1] = part.reduce(found[1][-1])
     for one, other in zip(*found, strict=True):
         assert np.abs(one - other).max() < 1e-10
+
+
+@needs_robots
+@pytest.mark.parametrize("name", ["g1", "simple_humanoid", "talos"])
+def test_bodies_are_those_of_pinocchios_reduced_model(name: str) -> None:
+    robot = find_robot(name).model_copy(
+        update={"feet": (), "contacts": ()}
+    )  # no frames but joints'
+    whole, own = (build_pinocchio_model(each).model for each in (robot, welded(robot).robot))
+    for joint in range(1, whole.njoints):
+        whole.addJointFrame(joint)
+    q = pin.neutral(whole)
+    for joint, value in robot.held.items():
+        q[whole.joints[whole.getJointId(joint)].idx_q] = value
+    reduced = pin.buildReducedModel(whole, [whole.getJointId(joint) for joint in robot.held], q)
+    assert len(robot.held) >= 17 and reduced.njoints == own.njoints
+    for k in range(1, own.njoints):
+        other = reduced.getJointId(own.names[k])
+        ours, theirs = own.inertias[k], reduced.inertias[other]
+        np.testing.assert_allclose(ours.matrix(), theirs.matrix(), rtol=0, atol=1e-13)
+        ours, theirs = own.jointPlacements[k], reduced.jointPlacements[other]
+        np.testing.assert_allclose(ours.homogeneous, theirs.homogeneous, rtol=0, atol=1e-13)
 
 
 def test_values_of_all_joints_and_back() -> None:

@@ -16,10 +16,8 @@ from aloft.blocks.control.leg_inverse_kinematics import (
     LegMemory,
     excess_pitch,
     keeps_acceleration,
-    planned_pitch,
 )
 from aloft.blocks.signals import JumpReference, Phase
-from aloft.mathematics.rotations import multiply, to_matrix
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
@@ -30,7 +28,6 @@ from aloft.runtime.testing import BlockBench
 
 from ...kernel_samples import records
 from ...robots.limbed_robots import humanoid, quadruped
-from ...turns import quaternion_of
 
 ROBOT = find_robot("bruce")
 LEGS = [five_joint_leg.read_leg(ROBOT, foot) for foot in range(2)]
@@ -513,27 +510,6 @@ def signal(kind, **values):
     for name, value in values.items():
         getattr(made, name)[...] = value
     return made
-
-
-@pytest.mark.parametrize("pitch", [-3.0, -1.0, 0.0, 0.7, 2.5])
-@pytest.mark.parametrize("other", [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (-0.2, 0.5)])
-def test_the_planned_pitch_is_the_turn_about_y_before_roll_and_yaw(pitch, other):
-    roll, yaw = other
-    found = planned_pitch(quaternion_of([0.0, pitch, 0.0]))
-    assert found == pytest.approx(pitch, abs=1e-12)
-    rolled = multiplied(quaternion_of([0.0, pitch, 0.0]), quaternion_of([roll, 0.0, 0.0]))
-    turned = multiplied(rolled, quaternion_of([0.0, 0.0, yaw]))
-    matrix = np.empty((3, 3))
-    to_matrix(turned, matrix)
-    # the x axis, seen in the plane of x and z
-    expected = math.atan2(-matrix[2, 0], matrix[0, 0])
-    assert planned_pitch(turned) == pytest.approx(expected, abs=1e-12)
-
-
-def multiplied(first, second):
-    out = np.empty(4)
-    multiply(first, second, out)
-    return out
 
 
 @pytest.mark.parametrize("pitch", [-2.9, -0.5, 0.0, 1.0, 3.0])
