@@ -95,27 +95,20 @@ class PlanningOptions:
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False
 
 
-@dataclass(frozen=True)
-class PrintingOptions:
-    """What is printed."""
-
-    as_json: JsonBesideTables = False
-    quiet: Quiet = False
-
-
 @expand_option_groups
 def jump(
     asked: JumpOptions,
     running: TrialOptions,
     recording: RecordOptions,
     planning: PlanningOptions,
-    printing: PrintingOptions,
+    as_json: JsonBesideTables = False,
+    quiet: Quiet = False,
 ) -> None:
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
     from ..studies.batch.seeds import parse_seeds
 
-    as_json, seeds, seed = printing.as_json, running.seeds, running.seed
-    out = console(to_stderr=as_json, quiet=printing.quiet)
+    seeds, seed = running.seeds, running.seed
+    out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
         if seeds and (recording.record is not None or seed):
             raise AloftError(
