@@ -12,7 +12,18 @@ import numpy as np
 
 from .arguments import ArgumentType, RecordType
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
-from .llvm_code import BOOL, NOTHING, Code, Refused, Slice, Value, join, leaves, number, tuple_of
+from .llvm_code import (
+    BOOL,
+    NOTHING,
+    FunctionCode,
+    Refused,
+    Slice,
+    Value,
+    join,
+    leaves,
+    number,
+    tuple_of,
+)
 
 
 class CompileError(Exception):
@@ -66,7 +77,7 @@ class ExpressionTranslator:
         self._callee = callee
         self._types = types
         self._signed = signed
-        self._code = Code()
+        self._code = FunctionCode()
         self._rooms: dict[str, tuple[str, ...]] = {}
         self._callees: dict[str, Translated] = {}
         self._scope = function.__globals__

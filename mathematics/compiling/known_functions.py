@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from .llvm_code import BOOL, FLOAT, INT, NOTHING, Code, Refused, Value, join, number
+from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, Refused, Value, join, number
 
-Translation = Callable[[Code, Sequence[Value]], Value]
+Translation = Callable[[FunctionCode, Sequence[Value]], Value]
 """Writes a call with these arguments, and returns its result."""
 
 
 def _function(name: str) -> Translation:
     """A function of numbers with a fraction, which C's mathematical library or LLVM has."""
 
-    def write(code: Code, arguments: Sequence[Value]) -> Value:
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         operands = [f"double {code.convert(each, FLOAT).parts[0]}" for each in arguments]
         return Value(FLOAT, (code.call(name, "double", *operands),))
 
@@ -31,7 +31,7 @@ def _to_whole(name: str) -> Translation:
     """A function that rounds to a whole number in its own way."""
     rounded = _function(name)
 
-    def write(code: Code, arguments: Sequence[Value]) -> Value:
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         (value,) = arguments
         return value if value.kind == "int" else code.convert(rounded(code, [value]), INT)
 
@@ -39,7 +39,7 @@ def _to_whole(name: str) -> Translation:
 
 
 def _conversion(kind: Any) -> Translation:
-    def write(code: Code, arguments: Sequence[Value]) -> Value:
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         (value,) = arguments
         if value.constant is None and value.kind == kind.kind:
             return value
@@ -51,7 +51,7 @@ def _conversion(kind: Any) -> Translation:
 def _extreme(comparison: str) -> Translation:
     """``max`` or ``min`` of several numbers: as in Python, of equal ones the first."""
 
-    def write(code: Code, arguments: Sequence[Value]) -> Value:
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         kind = arguments[0].type
         for each in arguments[1:]:
             kind = join(kind, each.type)
@@ -63,7 +63,7 @@ def _extreme(comparison: str) -> Translation:
     return write
 
 
-def _absolute(code: Code, arguments: Sequence[Value]) -> Value:
+def _absolute(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     (value,) = arguments
     if value.kind == "float":
         return Value(FLOAT, (code.call("llvm.fabs.f64", "double", f"double {value.parts[0]}"),))
@@ -73,7 +73,7 @@ def _absolute(code: Code, arguments: Sequence[Value]) -> Value:
     return Value(INT, chosen.parts, counts=True)
 
 
-def _length(code: Code, arguments: Sequence[Value]) -> Value:
+def _length(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     (value,) = arguments
     try:
         return code.size(value, 0)
@@ -81,13 +81,13 @@ def _length(code: Code, arguments: Sequence[Value]) -> Value:
         return number(len(value.members))
 
 
-def _is_nan(code: Code, arguments: Sequence[Value]) -> Value:
+def _is_nan(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     x = code.convert(arguments[0], FLOAT).parts[0]
     return Value(BOOL, (code.result(f"fcmp uno double {x}, 0.0"),))
 
 
 def _is_below_infinity(comparison: str) -> Translation:
-    def write(code: Code, arguments: Sequence[Value]) -> Value:
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         size = _absolute(code, [code.convert(arguments[0], FLOAT)])
         infinity = number(math.inf).parts[0]
         text = f"fcmp {comparison} double {size.parts[0]}, {infinity}"
@@ -138,7 +138,7 @@ ELEMENTWISE: dict[Any, Translation] = {
 """How NumPy's functions of elements are written for one element."""
 
 
-def write_elements(code: Code, function: Any, arguments: Sequence[Value]) -> Value:
+def write_elements(code: FunctionCode, function: Any, arguments: Sequence[Value]) -> Value:
     """A call of one of NumPy's functions of elements."""
     write = ELEMENTWISE[function]
     if len(arguments) == function.nin:
@@ -148,7 +148,7 @@ def write_elements(code: Code, function: Any, arguments: Sequence[Value]) -> Val
     return NOTHING
 
 
-def apply(code: Code, out: Value, operands: Sequence[Value], write: Translation) -> None:
+def apply(code: FunctionCode, out: Value, operands: Sequence[Value], write: Translation) -> None:
     """Write to each element of an array what a function makes of those of others, and of numbers."""
 
     def one(places: list[Value]) -> None:
@@ -166,7 +166,7 @@ def apply(code: Code, out: Value, operands: Sequence[Value], write: Translation)
     code.loop(out.shape, one)
 
 
-def write_product(code: Code, arguments: Sequence[Value]) -> Value:
+def write_product(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     """``np.dot(a, b, out)``; sums go from the first product to the last."""
     a, b, *out = arguments
     if not out:
@@ -182,7 +182,7 @@ def write_product(code: Code, arguments: Sequence[Value]) -> Value:
 
 
 def _sum_of_products(
-    code: Code, a: Value, b: Value, rows: list[Value], columns: list[Value]
+    code: FunctionCode, a: Value, b: Value, rows: list[Value], columns: list[Value]
 ) -> Value:
     total = code.variable(FLOAT)
     code.store(number(0.0), total)

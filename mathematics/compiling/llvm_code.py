@@ -144,13 +144,13 @@ def _described(kind: ArgumentType) -> str:
 
 
 class Slice(NamedTuple):
-    """``lower:upper`` in an index; None where it is left out."""
+    """``first:end`` in an index; None where it is left out."""
 
-    lower: Value | None
-    upper: Value | None
+    first: Value | None
+    end: Value | None
 
 
-class Code:
+class FunctionCode:
     """The body of one function, written from its beginning to its end.
 
     Attributes:
@@ -495,8 +495,8 @@ class Code:
 
     def _range(self, index: Slice, size: str) -> tuple[str, str]:
         """The first place and the length of a slice, as Python limits them."""
-        first = "0" if index.lower is None else self._limited(index.lower, size)
-        last = size if index.upper is None else self._limited(index.upper, size)
+        first = "0" if index.first is None else self._limited(index.first, size)
+        last = size if index.end is None else self._limited(index.end, size)
         if first == "0":
             return first, last
         length = self.result(f"sub nsw i64 {last}, {first}")
@@ -554,7 +554,7 @@ def memory_type(kind: ArrayType) -> str:
     raise Refused(f"an array of {kind.dtype} cannot be read")
 
 
-def _same(code: Code, operand: str, leaf: str, wanted: str, text: str) -> str:
+def _same(code: FunctionCode, operand: str, leaf: str, wanted: str, text: str) -> str:
     return operand if leaf == wanted else code.result(f"{text} {leaf} {operand} to {wanted}")
 
 
