@@ -143,7 +143,7 @@ def look(number: int) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Line:
+class Curve:
     """One line of a panel. It is interrupted where ``y`` is not finite.
 
     Attributes:
@@ -188,7 +188,7 @@ class Panel:
     """
 
     title: str
-    lines: Sequence[Line]
+    lines: Sequence[Curve]
     x_label: str = "time [s]"
     x_range: tuple[float, float] | None = None
     shades: Sequence[Shade] = ()
@@ -282,7 +282,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_xlabel(panel.x_label)
 
 
-def _numbers(lines: Sequence[Line]) -> list[int]:
+def _numbers(lines: Sequence[Curve]) -> list[int]:
     """Which colour each line takes: limits and lines with a colour of their own take none."""
     numbers, used = [], 0
     for line in lines:
@@ -291,11 +291,11 @@ def _numbers(lines: Sequence[Line]) -> list[int]:
     return numbers
 
 
-def _colour(line: Line, number: int) -> str:
+def _colour(line: Curve, number: int) -> str:
     return line.colour or (FAINT if line.limit else COLOURS[number % len(COLOURS)])
 
 
-def _last(line: Line, x_range: tuple[float, float]) -> float:
+def _last(line: Curve, x_range: tuple[float, float]) -> float:
     """The last finite value that a line has within the range; NaN where it has none."""
     shown = np.isfinite(line.y) & (line.x >= x_range[0]) & (line.x <= x_range[1])
     return float(line.y[shown][-1]) if shown.any() else float("nan")

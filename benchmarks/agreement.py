@@ -145,7 +145,7 @@ STANCES = (None, (True, True, False, False), (False, False, False, True))
 """Points in stance that each state is solved with: the recorded ones, one foot, and one point."""
 
 
-class State(NamedTuple):
+class SolvedState(NamedTuple):
     """What a controller had in a tick, and what may differ from its parameters.
 
     ``peak`` (n_joints,) are the motors' peak torques [N m], ``friction``, ``force_min`` and ``force_max`` [N] the
@@ -164,7 +164,7 @@ class State(NamedTuple):
 
 def recorded_states(
     overrides: dict[str, Any], duration: float | None = None, every: int = 1
-) -> tuple[WholeBodyController, list[State]]:
+) -> tuple[WholeBodyController, list[SolvedState]]:
     """The controller of a jump that is over, and its states in ticks with a point in stance.
 
     Raises:
@@ -173,7 +173,7 @@ def recorded_states(
     graph = load(GRAPH, overrides).checked
     bound = BoundGraph(graph)
     (block,) = (b for b in bound.blocks.values() if isinstance(b, WholeBodyController))
-    found: list[State] = []
+    found: list[SolvedState] = []
     step: Callable[[], None] = block.step
 
     def watched() -> None:
@@ -187,10 +187,10 @@ def recorded_states(
     return block, found
 
 
-def present_state(block: WholeBodyController) -> State:
+def present_state(block: WholeBodyController) -> SolvedState:
     """The state that a controller has now."""
     w = block._weights
-    return State(
+    return SolvedState(
         TaskRows(*(array.copy() for array in block._rows)),
         RigidBodyTerms(*(array.copy() for array in block._model)),
         block.phase.stance.copy(),
@@ -202,7 +202,7 @@ def present_state(block: WholeBodyController) -> State:
     )
 
 
-def show_state(block: WholeBodyController, state: State) -> None:
+def show_state(block: WholeBodyController, state: SolvedState) -> None:
     """Write a state into the memory of a controller whose graph does not run."""
     pairs: list[tuple[Array, Any]] = [
         *zip(block._rows, state.rows, strict=True),
@@ -219,7 +219,7 @@ def show_state(block: WholeBodyController, state: State) -> None:
         array[...] = values
 
 
-def random_states(states: list[State], count: int, seed: int) -> Iterator[State]:
+def random_states(states: list[SolvedState], count: int, seed: int) -> Iterator[SolvedState]:
     """So many programs made from recorded ones: other points in stance, tasks that ask for up to ten
     times as much with other weights, other speeds, friction and limits.
 
@@ -238,7 +238,7 @@ def random_states(states: list[State], count: int, seed: int) -> Iterator[State]
         )
         rows.weights[:] *= 10.0 ** random.uniform(-1.0, 1.0, len(rows.weights))
         least = float(random.choice([0.0, 0.0, 0.0, 1.0, 10.0, 60.0]))
-        yield State(
+        yield SolvedState(
             rows,
             state.model,
             stance,
@@ -278,7 +278,7 @@ def agreement(count: int = 50_000, seed: int = 1, states: int = STATES) -> list[
     Raises:
         AssertionError: the jumps have fewer states than that.
     """
-    found: list[State] = []
+    found: list[SolvedState] = []
     block: WholeBodyController | None = None
     for number, overrides in enumerate(JUMPS.values()):
         if block is None or len(found) < states:
@@ -293,7 +293,7 @@ def agreement(count: int = 50_000, seed: int = 1, states: int = STATES) -> list[
     return [*recorded.rows("recorded states"), *drawn.rows(f"random programs of seed {seed}")]
 
 
-def _stances(states: Iterable[State]) -> Iterable[State]:
+def _stances(states: Iterable[SolvedState]) -> Iterable[SolvedState]:
     """The states with the recorded points in stance; every third on one foot and every fifth on one
     point as well."""
     for number, state in enumerate(states):
@@ -304,7 +304,7 @@ def _stances(states: Iterable[State]) -> Iterable[State]:
 
 
 @dataclass
-class Found:
+class Agreement:
     """What came out of a set of programs.
 
     ``errors`` [N m] by method; ``by_own`` counts the minima that only the own method has proposed,
@@ -378,9 +378,9 @@ class Methods:
         self._coarser = ConeProgramSolver()
         self._force, self._product = np.zeros((contacts, 3)), np.zeros(n - 6)
 
-    def compare(self, states: Iterable[State]) -> Found:
+    def compare(self, states: Iterable[SolvedState]) -> Agreement:
         """Solve all programs."""
-        found = Found()
+        found = Agreement()
         for state in states:
             show_state(self._block, state)
             self._block._limit.run()
@@ -391,7 +391,7 @@ class Methods:
             self._round(found, program, active, state.friction)
         return found
 
-    def _pyramids(self, found: Found, program: WholeBodyProgram, active: Indices) -> None:
+    def _pyramids(self, found: Agreement, program: WholeBodyProgram, active: Indices) -> None:
         self._own.run()
         code, own = int(self._solution.code[0]), self._solution.torque.copy()
         guess = np.hstack((self._solution.acceleration, self._solution.force[active].ravel()))
@@ -416,7 +416,7 @@ class Methods:
         self._note(found, DAQP, None if x is None else self._torque(x, active), torque)
 
     def _round(
-        self, found: Found, program: WholeBodyProgram, active: Indices, friction: float
+        self, found: Agreement, program: WholeBodyProgram, active: Indices, friction: float
     ) -> None:
         self._cones.run()
         code, own = int(self._solution.code[0]), self._solution.torque.copy()
@@ -482,7 +482,7 @@ class Methods:
         return proved_minimum(program, Proposal(x, tight, places), friction)
 
     @staticmethod
-    def _note(found: Found, name: str, torque: Array | None, best: Array) -> None:
+    def _note(found: Agreement, name: str, torque: Array | None, best: Array) -> None:
         if torque is None:
             found.unsolved[name] = found.unsolved.get(name, 0) + 1
             found.errors.setdefault(name, [])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from .agreement import agreement
 from .driver import driver
 from .frontier.frontier import frontier
+from .general_blocks import general_blocks
 from .jumps.jumps import jumps
 from .links.link_delays import link_delays
 from .links.links import links
@@ -32,6 +33,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,
+    "general_blocks": general_blocks,
     "planner": planner,
     "recorder": recorder,
     "links": links,
@@ -44,27 +46,25 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 """All benchmarks by name; each returns its rows."""
 LONG = ("agreement", "jumps", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
-COUNTED = ("agreement", "jumps")
-"""Those that can be told how many cases to draw (``count``), and with which ``seed``."""
-SEEDED = ("frontier", "link_delays")
-"""Those that can be told the ``seeds`` of the trial to run with."""
-TIMED = ("recorder",)
-"""Those that can be told how many ``seconds`` to run in real time."""
-PEERED = ("tick",)
-"""Those that can be told where TSID is (``tsid``), and ``since`` which commit to compare."""
-LINKED = ("link_delays",)
-"""Those that can be told the ``jitter`` [s] of messages and the share of them that is lost (``loss``)."""
+OPTIONS: Mapping[str, tuple[str, ...]] = {
+    "seconds": ("recorder",),
+    "count": ("agreement", "jumps"),
+    "seed": ("agreement", "jumps"),
+    "seeds": ("frontier", "link_delays"),
+    "jitter": ("link_delays",),
+    "loss": ("link_delays",),
+    "tsid": ("tick",),
+    "since": ("tick",),
+}
+"""The options of ``aloft bench``, and the benchmarks that take each."""
 
 
 def run_benchmarks(
-    names: Iterable[str] | None = None, seconds: float | None = None,
-    count: int | None = None, seed: int | None = None, seeds: Sequence[int] | None = None,
-    jitter: float | None = None, loss: float | None = None, tsid: str | None = None,
-    since: str | None = None,
-) -> dict[str, Any]:  # fmt: skip
-    """Run the named benchmarks, by default all but those in ``LONG``; ``seconds`` is for those in
-    ``TIMED``, ``count`` and ``seed`` for those in ``COUNTED``, ``seeds`` for those in ``SEEDED``,
-    ``jitter`` [s] and ``loss`` for those in ``LINKED``, ``tsid`` and ``since`` for those in ``PEERED``.
+    names: Iterable[str] | None = None, options: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Run the named benchmarks, by default all but those in ``LONG``.
+
+    Each gets those of the ``options`` that it takes.
 
     Returns:
         ``machine``, ``load`` (averages before and after) and ``rows``, as plain data for JSON.
@@ -79,10 +79,7 @@ def run_benchmarks(
     before = _load()
     rows = []
     for name in chosen:
-        told = {"seconds": (seconds, TIMED), "count": (count, COUNTED), "seed": (seed, COUNTED),
-                "seeds": (seeds, SEEDED), "jitter": (jitter, LINKED), "loss": (loss, LINKED),
-                "tsid": (tsid, PEERED), "since": (since, PEERED)}  # fmt: skip
-        given = {k: v for k, (v, known) in told.items() if v is not None and name in known}
+        given = {k: v for k, v in (options or {}).items() if name in OPTIONS[k]}
         rows += BENCHMARKS[name](**given)
     return {
         "machine": _machine(),

@@ -1,4 +1,4 @@
-"""The cost of recording: control thread time for each tick, disk space for each minute, and memory.
+"""The cost of recording: control thread time for each tick, packing, disk space for each minute, memory.
 
 The graph is the whole jump's, without the score that would end it; so the bus is BRUCE's and the
 control thread has its real work. ``aloft bench recorder --seconds 600`` makes the run in real time
@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..logs.file.row_codec import pack
 from ..logs.recording.recorder import Recorder
 from ..runtime.graph import load
 from ..runtime.language.errors import ExitCode
@@ -36,6 +39,8 @@ GROWTH_GOAL = 16.0
 """Mebibytes that memory may grow from the second to the last quarter of a run of any length."""
 MEMORY_PERIOD = 1.0
 """Seconds between two looks at the recorder's memory."""
+PACKED_TICKS, PACKED_BATCH = 1500, 256
+"""Ticks of the jump that are packed, and how many together: about half a second."""
 
 
 def recorder(seconds: float = 60.0, rounds: int = 30) -> list[Row]:
@@ -47,7 +52,11 @@ def recorder(seconds: float = 60.0, rounds: int = 30) -> list[Row]:
     """
     graph = endless_jump()
     with TemporaryDirectory() as folder:
-        return [*cost(graph, Path(folder), rounds), *paced(graph, Path(folder), seconds)]
+        return [
+            *cost(graph, Path(folder), rounds),
+            *packing(graph),
+            *paced(graph, Path(folder), seconds),
+        ]
 
 
 def endless_jump() -> CheckedGraph:
@@ -118,6 +127,74 @@ def _drain(sink: Recorder) -> None:
     assert sink.link is not None
     while sink.link.ring.read_back < sink.link.ring.written:
         time.sleep(1e-3)
+
+
+def packing(graph: CheckedGraph) -> list[Row]:
+    """Size and time of the packed rows, beside what Arrow makes of the same columns."""
+    result = Executor(graph).run(PACKED_TICKS)
+    result.raise_if_failed()
+    assert result.log is not None
+    rows = result.log.rows()
+    batches = [rows[first : first + PACKED_BATCH] for first in range(0, len(rows), PACKED_BATCH)]
+    size, cost = _packed(lambda batch: pack(0, batch), batches)
+    raw = f"{rows.nbytes / 1e6:.1f} MB of {len(rows)} ticks, {PACKED_BATCH} at a time"
+    found = []
+    for peer, write in (
+        ("Arrow IPC with Zstandard", _arrow_ipc),
+        ("Parquet, byte-stream split and Zstandard", _parquet),
+    ):
+        its_size, its_cost = _packed(write, batches)
+        found += [
+            Row("packed rows, size", size, "MB", peer, size / its_size, goal=1.0, note=raw),
+            Row("packed rows, time", cost, "us/tick", peer, cost / its_cost, goal=1.0),
+        ]
+    return found
+
+
+def _packed(
+    write: Callable[[NDArray[np.uint8]], bytes], batches: Sequence[NDArray[np.uint8]]
+) -> tuple[float, float]:
+    """The megabytes of all batches, and the median of the microseconds a tick."""
+    costs, size = [], 0
+    for _ in range(3):
+        began = time.process_time()
+        size = sum(len(write(batch)) for batch in batches)
+        costs.append((time.process_time() - began) * 1e6 / sum(map(len, batches)))
+    return size / 1e6, float(np.median(costs))
+
+
+def _columns(rows: NDArray[np.uint8]) -> Any:
+    """The rows as a table with a column for each number."""
+    import pyarrow as pa
+
+    numbers = np.ascontiguousarray(rows).view(np.float64)
+    return pa.table({str(k): np.ascontiguousarray(each) for k, each in enumerate(numbers.T)})
+
+
+def _arrow_ipc(rows: NDArray[np.uint8]) -> bytes:
+    import pyarrow as pa
+
+    table, out = _columns(rows), pa.BufferOutputStream()
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_stream(out, table.schema, options=options) as writer:
+        writer.write_table(table)
+    return bytes(out.getvalue())
+
+
+def _parquet(rows: NDArray[np.uint8]) -> bytes:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    out = pa.BufferOutputStream()
+    parquet.write_table(
+        _columns(rows),
+        out,
+        compression="zstd",
+        use_dictionary=False,
+        use_byte_stream_split=True,
+        write_statistics=False,
+    )
+    return bytes(out.getvalue())
 
 
 class _MemoryWatch:

@@ -3,16 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .. import __version__
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import JsonBesideTables, benchmark_names
+from .shared.options import JsonBesideTables
 from .shared.output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+FROM_SOURCE = f"""the benchmarks are not in the wheel; install aloft from its source instead:
+    pip download --no-deps --no-binary aloft aloft=={__version__}
+    tar xzf aloft-{__version__}.tar.gz
+    pip install --editable aloft-{__version__}
+or, in a clone of the repository: pip install --editable ."""
+
+
+def find_catalogue() -> ModuleType:
+    """The module that names all benchmarks, which lie beside the package in its source.
+
+    Raises:
+        AloftError: aloft was installed from a wheel, which has no benchmarks.
+    """
+    if find_spec(f"{__package__.rpartition('.')[0]}.benchmarks") is None:
+        raise AloftError(FROM_SOURCE)
+    from ..benchmarks import catalogue
+
+    return catalogue
+
+
+def benchmark_names(incomplete: str) -> list[str]:
+    """The names of benchmarks that begin with a text; none where there are no benchmarks."""
+    try:
+        names = find_catalogue().BENCHMARKS
+    except AloftError:
+        return []
+    return [name for name in names if name.startswith(incomplete)]
 
 
 def bench(
@@ -50,52 +81,31 @@ def bench(
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
-    from ..benchmarks.catalogue import (
-        BENCHMARKS,
-        COUNTED,
-        LINKED,
-        PEERED,
-        SEEDED,
-        TIMED,
-        run_benchmarks,
-    )
     from ..studies.batch.seeds import parse_seeds
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if name and name not in BENCHMARKS:
-            raise AloftError(f"there is no benchmark {name!r}; there is {', '.join(BENCHMARKS)}")
-        if seconds is not None and name not in TIMED:
-            raise AloftError(f"--seconds is for {', '.join(TIMED)}, not for {name or 'all'}")
-        if (count, seed) != (None, None) and name not in COUNTED:
+        catalogue = find_catalogue()
+        if name and name not in catalogue.BENCHMARKS:
             raise AloftError(
-                f"--count and --seed are for {', '.join(COUNTED)}, not for {name or 'all'}"
+                f"there is no benchmark {name!r}; there is {', '.join(catalogue.BENCHMARKS)}"
             )
-        if seeds and name not in SEEDED:
-            raise AloftError(f"--seeds is for {', '.join(SEEDED)}, not for {name or 'all'}")
-        if (jitter or loss) and name not in LINKED:
-            raise AloftError(
-                f"--jitter and --loss are for {', '.join(LINKED)}, not for {name or 'all'}"
-            )
-        if (tsid or since) and name not in PEERED:
-            raise AloftError(
-                f"--tsid and --since are for {', '.join(PEERED)}, not for {name or 'all'}"
-            )
-        chosen = parse_seeds(seeds) if seeds else None
-        longer = _number("--jitter", jitter, "s", 1.0, "'1 ms', up to a second")
-        lost = _number("--loss", loss, "1", 0.999, "'5 %', less than all")
+        options = {
+            "seconds": seconds,
+            "count": count,
+            "seed": seed,
+            "seeds": parse_seeds(seeds) if seeds else None,
+            "jitter": _number("--jitter", jitter, "s", 1.0, "'1 ms', up to a second"),
+            "loss": _number("--loss", loss, "1", 0.999, "'5 %', less than all"),
+            "tsid": tsid or None,
+            "since": since or None,
+        }
+        given = {option: value for option, value in options.items() if value is not None}
+        for option in given:
+            if name not in (takers := catalogue.OPTIONS[option]):
+                raise AloftError(f"--{option} is for {', '.join(takers)}, not for {name or 'all'}")
         with out.status("measuring"):
-            results = run_benchmarks(
-                [name] if name else None,
-                seconds,
-                count,
-                seed,
-                chosen,
-                longer,
-                lost,
-                tsid or None,
-                since or None,
-            )
+            results = catalogue.run_benchmarks([name] if name else None, given)
     print_results(out, results)
     if as_json:
         print_json(results)

@@ -83,12 +83,12 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
 
 def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Panel:
     from ..logs.viewing.signal_names import element_names, unit_of
-    from ..plotting import Line, Panel
+    from ..plotting import Curve, Panel
 
     field = run.signals()[name]
     values = run[name][kept].reshape(int(kept.sum()), -1).astype(np.float64)
     labels = element_names(field, run.header.robot) or [str(k) for k in range(values.shape[1])]
-    lines = [Line(labels[k] if field.shape else "", run.time[kept], values[:, k]) for k in places]
+    lines = [Curve(labels[k] if field.shape else "", run.time[kept], values[:, k]) for k in places]
     unit = unit_of(field)
     return Panel(f"{name} [{unit}]" if unit else name, lines)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from ..studies.study import Filter, Study
+    from ..studies.study import CellFilter, Study
 
 
 def study(
@@ -95,7 +95,7 @@ def study(
 
 def run_study(
     found: Study,
-    part: Filter,
+    part: CellFilter,
     seeds: Sequence[int],
     folder: Path,
     workers: int,

@@ -40,7 +40,12 @@ GRAPH_FILE = ("a graph file", "rate, robot, blocks")
 
 
 def read_file(
-    path: Path, shown: str, problems: Problems, kind_of_file: tuple[str, str] = GRAPH_FILE
+    path: Path,
+    shown: str,
+    problems: Problems,
+    kind_of_file: tuple[str, str] = GRAPH_FILE,
+    *,
+    may_be_empty: bool = False,
 ) -> MapNode | None:
     """The mapping in a file, which messages call ``shown``; ``None`` after a problem.
 
@@ -56,7 +61,7 @@ def read_file(
     except UnicodeDecodeError as error:
         _report_encoding(data, error, shown, problems)
         return None
-    return read_mapping(text, shown, problems, kind_of_file)
+    return read_mapping(text, shown, problems, kind_of_file, may_be_empty=may_be_empty)
 
 
 def _report_encoding(
@@ -81,13 +86,20 @@ def _report_encoding(
 
 
 def read_mapping(
-    text: str, shown: str, problems: Problems, kind_of_file: tuple[str, str] = GRAPH_FILE
+    text: str,
+    shown: str,
+    problems: Problems,
+    kind_of_file: tuple[str, str] = GRAPH_FILE,
+    *,
+    may_be_empty: bool = False,
 ) -> MapNode | None:
     """The mapping in a YAML text; ``None`` after a problem."""
     before = len(problems)
     node = read_value(text, shown, problems)
     if isinstance(node, MapNode):
         return node
+    if node is None and may_be_empty and len(problems) == before:
+        return MapNode((), Position(shown, 1, 1))
     if len(problems) == before:
         found = "a list" if isinstance(node, ListNode) else "a single value"
         if node is None or (isinstance(node, ScalarNode) and node.value is None):
@@ -143,7 +155,7 @@ def _report_syntax(error: yaml.MarkedYAMLError, text: str, shown: str, problems:
         message, fix, other = "a tab where YAML wants spaces", "indent with spaces", None
     elif "mapping values are not allowed" in message:
         fix = "indent the lines of one mapping alike; put text with a colon in quotes"
-    elif "could not find expected ':'" in message or "expected ',' or" in message:
+    elif any(part in message for part in ("expected ':'", "expected ',' or", "expected node")):
         fix = "close the bracket or quote, or add the missing colon or comma"
     elif "expected <block end>" in message or "did not find expected key" in message:
         fix = "indent the lines of one mapping alike"

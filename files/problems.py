@@ -244,13 +244,18 @@ class Problems:
         return Report(file, tuple(sorted(printed_problems, key=lambda problem: problem.where)))
 
 
-def nearest(name: str, legal: Iterable[str], count: int = 3) -> tuple[str, ...]:
-    """The legal names most similar to ``name``, the most similar first; empty if none is."""
+def nearest(
+    name: str, legal: Iterable[str], count: int = 3, cutoff: float = 0.6
+) -> tuple[str, ...]:
+    """The legal names most similar to ``name``, the most similar first; empty if none is.
+
+    Names less similar than ``cutoff``, which is from 0 to 1, are left out.
+    """
     names = list(dict.fromkeys(legal))
     lowered: dict[str, str] = {}
     for candidate in names:
         lowered.setdefault(candidate.lower(), candidate)
-    found = difflib.get_close_matches(name.lower(), list(lowered), n=count, cutoff=0.6)
+    found = difflib.get_close_matches(name.lower(), list(lowered), n=count, cutoff=cutoff)
     return tuple(lowered[match] for match in found)
 
 

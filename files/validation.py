@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,13 +42,18 @@ _BOUNDS = {
 
 
 def read_model(
-    path: Path, model: type[Model], problems: Problems, kind_of_file: tuple[str, str]
+    path: Path,
+    model: type[Model],
+    problems: Problems,
+    kind_of_file: tuple[str, str],
+    *,
+    may_be_empty: bool = False,
 ) -> tuple[Model | None, MapNode | None]:
     """The model in a file, and the file's tree; ``None`` for what cannot be read, which is reported.
 
     ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
-    tree = read_file(path, str(path), problems, kind_of_file)
+    tree = read_file(path, str(path), problems, kind_of_file, may_be_empty=may_be_empty)
     if tree is None:
         return None, None
     try:
@@ -90,24 +96,25 @@ def explain(error: Mapping[str, Any], unit: str = "") -> tuple[str, str]:
 
 def describe(error: Mapping[str, Any], model: type[BaseModel]) -> str:
     """One error of pydantic as a line: where it is, what is expected and what was found."""
-    location = tuple(error["loc"])
-    at = path_text(location)
+    location, value = tuple(error["loc"]), error["input"]
+    at = ".".join(map(str, location))
     if error["type"] == "missing":
-        return f"{at} is missing"
+        return f"{at}: is missing"
     if error["type"] == "extra_forbidden":
-        legal = names_at(model, location[:-1])
-        near = nearest(str(location[-1]), legal, 1)
-        return f"there is no {at}" + (f"; did you mean {near[0]}?" if near else "")
-    info = info_at(model, location)
-    expected, reason = explain(error, unit_of(info))
-    if not at:
-        return reason or expected
-    found = text_of(error["input"]) if _is_short(error["input"]) else "this"
-    return f"{at} cannot be {found}: " + (f"expected {expected}" if expected else reason)
+        near = nearest(str(location[-1]), names_at(model, location[:-1]), 1)
+        return f"{at}: is not known" + (f"; the nearest is {near[0]}" if near else "")
+    unit = unit_of(info_at(model, location))
+    expected, reason = explain(error, unit)
+    expected = with_unit(expected, unit)
+    text = f"expected {expected}" if expected else reason
+    return text if not at or isinstance(value, Mapping) else f"{at}: {text}, found {value!r}"
 
 
-def _is_short(value: Any) -> bool:
-    return value is None or isinstance(value, (bool, int, float, str))
+def with_unit(expected: str, unit: str) -> str:
+    """What is expected, with the unit where it does not say it already."""
+    if not unit or not expected or re.search(rf"(?<!\w){re.escape(unit)}(?!\w)", expected):
+        return expected
+    return f"{expected} in {unit}"
 
 
 def unit_of(info: FieldInfo | None) -> str:
@@ -292,10 +299,15 @@ def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, E
         if isinstance(node, MapNode) and (found := node.get(str(step))) is not None:
             entry, node = found, found.value
             steps.append(str(step))
-        elif isinstance(node, ListNode) and isinstance(step, int) and step < len(node.items):
-            node, entry = node.items[step], None
-            steps.append(step)
+        elif isinstance(node, ListNode) and str(step).isdigit() and int(step) < len(node.items):
+            node, entry = node.items[int(step)], None
+            steps.append(int(step))
     return tuple(steps), node, entry
+
+
+def place_of(root: MapNode, path: Sequence[str | int]) -> Position:
+    """The place of the value at a path, or of the nearest thing that holds it."""
+    return locate(root, path)[1].where
 
 
 def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:

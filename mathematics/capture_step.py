@@ -15,9 +15,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .constants import GRAVITY
 from .kernel import kernel
@@ -157,9 +154,7 @@ def spread_to_feet(stance: Flags1D, foot: Indices1D, n_feet: int, out: Flags1D) 
 
 
 @kernel
-def support_margin(
-    points: NDArray[np.float64], loaded: NDArray[np.bool_], x: float, y: float
-) -> float:
+def support_margin(points: Array2D, loaded: Flags1D, x: float, y: float) -> float:
     """The distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
 
     The support polygon is the convex hull of the ``loaded`` ones of ``points`` (n, 2 or 3). The
@@ -173,23 +168,23 @@ def support_margin(
         if not loaded[i]:
             continue
         first = i if first < 0 else first
-        ax, ay = float(points[i, 0]), float(points[i, 1])
+        ax, ay = points[i, 0], points[i, 1]
         for j in range(count):
             if not loaded[j]:
                 continue
-            dx, dy = float(points[j, 0]) - ax, float(points[j, 1]) - ay
+            dx, dy = points[j, 0] - ax, points[j, 1] - ay
             length = math.sqrt(dx * dx + dy * dy)
             if length < 1e-9:
                 continue
             leftmost = True
             for k in range(count):
-                side = dx * (float(points[k, 1]) - ay) - dy * (float(points[k, 0]) - ax)
+                side = dx * (points[k, 1] - ay) - dy * (points[k, 0] - ax)
                 leftmost = leftmost and (side >= -1e-12 or not loaded[k])
             if leftmost:
                 margin = min(margin, (dx * (y - ay) - dy * (x - ax)) / length)
     if first < 0:
         return -1.0
     if margin == math.inf:
-        dx, dy = float(points[first, 0]) - x, float(points[first, 1]) - y
+        dx, dy = points[first, 0] - x, points[first, 1] - y
         return -math.sqrt(dx * dx + dy * dy)
     return margin

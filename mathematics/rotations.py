@@ -23,16 +23,6 @@ _SMALL = 1e-8
 
 
 @kernel
-def cross(a: Array1D, b: Array1D, out: Array1D) -> None:
-    """The cross product of two three-vectors."""
-    ax, ay, az = a[0], a[1], a[2]
-    bx, by, bz = b[0], b[1], b[2]
-    out[0] = ay * bz - az * by
-    out[1] = az * bx - ax * bz
-    out[2] = ax * by - ay * bx
-
-
-@kernel
 def skew(vector: Array1D, out: Array2D) -> None:
     """The matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
     x, y, z = vector[0], vector[1], vector[2]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -129,9 +128,6 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
     from .importing.fit_to_ground import fit_to_ground
 
     content = text.data if text is not None and text.data is not None else {}
-    if not isinstance(content, Mapping):
-        fault = RobotFault((), "this adds nothing to a robot", "a mapping")
-        raise RobotError(str(added), [text.placed(fault) if text else fault])
     imported = import_robot(path, content)
     faults = [*(text.faults if text else ()), *imported.faults]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.

@@ -98,7 +98,7 @@ COM = slice(1, 4)
 
 
 @dataclass(frozen=True)
-class Value:
+class Estimate:
     """A value that was found, with the standard deviation of its error."""
 
     value: float
@@ -117,10 +117,10 @@ class IdentifiedBody:
         equations: how many were used.
     """
 
-    mass: Value
-    com_offset: tuple[Value, Value, Value]
-    coulomb: dict[str, Value]
-    viscous: dict[str, Value]
+    mass: Estimate
+    com_offset: tuple[Estimate, Estimate, Estimate]
+    coulomb: dict[str, Estimate]
+    viscous: dict[str, Estimate]
     resting: tuple[str, ...]
     equations: int
 
@@ -183,12 +183,12 @@ def identify_rigid_body(
     std = np.sqrt(np.diag(covariance))
     s, n = float(found[0]), int(moved.sum())
     names = [joint.name for joint, moves in zip(robot.joints, moved, strict=True) if moves]
-    offsets = [Value(float(found[k]) / s, float(std[k]) / s) for k in range(1, 4)]
+    offsets = [Estimate(float(found[k]) / s, float(std[k]) / s) for k in range(1, 4)]
     return IdentifiedBody(
-        Value(s * robot.total_mass, float(std[0]) * robot.total_mass),
+        Estimate(s * robot.total_mass, float(std[0]) * robot.total_mass),
         (offsets[0], offsets[1], offsets[2]),
-        {name: Value(float(found[4 + k]), float(std[4 + k])) for k, name in enumerate(names)},
-        {name: Value(float(found[4 + n + k]), float(std[4 + n + k])) for k, name in enumerate(names)},
+        {name: Estimate(float(found[4 + k]), float(std[4 + k])) for k, name in enumerate(names)},
+        {name: Estimate(float(found[4 + n + k]), float(std[4 + n + k])) for k, name in enumerate(names)},
         tuple(j.name for j, moves in zip(robot.joints, moved, strict=True) if not moves),
         len(rows),
     )  # fmt: skip
@@ -336,7 +336,7 @@ class IdentifiedDelay:
         ticks: how many were used.
     """
 
-    delay: Value
+    delay: Estimate
     correlation: float
     ticks: int
 
@@ -383,7 +383,7 @@ def identify_delay(
         )
     parts = [_fit(changes, measured, part, j)[1] for part in np.array_split(used, _PARTS)]
     std = max(float(np.std(parts, ddof=1)) / math.sqrt(_PARTS), _RESOLUTION)
-    return IdentifiedDelay(Value((j + share) * period, std * period), correlation, len(used))
+    return IdentifiedDelay(Estimate((j + share) * period, std * period), correlation, len(used))
 
 
 def _fit(changes: Array, measured: Array, used: NDArray[np.int64], j: int) -> tuple[float, float]:

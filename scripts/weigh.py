@@ -24,6 +24,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 LEFT_OUT = ("tests/", "docs/", "scripts/")
+BESIDE = "benchmarks"
+"""A folder that comes with the source but is no part of the package: its row is below the total."""
 SHORT = 60
 """A file with fewer lines is short."""
 WIDEST = 8
@@ -130,6 +132,14 @@ def parse(texts: dict[str, str]) -> list[Source]:
 
 
 def weigh(sources: list[Source]) -> dict[str, Weight]:
+    """The weight of each folder, of the whole package as ``total``, and of what lies beside it."""
+    weights = weigh_folders([each for each in sources if each.folder != BESIDE])
+    if beside := [each for each in sources if each.folder == BESIDE]:
+        weights[BESIDE] = weigh_folders(beside)["total"]
+    return weights
+
+
+def weigh_folders(sources: list[Source]) -> dict[str, Weight]:
     """The weight of each folder, and of all of them as ``total``."""
     weights: dict[str, Weight] = defaultdict(Weight)
     importers = imported_by(sources)
@@ -300,7 +310,8 @@ def as_data(weights: dict[str, Weight]) -> dict[str, object]:
 
 def print_table(now: dict[str, Weight], base: dict[str, Weight] | None) -> None:
     """A row for each folder; with a base a second one with the numbers of the revision."""
-    names = [*sorted({*now, *(base or {})} - {"total"}), "total"]
+    folders = {*now, *(base or {})}
+    names = [*sorted(folders - {"total", BESIDE}), "total", *folders.intersection({BESIDE})]
     print(" " * 14 + "".join(f"{measure:>15}" for measure in MEASURES))
     for name in names:
         print(row(name, now.get(name)))

@@ -22,7 +22,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.language.units import parse_unit
 from .execution import Run
 from .study import Axis, Plot, Study
-from .summary import Row, figures_of, wilson_interval
+from .summary import StudyRow, figures_of, wilson_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ def group(runs: Sequence[Run], plot: Plot, axes: Sequence[str]) -> dict[tuple[st
     return groups
 
 
-def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]) -> str:
+def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRow]) -> str:
     """The picture as SVG text.
 
     Raises:
@@ -84,7 +84,7 @@ def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]
 
 
 def write_plots(
-    study: Study, runs: Sequence[Run], rows: Sequence[Row], folder: Path
+    study: Study, runs: Sequence[Run], rows: Sequence[StudyRow], folder: Path
 ) -> tuple[dict[str, Path], list[str]]:
     """Draw all plots. Returns the files by the plots' names, and why other plots could not be drawn."""
     written: dict[str, Path] = {}
@@ -108,7 +108,7 @@ def _values(study: Study, name: str) -> dict[str, float]:
     return {case.label: float(case.value) for case in axis.cases}
 
 
-def _polar(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]) -> str:
+def _polar(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRow]) -> str:
     angle_axis, radius_axis = study.axis(plot.angle), study.axis(plot.radius)
     assert angle_axis is not None and radius_axis is not None
     groups = group(runs, plot, (plot.lines, plot.angle, plot.radius))
@@ -147,7 +147,7 @@ def _radians(axis: Axis) -> float:
     return unit.factor_to(rad) if unit.same_dimension(rad) else math.radians(1.0)
 
 
-def _lines(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]) -> str:
+def _lines(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRow]) -> str:
     of_rate = plot.y == "rate"
     axes = (plot.lines, plot.x, *([plot.panels] if plot.panels else []))
     groups = group(runs, plot, axes)
@@ -170,7 +170,7 @@ def _lines(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]) -
     return line_panels(plot.title or study.title, f"{plot.x}{unit}", y_label, panels, share=of_rate)
 
 
-def _dots(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[Row]) -> str:
+def _dots(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRow]) -> str:
     of_rate = plot.y == "rate"
     dots = []
     axes = [a for a in study.axis_names if len(study.labels_of(a)) > 1] or ["task"]

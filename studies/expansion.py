@@ -20,7 +20,7 @@ from ..files.problems import Code, LoadError, Position, Problem, Problems, Repor
 from ..runtime.graph import Graph
 from ..runtime.language.stages import CheckedGraph
 from ..runtime.loading import load, load_text
-from .study import Arm, Axis, Coordinate, Study, Task
+from .study import Arm, Axis, Coordinate, Study, StudyTask
 
 Tuned = Mapping[str, Mapping[str, Any]]
 """What tuning found: parameters by arm."""
@@ -79,7 +79,7 @@ def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()
 
 
 def _cell(
-    study: Study, common: Sequence[Entry], task: Task, arm: Arm, cases: Mapping[Axis, Any]
+    study: Study, common: Sequence[Entry], task: StudyTask, arm: Arm, cases: Mapping[Axis, Any]
 ) -> Cell:
     entries = [*study.sets, *common, *task.sets]
     entries += [entry for case in cases.values() for entry in case.sets]

@@ -15,7 +15,7 @@ from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..files.problems import Code, LoadError, Position, Problems, nearest
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .sections import Labels, read_axes, read_goals, read_plots, read_seeds, read_sets, read_tuning
-from .study import Arm, Filter, Range, Study, Task
+from .study import Arm, CellFilter, Range, Study, StudyTask
 from .tuning import read_range
 
 KEYS = (
@@ -41,7 +41,7 @@ def read_study(path: Path) -> Study:
     return study
 
 
-def part_of(study: Study, texts: Sequence[str]) -> Filter:
+def part_of(study: Study, texts: Sequence[str]) -> CellFilter:
     """The filter that texts such as ``axis=value`` mean. Several values of one axis are alternatives.
 
     Raises:
@@ -130,7 +130,7 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
     )
 
 
-def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple[Task, ...]:
+def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple[StudyTask, ...]:
     given = [keys[key] for key in GRAPH_KEYS if key in keys]
     if len(given) != 1:
         written = " and ".join(repr(entry.key) for entry in given)
@@ -149,7 +149,7 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
         named = [_read_task(item, path, problems) for item in entry.value]
         tasks = [task for task in named if task is not None]
     else:
-        tasks = [Task(p.stem, p, node.where) for node, p in _files(entry, path, problems)]
+        tasks = [StudyTask(p.stem, p, node.where) for node, p in _files(entry, path, problems)]
     names: set[str] = set()
     for task in tasks:
         if task.name in names:
@@ -161,12 +161,12 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
     return tuple(tasks)
 
 
-def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[Task, ...]:
+def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[StudyTask, ...]:
     """The tasks of another study, which has to name them itself."""
     if not isinstance(entry.value, ScalarNode):
         wrong_kind(entry.value, "'graphs_of'", "a study's file, relative to this one", problems)
         return ()
-    tasks: list[Task] = []
+    tasks: list[StudyTask] = []
     for node, file in _files(entry, path, problems):
         tree = read_file(file, str(file), problems, ("a study file", "graph, seeds, grid"))
         if tree is None:
@@ -185,7 +185,7 @@ def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[Task, ...]:
     return tuple(tasks)
 
 
-def _read_task(entry: Entry, path: Path, problems: Problems) -> Task | None:
+def _read_task(entry: Entry, path: Path, problems: Problems) -> StudyTask | None:
     """``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
     file = entry
     sets: tuple[Entry, ...] = ()
@@ -202,7 +202,7 @@ def _read_task(entry: Entry, path: Path, problems: Problems) -> Task | None:
             return None
         file, sets = graph, (read_sets(given, problems) or ()) if given else ()
     found = _files(file, path, problems)
-    return Task(entry.key, found[0][1], entry.key_where, sets) if found else None
+    return StudyTask(entry.key, found[0][1], entry.key_where, sets) if found else None
 
 
 def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[Node, Path]]:

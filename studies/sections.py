@@ -24,7 +24,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .batch.seeds import parse_seeds
 from .quantities import column_name, in_unit, quantity, written
-from .study import FIRST_REPORT_SEED, Axis, Case, Coordinate, Filter, Goal, Plot, Tuning
+from .study import FIRST_REPORT_SEED, Axis, Case, CellFilter, Coordinate, Goal, Plot, Tuning
 
 RESERVED = (
     "task", "arm", "seed", "tuning_seed", "success", "reason", "error", "run_hash", "wall_time_s",
@@ -245,13 +245,13 @@ class Labels:
     by_axis: Mapping[str, tuple[str, ...]]
     axes: Mapping[str, Axis]
 
-    def read_filter(self, entry: Entry | None, problems: Problems) -> Filter:
+    def read_filter(self, entry: Entry | None, problems: Problems) -> CellFilter:
         """``where``: for some axes one value or a list of them."""
         if entry is None:
-            return Filter()
+            return CellFilter()
         if not isinstance(entry.value, MapNode):
             wrong_kind(entry.value, "'where'", "a mapping: {axis: value or [values]}", problems)
-            return Filter()
+            return CellFilter()
         found: dict[str, tuple[str, ...]] = {}
         for item in entry.value:
             if item.key not in self.by_axis:
@@ -263,7 +263,7 @@ class Labels:
             if many and not nodes:
                 wrong_kind(item.value, repr(item.key), "at least one value", problems)
             found[item.key] = tuple(label for label in labels if label is not None)
-        return Filter(found)
+        return CellFilter(found)
 
     def _label(self, axis: str, node: Node, problems: Problems) -> str | None:
         value = plain(node)

@@ -66,7 +66,7 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Task:
+class StudyTask:
     """One graph of the study, with its name and its overrides."""
 
     name: str
@@ -76,7 +76,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Filter:
+class CellFilter:
     """The labels that a cell may have on some axes, ``task`` and ``arm`` among them."""
 
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -91,7 +91,7 @@ class Goal:
     """The success rate that the cells of a filter should reach."""
 
     rate: float
-    cells: Filter = Filter()
+    cells: CellFilter = CellFilter()
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Tuning:
     seeds: tuple[int, ...]
     draws: int
     seed: int = 0
-    cells: Filter = Filter()
+    cells: CellFilter = CellFilter()
     sets: tuple[Entry, ...] = ()
     least: str = ""
     """Between draws of the same number of successes, the one whose mean of this metric is less."""
@@ -121,7 +121,7 @@ class Plot:
     angle: str = ""
     radius: str = ""
     level: float = 0.95
-    cells: Filter = Filter()
+    cells: CellFilter = CellFilter()
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Study:
     name: str
     path: Path
     title: str
-    tasks: tuple[Task, ...]
+    tasks: tuple[StudyTask, ...]
     include: tuple[Path, ...]
     seeds: tuple[int, ...]
     sets: tuple[Entry, ...] = ()

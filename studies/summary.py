@@ -62,7 +62,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Row:
+class StudyRow:
     """The runs of one cell, together. ``goal`` and ``met`` are ``None`` for a cell without a goal."""
 
     cell: Cell
@@ -97,7 +97,7 @@ class Row:
         }  # fmt: skip
 
 
-def summarise(study: Study, runs: Sequence[Run]) -> list[Row]:
+def summarise(study: Study, runs: Sequence[Run]) -> list[StudyRow]:
     """One row for each cell, in the order of the study, with Wilson's 95 % interval of its success rate."""
     by_cell: dict[int, list[Run]] = {}
     for run in runs:
@@ -105,7 +105,7 @@ def summarise(study: Study, runs: Sequence[Run]) -> list[Row]:
     return [_row(study, group) for group in by_cell.values()]
 
 
-def _row(study: Study, runs: Sequence[Run]) -> Row:
+def _row(study: Study, runs: Sequence[Run]) -> StudyRow:
     cell = runs[0].cell
     outcomes = [run.outcome for run in runs if run.outcome is not None]
     successes = sum(outcome.success for outcome in outcomes)
@@ -119,7 +119,7 @@ def _row(study: Study, runs: Sequence[Run]) -> Row:
         if not outcome.success:
             reasons[outcome.reason] = reasons.get(outcome.reason, 0) + 1
     low, high = wilson_interval(successes, len(outcomes))
-    return Row(
+    return StudyRow(
         cell,
         len(outcomes),
         successes,

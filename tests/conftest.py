@@ -41,15 +41,31 @@ def pytest_xdist_auto_num_workers() -> Generator[None, int, int]:
 
 
 @pytest.fixture(scope="session")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel built from a copy of the tracked files, so nothing here is touched."""
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "some-folder"
+def tracked_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the tracked files, so that building touches nothing here."""
+    source = tmp_path_factory.mktemp("source") / "some-folder"
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(*UNTRACKED, "scripts"))
-    code = f"from setuptools import build_meta; build_meta.build_wheel({str(folder)!r})"
+    return source
+
+
+@pytest.fixture(scope="session")
+def wheel(tracked_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel of the tracked files."""
+    return built("wheel", tracked_files, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="session")
+def source_distribution(tracked_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A source distribution of the tracked files."""
+    return built("sdist", tracked_files, tmp_path_factory.mktemp("sdist"))
+
+
+def built(kind: str, source: Path, folder: Path) -> Path:
+    """The one file that setuptools builds of a checkout into a folder."""
+    code = f"from setuptools import build_meta; build_meta.build_{kind}({str(folder)!r})"
     subprocess.run([sys.executable, "-c", code], cwd=source, check=True, capture_output=True)
-    (built,) = folder.glob("*.whl")
-    return built
+    (file,) = folder.iterdir()
+    return file
 
 
 @pytest.fixture(scope="session")

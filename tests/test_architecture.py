@@ -88,7 +88,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "ros2",
+        "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
@@ -107,7 +108,7 @@ HEAVY = {
     "daqp",
     "rerun",
     "scipy",
-    "numba",
+    "llvmlite",
     "pyarrow",
     "PIL",
     "zenoh",
@@ -199,6 +200,18 @@ def test_every_file_has_a_room() -> None:
         if not any(is_within(folder.relative_to(ROOT).parts, room) for room in ALLOWED)
     ]
     assert not without, "say in ALLOWED what the room may import"
+
+
+def test_only_their_verb_imports_the_benchmarks() -> None:
+    """They are not in the wheel."""
+    importing = [
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        if package != "benchmarks"
+        for path in files(package)
+        if any((own(name) or ("",))[0] == "benchmarks" for name in imports(path))
+    ]
+    assert importing == ["cli/bench.py"]
 
 
 @pytest.mark.parametrize("room", ALLOWED)
@@ -382,9 +395,9 @@ def environment_reads(path: Path) -> Iterator[str]:
 
 def test_hidden_configuration_is_refused() -> None:
     # a graph is data: no environment variable may change what it computes
-    # where files are kept, and for which processor numba makes machine code, which has the same bytes
+    # where files are kept, and for which processor machine code is made, which has the same bytes
     # that of OpenBLAS is read to keep apart what was computed under another
-    same_results = {"XDG_CACHE_HOME", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "OPENBLAS_CORETYPE"}
+    same_results = {"XDG_CACHE_HOME", "ALOFT_CPU_NAME", "ALOFT_CPU_FEATURES", "OPENBLAS_CORETYPE"}
     wrong = [
         f"{path.relative_to(ROOT)} reads {name}"
         for package in ("mathematics", "robots", "runtime", "planner", "blocks", "hal")

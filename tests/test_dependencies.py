@@ -15,7 +15,6 @@ NOT_SHIPPED = ("tests", "docs", "scripts")
 BY = {
     "PIL": "pillow",
     "dask": "distributed",
-    "llvmlite": "numba",
     "mujoco": "mujoco-core",
     "fmu_manipulation_toolbox": "fmu-manipulation-toolbox",
     "pinocchio": "pin",

@@ -1,7 +1,9 @@
 """What is shipped: every sub-package, every data file, and a command line that starts at once."""
 
+import os
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from importlib import metadata
@@ -12,7 +14,9 @@ import pytest
 import aloft
 
 ROOT = Path(__file__).parent.parent
-NOT_SHIPPED = {"tests", "docs", "scripts", "recordings", "build", "dist", "aloft.egg-info"}
+NOT_SHIPPED = {
+    "benchmarks", "tests", "docs", "scripts", "recordings", "build", "dist", "aloft.egg-info",
+}  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
 
@@ -46,6 +50,43 @@ def test_the_wheel_holds_nothing_else(wheel: Path) -> None:
     assert tops == {"aloft", f"aloft-{aloft.__version__}.dist-info"}
     shipped = {name.split("/")[1] for name in zipfile.ZipFile(wheel).namelist()}
     assert shipped.isdisjoint(NOT_SHIPPED)
+
+
+def test_without_the_source_bench_says_how_to_get_the_benchmarks(
+    wheel: Path, tmp_path: Path
+) -> None:
+    zipfile.ZipFile(wheel).extractall(tmp_path)
+    packages = [path for path in sys.path if path.endswith("site-packages")]
+    done = subprocess.run(
+        # without `site`, which would find the checkout that is installed here
+        [sys.executable, "-S", "-m", "aloft", "bench", "startup"],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *packages])},
+        cwd=tmp_path,
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: the benchmarks are not in the wheel; install aloft from")
+    for command in (
+        f"pip download --no-deps --no-binary aloft aloft=={aloft.__version__}",
+        f"tar xzf aloft-{aloft.__version__}.tar.gz",
+        f"pip install --editable aloft-{aloft.__version__}",
+    ):
+        assert f"    {command}\n" in done.stderr
+
+
+def test_the_source_distribution_has_what_the_benchmarks_need(
+    source_distribution: Path, wheel: Path
+) -> None:
+    assert source_distribution.name == f"aloft-{aloft.__version__}.tar.gz"
+    with tarfile.open(source_distribution) as tar:
+        inside = {name.partition("/")[2] for name in tar.getnames()}
+    expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "benchmarks").rglob("*.py")}
+    for name in zipfile.ZipFile(wheel).namelist():
+        if name.startswith("aloft/"):
+            expected.add(name.partition("/")[2])
+    assert expected - inside == set()
 
 
 def test_one_version() -> None:

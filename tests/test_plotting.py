@@ -9,7 +9,7 @@ import pytest
 from aloft.plotting import (
     COLOURS,
     SHADES,
-    Line,
+    Curve,
     Panel,
     Shade,
     draw_panels,
@@ -44,7 +44,7 @@ def points(data: str) -> np.ndarray:
 
 def test_a_line_goes_through_its_points() -> None:
     text = drawn(
-        Panel("y [m]", [Line("one", np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 1.0]))])
+        Panel("y [m]", [Curve("one", np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 1.0]))])
     )
     (data,) = lines_of(text)
     (x0, y0), (x1, y1), (x2, y2) = points(data)
@@ -56,18 +56,22 @@ def test_a_line_goes_through_its_points() -> None:
 
 def test_a_line_is_interrupted_where_it_is_not_finite() -> None:
     y = np.where((X > 0.4) & (X < 0.5), np.nan, np.sin(9.0 * X))
-    (data,) = lines_of(drawn(Panel("", [Line("", X, y)])))
+    (data,) = lines_of(drawn(Panel("", [Curve("", X, y)])))
     assert data.count("M") == 2
 
 
 def test_a_constant_line_and_no_line_can_be_drawn() -> None:
-    for lines in ([Line("c", X, np.full(101, 2.0))], [Line("", X, np.full(101, np.nan))], []):
+    for lines in (
+        [Curve("c", X, np.full(101, 2.0))],
+        [Curve("", X, np.full(101, np.nan))],
+        [],
+    ):
         assert "<svg" in drawn(Panel("", lines))
 
 
 def test_limits_are_told_apart_and_take_no_colour() -> None:
-    limit = Line("limit", X, np.ones(101), limit=True)
-    text = drawn(Panel("", [limit, Line("a", X, X)]))
+    limit = Curve("limit", X, np.ones(101), limit=True)
+    text = drawn(Panel("", [limit, Curve("a", X, X)]))
     assert len(lines_of(text, "limit")) == 1 and len(lines_of(text)) == 1
     assert f"stroke: {COLOURS[0]}" in text and f"stroke: {COLOURS[1]}" not in text
 
@@ -76,7 +80,7 @@ def test_stretches_are_shaded_as_far_as_they_reach() -> None:
     def share(*shades: Shade) -> float:
         with style():
             figure = new_figure(4.0, 3.0)
-            draw_panels([(figure.add_subplot(), Panel("", [Line("", X, X)], shades=shades))])
+            draw_panels([(figure.add_subplot(), Panel("", [Curve("", X, X)], shades=shades))])
             pixels = np.asarray(image(figure)).astype(int)
         colour = [int(SHADES["flight"][k : k + 2], 16) for k in (1, 3, 5)]
         return float((np.abs(pixels - colour).max(axis=2) < 4).mean())
@@ -86,7 +90,9 @@ def test_stretches_are_shaded_as_far_as_they_reach() -> None:
 
 
 def test_the_same_data_give_the_same_bytes() -> None:
-    panel = Panel("a", [Line("x", X, X**2), Line("y", X, X)], shades=[Shade(0.1, 0.2, "push", "p")])
+    panel = Panel(
+        "a", [Curve("x", X, X**2), Curve("y", X, X)], shades=[Shade(0.1, 0.2, "push", "p")]
+    )
     assert drawn(panel) == drawn(panel)
     assert "date" not in drawn(panel).lower()
 

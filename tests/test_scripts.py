@@ -112,3 +112,12 @@ def test_what_the_package_weighs() -> None:
     assert [place.split()[-1] for place in total.places["vague classes"]] == ["Told"]
     assert [place.split(":")[0] for place in total.places["shared names"]] == ["Other"]
     assert WEIGH.widest({"total": total})[0] == (3, "a/one.py:17 step")
+
+
+def test_benchmarks_weigh_for_themselves() -> None:
+    bench = {
+        "benchmarks/one.py": "from ..b.two import Told\n\n\nclass Told(NamedTuple):\n    x: int\n"
+    }
+    weights = WEIGH.weigh(WEIGH.parse(SOURCES | bench))
+    assert weights.pop("benchmarks").counts["lines"] == 5
+    assert weights == WEIGH.weigh(WEIGH.parse(SOURCES))

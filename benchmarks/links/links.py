@@ -31,7 +31,7 @@ from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
 from ...runtime.loading import load_text
-from ...runtime.placement.placed import Link, PlacedGraph, place
+from ...runtime.placement.placed import MachineLink, PlacedGraph, place
 from ...runtime.running.memory import Memory
 from ...runtime.transports.transport import Transport, data_key
 from ...runtime.transports.zenoh_transport import ZenohTransport
@@ -118,15 +118,15 @@ class _End:
         self.transport: Transport = ZenohTransport("bench", placed.machines, wait=wait)
         self.transport.open(machine, lambda name: None)
 
-    def sender(self, link: Link) -> tuple[MessageWriter, Callable[[bytes], None]]:
+    def sender(self, link: MachineLink) -> tuple[MessageWriter, Callable[[bytes], None]]:
         bus = self.memory.bus
         put = self.transport.publisher(data_key(link.sender, link.receiver, link.source))
         return MessageWriter(link, bus.layout, bus.buffer.data, RUN), put
 
-    def reader(self, link: Link) -> MessageReader:
+    def reader(self, link: MachineLink) -> MessageReader:
         return MessageReader(link, self.memory.bus.layout, self.memory.bus.buffer.data)
 
-    def receiver(self, link: Link) -> LockstepReceiver:
+    def receiver(self, link: MachineLink) -> LockstepReceiver:
         receiver = LockstepReceiver(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
         self.transport.subscribe(
             data_key(link.sender, link.receiver, link.source), receiver.on_message
@@ -134,7 +134,7 @@ class _End:
         return receiver
 
 
-def _links(placed: PlacedGraph) -> tuple[list[Link], Link]:
+def _links(placed: PlacedGraph) -> tuple[list[MachineLink], MachineLink]:
     """The links there, and the one back."""
     back = next(link for link in placed.links if link.sender == "b")
     return [link for link in placed.links if link.sender == "a"], back

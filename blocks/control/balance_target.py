@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D, Array2D, Rows3, Vector3
+from ...mathematics.arrays import Array1D, Array2D, Rows3, Vector3
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import (
@@ -190,7 +190,7 @@ class BalanceTarget(Block):
         if not memory.started:
             memory.standing_height = reference.com[2]
             memory.heading = heading - planned
-            turn_about_vertical(scratch.planned_middle, float(memory.heading), scratch.vector)
+            turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
             memory.origin[:] = scratch.middle - scratch.vector
             memory.started = True
         goes_on = reference.lift_off_time > reference.time
@@ -289,7 +289,7 @@ def correct_place(
     flight = reference.touchdown_time - lift_off
     share = 1.0 - (lift_off - reference.time) / duration
     if share <= 0.0:
-        turn_about_vertical(scratch.planned_middle, float(memory.heading), scratch.vector)
+        turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)
         scratch.vector[:] = memory.origin + scratch.vector
         memory.off_place[:] = scratch.middle - scratch.vector
         return
@@ -345,7 +345,7 @@ def balance(
     depth, duration = params.landing_depth, params.rise_time
     share, rate, second = 0.0, 0.0, 0.0
     if phase.phase == Phase.RECOVER:
-        share, rate, second = minimum_jerk(float(phase.time_in_phase) / duration)
+        share, rate, second = minimum_jerk(phase.time_in_phase / duration)
     for k in range(3):
         target.com[k] = scratch.middle[k]
         target.com_velocity[k], target.com_acceleration[k] = 0.0, 0.0
@@ -387,8 +387,8 @@ def pattern_turn(
     """
     sine = cosine = 0.0
     for i in range(planned.shape[0]):
-        ax, ay = float(planned[i, 0] - planned_middle[0]), float(planned[i, 1] - planned_middle[1])
-        bx, by = float(points[i, 0] - middle[0]), float(points[i, 1] - middle[1])
+        ax, ay = planned[i, 0] - planned_middle[0], planned[i, 1] - planned_middle[1]
+        bx, by = points[i, 0] - middle[0], points[i, 1] - middle[1]
         sine += ax * by - ay * bx
         cosine += ax * bx + ay * by
     return math.atan2(sine, cosine)
@@ -404,15 +404,15 @@ def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
 
 @kernel
 def lengthen(
-    off_place: Array,
+    off_place: Vector3,
     gain: float,
     limit: float,
     flight: float,
     duration: float,
     share: float,
-    place: Array,
-    velocity: Array,
-    acceleration: Array,
+    place: Vector3,
+    velocity: Vector3,
+    acceleration: Vector3,
 ) -> None:
     """Add the correction of the feet's position error to a jump's motion; see ``BalanceTarget``.
 
@@ -427,11 +427,10 @@ def lengthen(
     """
     u = min(max(share, 0.0), 1.0)
     grown, rate, _ = minimum_jerk(u)
-    square = float(off_place[0]) ** 2 + float(off_place[1]) ** 2
-    size = gain * math.sqrt(square)
-    kept = 1.0 if size <= limit else limit / size
+    size = gain * math.sqrt(off_place[0] ** 2 + off_place[1] ** 2)
+    limited = 1.0 if size <= limit else limit / size
     for k in range(2):
-        speed = -kept * gain * float(off_place[k]) / (flight + 0.5 * duration)
+        speed = -limited * gain * off_place[k] / (flight + 0.5 * duration)
         place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
         velocity[k] += speed * grown
         acceleration[k] += speed * rate / duration
@@ -439,7 +438,7 @@ def lengthen(
 
 @kernel
 def add_quadratic_growth(
-    goal: Array, share: float, duration: float, value: Array, rate: Array
+    goal: Vector3, share: float, duration: float, value: Vector3, rate: Vector3
 ) -> None:
     """Add to ``value`` (3,) a term that grows with the square of time to ``goal`` (3,).
 
@@ -448,9 +447,8 @@ def add_quadratic_growth(
         value, rate: a quantity and its time derivative; share^2 goal is added to the one, and the
             derivative of that to the other.
     """
-    for k in range(3):
-        value[k] += share * share * float(goal[k])
-        rate[k] += 2.0 * share / duration * float(goal[k])
+    value[:] = value + share * share * goal
+    rate[:] = rate + 2.0 * share / duration * goal
 
 
 @kernel

@@ -100,7 +100,7 @@ class LegConstants(Signal):
     sole_highest = Field("n_feet", unit="rad", text="its highest position")
 
 
-class LegScratch(Signal):
+class LegKinematicsScratch(Signal):
     """Room for a step of ``LegInverseKinematics``."""
 
     slides = Field(dtype="bool", text="whether a foot out of reach slides in its sole's plane")
@@ -166,11 +166,11 @@ class LegInverseKinematics(KernelBlock):
 
     Params = LegParams
     Constants = LegConstants
-    Scratch = LegScratch
+    Scratch = LegKinematicsScratch
     needs = ("feet",)
     params: LegParams
     constants: LegConstants
-    scratch: LegScratch
+    scratch: LegKinematicsScratch
 
     feet = Input(FootTarget, text="where the feet should be, relative to the base")
     joints = Input(JointState, text="measured joints, where the least squares begin")
@@ -266,7 +266,7 @@ def begin_targets(
     target: JointTarget,
     params: LegParams,
     constants: LegConstants,
-    scratch: LegScratch,
+    scratch: LegKinematicsScratch,
 ) -> None:
     """Set held joints to their position and all others to the measured one.
 

@@ -352,7 +352,7 @@ def use_contacts(
         legs.points, support * params.velocity_gain, support * params.position_gain,
         estimate.position, estimate.velocity,
     )  # fmt: skip
-    if params.flight == "ballistic" and estimate.flight_ticks > 0:
+    if params.flight == "ballistic":
         fall_freely(estimate, legs, constants, scratch)
     base.position[:] = estimate.position
     base.linear_velocity[:] = estimate.velocity
@@ -369,6 +369,8 @@ def fall_freely(
 ) -> None:
     """In flight, let the centre of mass fall freely and the base follow from the joints."""
     ticks, velocity, change = estimate.flight_ticks, scratch.vector, scratch.acceleration
+    if ticks == 0:
+        return
     rotate(estimate.orientation, legs.motion.com_velocity, velocity)
     velocity[:] += estimate.velocity
     velocity[2] += GRAVITY * constants.period * ticks  # as it was at the start of the fall

@@ -157,7 +157,7 @@ class BandStop(LinearFilter):
         band_stop(p.centre, p.width, self.period, self.constants.coefficients)
 
 
-class Window(Signal):
+class RecentInputs(Signal):
     """The last inputs."""
 
     values = Field(("samples", "n"), text="the last inputs, each in the place of its turn")
@@ -177,11 +177,11 @@ class MovingAverage(UnitOfInput, Block):
     params: Params
     u = Input(Vector, text="what is averaged")
     y = Output(Vector, text="the mean")
-    x = State(Window, text="the last inputs")
+    x = State(RecentInputs, text="the last inputs")
 
     @kernel
     @staticmethod
-    def step(u: Vector, y: Vector, x: Window, params: Params) -> None:
+    def step(u: Vector, y: Vector, x: RecentInputs, params: Params) -> None:
         x.values[x.count % params.samples, :] = u.value
         x.count += 1
         y.value[:] = 0.0

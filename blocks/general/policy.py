@@ -32,7 +32,7 @@ class Action(Signal):
     value = Field("m", inferred=True, text="the action's elements, in the network's order")
 
 
-class Memory(Signal):
+class NetworkState(Signal):
     """What a recurrent network remembers."""
 
     value = Field("size", text="all of its states, one after the other")
@@ -68,7 +68,7 @@ class Policy(UnitFromParameters, Block):
     params: Params
     u = Input(Observation, text="what the policy sees")
     y = Output(Action, text="what it answers")
-    memory = State(Memory, text="the states of a recurrent network")
+    memory = State(NetworkState, text="the states of a recurrent network")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -156,7 +156,7 @@ class Network:
         self._session.run_with_iobinding(self._binding)
 
     def _bind(self, node: Any, kind: str, elements: int = 0, parameter: str = "") -> NDArray[Any]:
-        """Memory for an input or output; ``elements`` is how many it must have, if that is known."""
+        """NetworkState for an input or output; ``elements`` is how many it must have, if that is known."""
         if node.type not in _DTYPES:
             raise ValueError(
                 f"{kind} {node.name!r} is a {node.type}, not a tensor of float or double"

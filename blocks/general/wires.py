@@ -26,7 +26,7 @@ class Second(Signal):
     value = Field("n_b", inferred=True, text="the elements behind them")
 
 
-class Joined(Signal):
+class JoinedVector(Signal):
     """A vector of ``n_a + n_b`` numbers."""
 
     value = Field("n", inferred=True, text="first those of a, then those of b")
@@ -56,7 +56,7 @@ class Mux(Pairs, Block):
     params: PairSizes
     a = Input(First, text="the first elements")
     b = Input(Second, text="the elements behind them")
-    y = Output(Joined, text="all elements")
+    y = Output(JoinedVector, text="all elements")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
@@ -68,7 +68,7 @@ class Mux(Pairs, Block):
 
     @kernel
     @staticmethod
-    def step(a: First, b: Second, y: Joined, params: PairSizes) -> None:
+    def step(a: First, b: Second, y: JoinedVector, params: PairSizes) -> None:
         y.value[: params.n_a] = a.value
         y.value[params.n_a :] = b.value
 
@@ -78,7 +78,7 @@ class Demux(Pairs, Block):
 
     Params = PairSizes
     params: PairSizes
-    u = Input(Joined, text="what is split")
+    u = Input(JoinedVector, text="what is split")
     a = Output(First, text="the first elements")
     b = Output(Second, text="the elements behind them")
 
@@ -89,7 +89,7 @@ class Demux(Pairs, Block):
 
     @kernel
     @staticmethod
-    def step(u: Joined, a: First, b: Second, params: PairSizes) -> None:
+    def step(u: JoinedVector, a: First, b: Second, params: PairSizes) -> None:
         a.value[:] = u.value[: params.n_a]
         b.value[:] = u.value[params.n_a :]
 

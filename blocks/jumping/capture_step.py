@@ -234,7 +234,7 @@ def find_capture_point(
     return capture_point(
         terms.com, terms.com_velocity, terms.angular_momentum,
         mass if mass != 0.0 else constants.mass, terms.com[2] - ground,
-        float(params.turn), scratch.capture,
+        params.turn, scratch.capture,
     )  # fmt: skip
 
 

@@ -81,10 +81,10 @@ class JumpPlan(Block):
     **Somersaults.** With ``turning`` a plan that turns over is timed in flight by how far the robot has
     turned and how long it will fly (``plan_progress.follow_turn``). Other plans are followed as without.
 
-    What follows from the task it tells other blocks of the graph: the ``scene`` with its steps, for
+    It exports to other blocks of the graph what follows from the task: the ``scene`` with its steps, for
     the simulator, and for the score the number of ``jumps`` and, of the last one, where it ends:
     ``landing_height``, ``distance`` [m, forward and left], ``yaw`` [rad], and ``rise`` [m] where the
-    task gives it for a single jump. It also tells the ``velocity_correction`` [m/s] and the
+    task gives it for a single jump. It also exports the ``velocity_correction`` [m/s] and the
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
     (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
 
@@ -119,7 +119,7 @@ class JumpPlan(Block):
             None, text="the planner's formulation, in place of the task's"
         )
         rehearsed: bool = parameter(
-            True, text="whether what a rehearsal of this plan has learnt is told to the graph"
+            True, text="whether what a rehearsal of this plan has learnt is exported to the graph"
         )
 
     Constants = ProgressConstants

@@ -35,13 +35,6 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 
-def benchmark_names(incomplete: str) -> list[str]:
-    """The names of benchmarks that begin with a text."""
-    from ...benchmarks.catalogue import BENCHMARKS
-
-    return [name for name in BENCHMARKS if name.startswith(incomplete)]
-
-
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 JsonBesideTables = Annotated[
     bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ...logs.recording.motion_recording import RecordedMotion
+    from ...logs.recording.motion_recording import MotionRecording
     from ...planner.library.library import PlanLibrary
     from ...planner.library.nearest_feasible import NearestFeasible
     from ...planner.task.files import PlanError
@@ -182,9 +182,9 @@ def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
     return [(row.task.name, row.reason.partition("\n")[0]) for row in rows]
 
 
-def recorded_motion(plan: PlannedJump, robot: RobotDescription) -> RecordedMotion:
+def recorded_motion(plan: PlannedJump, robot: RobotDescription) -> MotionRecording:
     """The plan as a motion with time series, with an instant about every 10 ms."""
-    from ...logs.recording.motion_recording import RecordedMotion
+    from ...logs.recording.motion_recording import MotionRecording
     from ...planner.checking.evidence import Evidence
     from ...planner.checking.plan_tests import allowed_motor_torque
     from ...planner.checking.replay import replay
@@ -202,7 +202,7 @@ def recorded_motion(plan: PlannedJump, robot: RobotDescription) -> RecordedMotio
     share = np.abs(evidence.motor_torque) / np.maximum(allowed_motor_torque(evidence, 1.0), 1e-3)
     motors, contacts = robot.transmission.motors, [c.name for c in robot.contacts]
     force = plan.contact_force[samples.knot]
-    return RecordedMotion(
+    return MotionRecording(
         robot=robot,
         time=samples.time,
         base_position=samples.position[:, :3],

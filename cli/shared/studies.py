@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ...studies.execution import Run
     from ...studies.expansion import Cell
     from ...studies.journal import Journal, Outcome
-    from ...studies.study import Filter, Study
-    from ...studies.summary import Row
+    from ...studies.study import CellFilter, Study
+    from ...studies.summary import StudyRow
     from ...studies.tuning import Draw
 
 
@@ -88,7 +88,7 @@ MOST_ROWS = 60
 
 
 def study_json(
-    study: Study, rows: Sequence[Row], seeds: Sequence[int], folder: Path
+    study: Study, rows: Sequence[StudyRow], seeds: Sequence[int], folder: Path
 ) -> dict[str, Any]:
     """The results as one JSON object."""
     from ...studies.journal import code_fingerprint
@@ -117,7 +117,9 @@ def study_json(
     }
 
 
-def print_rows(screen: Console, study: Study, rows: Sequence[Row], seeds: Sequence[int]) -> None:
+def print_rows(
+    screen: Console, study: Study, rows: Sequence[StudyRow], seeds: Sequence[int]
+) -> None:
     """Print one line for each cell. Axes with a single value are left out."""
     from ...studies.study import FIRST_REPORT_SEED
 
@@ -193,7 +195,7 @@ def print_tuned(screen: Console, study: Study, best: Mapping[str, Draw]) -> None
 
 def open_run(
     found: Study,
-    part: Filter,
+    part: CellFilter,
     seeds: Sequence[int],
     folder: Path,
     number: int,

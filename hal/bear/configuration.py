@@ -7,26 +7,21 @@ It belongs to one robot on one bench: its ports, addresses, directions and offse
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import ValidationError
-
-from ...robots.placed_yaml import PlacedYaml
+from ...files.problems import Code, LoadError, Problems, listing, nearest
+from ...files.validation import place_of, read_model
 from ...robots.robot_description import RobotDescription
-from ...robots.validation.faults import RobotError, nearest
-from ...runtime.language.errors import AloftError
+from ...runtime.language.block import UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from .bus import BAUDRATE
 from .protocol import LAST_DEVICE
 from .sense_board import SWITCHES
 
-HardwareFault = tuple[tuple[str | int, ...], str]
-"""A place in the file and what is wrong there."""
 
-
-class HardwareError(AloftError):
-    """The file of the hardware is wrong; the text names every fault with its place."""
+class HardwareError(LoadError):
+    """The file of the hardware is wrong; the text reports every mistake at its place."""
 
 
 class BusSettings(Parameters):
@@ -176,72 +171,85 @@ class Hardware(Parameters):
         Raises:
             HardwareError: the file cannot be read, or has faults: all of them are named.
         """
-        try:
-            placed = PlacedYaml.read(file)
-        except RobotError as error:
-            raise HardwareError(error.faults[0].text(str(file))) from error
-        faults = [fault.text(str(file)) for fault in placed.faults]
-        found: Hardware | None = None
-        try:
-            found = cls.model_validate(placed.data)
-        except ValidationError as error:
-            for each in error.errors(include_url=False):
-                faults.append(_fault(file, placed, each))
-        if found is not None:
-            for path, message in found.find_faults(robot):
-                faults.append(_text(file, placed, path, message))
-        if faults or found is None:
-            count = f"{len(faults)} fault{'s' if len(faults) != 1 else ''}"
-            raise HardwareError("\n".join([*faults, f"{file}: {count} in the hardware's file"]))
+        problems = Problems()
+        found, tree = read_model(file, cls, problems, ("a robot's hardware", "robot, bus, motors"))
+        if found is not None and tree is not None:
+            for requirement in found.find_faults(robot):
+                problems.add(
+                    Code.UNMET_REQUIREMENT, requirement.message, place_of(tree, requirement.parameter.split(".")),
+                    at=requirement.parameter, expected=requirement.expected, found=requirement.found,
+                    nearest=requirement.nearest, fix=requirement.fix,
+                )  # fmt: skip
+        if len(problems) or found is None:
+            raise HardwareError(problems.report(str(file)))
         return found
 
-    def find_faults(self, robot: RobotDescription | None) -> list[HardwareFault]:
-        """What contradicts itself, or the robot's description: places and texts."""
-        found: list[HardwareFault] = []
+    def find_faults(self, robot: RobotDescription | None) -> list[UnmetRequirement]:
+        """What contradicts itself, or the robot's description."""
+        found: list[UnmetRequirement] = []
         owners: dict[int, str] = {}
         for name, motor in self.motors.items():
             first = owners.setdefault(motor.id, name)
             if first != name:
                 found.append(
-                    (("motors", name, "id"), f"{name} and {first} have the same address {motor.id}")
+                    UnmetRequirement(
+                        f"{name} and {first} have the same address {motor.id}",
+                        f"motors.{name}.id",
+                        expected="an address of its own",
+                    )
                 )
             if motor.low >= motor.high:
                 text = f"{name}: low {motor.low:g} is not below high {motor.high:g}"
-                found.append((("motors", name, "low"), text))
-        if self.drives.current_margin >= self.drives.current_limit:
-            found.append(
-                (("drives", "current_margin"), "current_margin leaves nothing of current_limit")
-            )
-        if self.drives.lowest_voltage >= self.drives.highest_voltage:
-            found.append((("drives", "lowest_voltage"), "lowest_voltage is above highest_voltage"))
+                found.append(UnmetRequirement(text, f"motors.{name}.low"))
+        drives = self.drives
+        if drives.current_margin >= drives.current_limit:
+            text = "current_margin leaves nothing of current_limit"
+            found.append(UnmetRequirement(text, "drives.current_margin"))
+        if drives.lowest_voltage >= drives.highest_voltage:
+            text = "lowest_voltage is above highest_voltage"
+            found.append(UnmetRequirement(text, "drives.lowest_voltage"))
         if robot is not None:
             found += self._faults_with(robot)
         return found
 
-    def _faults_with(self, robot: RobotDescription) -> list[HardwareFault]:
-        found: list[HardwareFault] = []
+    def _faults_with(self, robot: RobotDescription) -> list[UnmetRequirement]:
+        found: list[UnmetRequirement] = []
         if self.robot != robot.name:
-            found.append((("robot",), f"this is the hardware of {self.robot}, not of {robot.name}"))
-            return found
+            text = f"this is the hardware of {self.robot}, not of {robot.name}"
+            return [UnmetRequirement(text, "robot", expected=robot.name, found=self.robot)]
         motors = robot.transmission.motors
         for name in self.motors:
             if name not in motors:
-                guess = nearest(name, motors)
-                hint = f"; did you mean {guess}?" if guess else ""
-                found.append((("motors", name), f"{robot.name} has no motor {name!r}{hint}"))
+                near = nearest(name, motors)
+                hint = f"; did you mean {near[0]}?" if near else ""
+                found.append(
+                    UnmetRequirement(
+                        f"{robot.name} has no motor {name!r}{hint}", f"motors.{name}",
+                        expected=listing(motors), found=name, nearest=near,
+                    )
+                )  # fmt: skip
         for name in motors:
             if name not in self.motors:
-                found.append((("motors",), f"motor {name} is missing"))
+                text = f"motor {name} is missing"
+                found.append(UnmetRequirement(text, "motors", fix=f"{name}: {{id: ...}}"))
         points = [contact.name for contact in robot.contacts]
         for k, name in enumerate(self.board.switches):
             if name not in points:
-                text = f"{robot.name} has no contact point {name!r}: {', '.join(points)}"
-                found.append((("board", "switches", k), text))
+                found.append(
+                    UnmetRequirement(
+                        f"{robot.name} has no contact point {name!r}: {', '.join(points)}",
+                        f"board.switches.{k}", found=name, nearest=nearest(name, points),
+                    )
+                )  # fmt: skip
         mounted = robot.sensors.mounted
         for k, name in enumerate(self.board.sensors):
             if name not in mounted:
-                text = f"{robot.name} mounts no sensor {name!r}: {', '.join(mounted) or 'none'}"
-                found.append((("board", "sensors", k), text))
+                found.append(
+                    UnmetRequirement(
+                        f"{robot.name} mounts no sensor {name!r}: {', '.join(mounted) or 'none'}",
+                        f"board.sensors.{k}", found=name, nearest=nearest(name, mounted),
+                    )
+                )  # fmt: skip
         return found
 
     @classmethod
@@ -267,19 +275,3 @@ class Hardware(Parameters):
                 "dead_man": {"kind": "none"},
             }
         )
-
-
-def _fault(file: Path, placed: PlacedYaml, error: Any) -> str:
-    path = tuple(part for part in error["loc"] if part != "[key]")
-    name = ".".join(str(part) for part in path) or "the file"
-    if error["type"] == "extra_forbidden":
-        return _text(file, placed, path, f"there is no setting {name!r}")
-    if error["type"] == "missing":
-        return _text(file, placed, path, f"{name} is missing")
-    said = str(error["msg"]).removeprefix("Input should be ")
-    return _text(file, placed, path, f"{name} cannot be {error['input']!r}: expected {said}")
-
-
-def _text(file: Path, placed: PlacedYaml, path: tuple[str | int, ...], message: str) -> str:
-    line, column = placed.place(path)
-    return f"{file}:{line}:{column}: {message}" if line else f"{file}: {message}"

@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ...files.problems import Code, Position, Problem, Report
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
@@ -91,10 +92,13 @@ def read_hardware(name: str, context: Context, robot: RobotDescription) -> Hardw
     places = [context.folder / name, Path(name), context.graph_folder / name]
     file = next((place for place in places if place.is_file()), None)
     if file is None:
-        raise HardwareError(
-            f"there is no file {name} of the hardware; looked at "
-            f"{', '.join(dict.fromkeys(str(place) for place in places))}"
+        problem = Problem(
+            Code.FILE,
+            f"there is no file {name} of the hardware",
+            Position(name, 0, 0),
+            expected=" or ".join(dict.fromkeys(str(place) for place in places)),
         )
+        raise HardwareError(Report(name, (problem,)))
     return Hardware.read(file, robot)
 
 

@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import ValidationError
 
+from ...files.validation import describe
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.call_sequence import Call
 from ...robots.description import RobotDescription
@@ -161,11 +162,10 @@ class MountedSensor(Sensor):
         try:
             self.settings = self.Settings.model_validate(dict(part.model_extra or {}))
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(step) for step in first["loc"])
+            first = describe(error.errors(include_url=False)[0], self.Settings)
             known = ", ".join(self.Settings.model_fields)
             raise SensorError(
-                f"sensor {name}: {where}: {first['msg']}; {self.kind} has kind, link, position, {known}"
+                f"sensor {name}: {first}; {self.kind} has kind, link, position, {known}"
             ) from error
         for field in self.settings.noise:
             if field not in self.signal.fields:

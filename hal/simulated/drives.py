@@ -26,6 +26,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
+from ...runtime.language.signals import Field, Signal
 from ...runtime.language.steps import signal_call
 from .motor_feedback import MotorFeedback, MotorLoops, close_loops
 from .state import DriveState, TickRecord, update_maximum, update_minimum
@@ -48,15 +49,14 @@ class DriveTrain(NamedTuple):
     no_load: Array1D
 
 
-class MotorScratch(NamedTuple):
-    """What the motors do in the present physics step, each (n,): their speeds [rad/s], torque limits,
-    the torques asked of them and those that they produce [N m]."""
+class MotorScratch(Signal):
+    """What the motors do in the present physics step."""
 
-    speed: Array1D
-    lower: Array1D
-    upper: Array1D
-    requested: Array1D
-    torque: Array1D
+    speed = Field("n_joints", unit="rad/s", text="their speeds")
+    lower = Field("n_joints", unit="N m", text="their lower torque limits")
+    upper = Field("n_joints", unit="N m", text="their upper torque limits")
+    requested = Field("n_joints", unit="N m", text="torques that are asked of them")
+    torque = Field("n_joints", unit="N m", text="torques that they produce")
 
 
 @kernel
@@ -277,8 +277,7 @@ class MotorLimits:
             motors.peak_torque / (motors.no_load_speed - motors.corner_speed),
             motors.no_load_speed,
         )
-        n = len(robot.joints)
-        self.scratch = MotorScratch(*(np.zeros(n) for _ in MotorScratch._fields))
+        self.scratch = MotorScratch.allocate(robot.dimensions)
         self.record = record
         self.motor_torque = self.scratch.torque
         """The motors' torques of the last step [N m], (n_joints,)."""

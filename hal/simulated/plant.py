@@ -82,9 +82,7 @@ class PushPoints(NamedTuple):
 @kernel
 def clear_wrenches(wrenches: Array2D) -> None:
     """Nothing acts on any body."""
-    for body in range(wrenches.shape[0]):
-        for axis in range(6):
-            wrenches[body, axis] = 0.0
+    wrenches[:, :] = 0.0
 
 
 @kernel

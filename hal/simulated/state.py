@@ -86,16 +86,18 @@ class StepSensors(NamedTuple):
 @kernel
 def clear(record: TickRecord) -> None:
     """Begin a new record, except for the memory of the switches."""
-    record.steps[()] = record.forbidden[()] = 0
-    for point in range(record.load.shape[0]):
-        for axis in range(4):
-            record.load[point, axis] = 0.0
+    record.steps = 0
+    record.forbidden = 0
+    record.load[:, :] = 0.0
     record.accelerometer[:] = 0.0
-    for k in range(record.saturated.shape[0]):
-        record.saturated[k] = 0
-        record.joint_torque[k] = record.violation[k] = record.overload[k] = 0.0
-        record.torque_high[k] = record.speed_high[k] = -math.inf
-        record.torque_low[k] = record.speed_low[k] = math.inf
+    record.saturated[:] = 0
+    record.joint_torque[:] = 0.0
+    record.violation[:] = 0.0
+    record.overload[:] = 0.0
+    record.torque_high[:] = -math.inf
+    record.torque_low[:] = math.inf
+    record.speed_high[:] = -math.inf
+    record.speed_low[:] = math.inf
 
 
 @kernel
@@ -170,15 +172,14 @@ def record_step(
         int(step[()]), sensors.load, ground_force, bounce_steps, record.closed, record.bounce_end
     )
     step[()] = step[()] + 1
-    record.steps[()] = record.steps[()] + 1
+    record.steps = record.steps + 1
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
         allowed += sensors.load[point, 0]
-        for axis in range(4):
-            record.load[point, axis] += sensors.load[point, axis]
+    record.load[:, :] += sensors.load
     record.accelerometer[:] += sensors.accelerometer
     if sensors.contacts[0] > allowed:
-        record.forbidden[()] = record.forbidden[()] + 1
+        record.forbidden = record.forbidden + 1
     for joint in range(lower.shape[0]):
         angle = sensors.position[joint]
         update_maximum(record.violation, joint, lower[joint] - angle)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ValidationError
 
+from ...files.validation import describe
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameters import Parameters, parameter
 
@@ -111,6 +112,5 @@ def read_fault(text: str) -> InjectedFault:
     try:
         return InjectedFault.model_validate(settings)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        what = ".".join(str(part) for part in first["loc"])
-        raise AloftError(f"fault {text!r}: {what}: {first['msg']}") from error
+        first = describe(error.errors(include_url=False)[0], InjectedFault)
+        raise AloftError(f"fault {text!r}: {first}") from error

@@ -45,7 +45,7 @@ class SignalDifference:
 
 
 @dataclass(frozen=True)
-class Difference:
+class RunDifference:
     """How two runs differ.
 
     Attributes:
@@ -78,7 +78,9 @@ def lift_off_tick(run: RecordedRun) -> int | None:
     return next((tick for tick, text in events if text == LIFT_OFF), None)
 
 
-def compare_runs(first: RecordedRun, second: RecordedRun, align: Align | None = None) -> Difference:
+def compare_runs(
+    first: RecordedRun, second: RecordedRun, align: Align | None = None
+) -> RunDifference:
     """Compare every signal that both runs have, tick by tick.
 
     Without ``align`` the runs are aligned at their first lift-off if both have one, and else at
@@ -138,7 +140,7 @@ def compare_runs(first: RecordedRun, second: RecordedRun, align: Align | None = 
             )
         )
     same = {field.name for field in known}
-    return Difference(
+    return RunDifference(
         align, start, other, len(relative), equal,
         tuple(sorted(found, key=_share, reverse=True)),
         tuple(name for name in first.signals() if name not in same),

@@ -15,6 +15,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ import numpy as np
 from ...hal.sensors.sensor import RosMessage
 from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import RobotDescription
+from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
@@ -31,18 +33,15 @@ from ..viewing.drawing import Moments
 from ..viewing.robot_shapes import quaternion_from_z, shapes_of
 from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
 from ..viewing.scene_sensors import sensor_ports
-from .cdr import DEFINITIONS, imu, joint_state, transforms, wrench
 from .named_columns import NamedColumn, NamedColumns
 
 PICTURE_RATE = 100.0
 """Poses a second in ``/tf`` [Hz]: more than an eye sees."""
 WORLD = "world"
 GREY, GROUND = (0.56, 0.64, 0.68, 1.0), (0.55, 0.57, 0.6, 1.0)
-SENSOR_MESSAGES: Mapping[str, tuple[Callable[..., bytes], tuple[str, ...]]] = {
-    "sensor_msgs/msg/Imu": (imu, ("angular_velocity", "linear_acceleration")),
-    "geometry_msgs/msg/WrenchStamped": (wrench, ("wrench.force", "wrench.torque")),
-}
-"""How the message of a mounted sensor is written: the function, and the numbers that it takes."""
+DISTRIBUTION = "jazzy"
+"""The distribution of ROS 2 whose messages are written."""
+IMU_TYPE, WRENCH_TYPE = "sensor_msgs/msg/Imu", "geometry_msgs/msg/WrenchStamped"
 LEVELS = {"INFO": 2, "WARN": 3, "ERROR": 4}
 """The levels of ``foxglove.Log``."""
 
@@ -78,32 +77,70 @@ def known_channels(run: RecordedRun) -> list[Channel]:
     ports = ports_of(run.header)
     joints, sensor = port_of(ports, JOINTS), port_of(ports, IMU)
     if joints is not None:
-        channels.append(
-            _ros("/joint_states", "sensor_msgs/msg/JointState", partial(_joints, joints, robot))
-        )
+        channels.append(_ros("/joint_states", _joint_codec(robot), partial(_joints, joints)))
     if sensor is not None:
-        channels.append(_ros("/imu", "sensor_msgs/msg/Imu", partial(_imu, sensor, robot.base)))
+        codec = _codec(IMU_TYPE, {"frame_id": robot.base}, _IMU_FIELDS)
+        numbers = {"angular_velocity": "angular_velocity", "specific_force": "linear_acceleration"}
+        channels.append(_ros("/imu", codec, partial(_numbers, sensor, numbers)))
     for port, mounted in sensor_ports(robot, ports).items():
-        message = mounted.ros2
-        if message is not None and message.type in SENSOR_MESSAGES:
-            messages = partial(_sensor, port, mounted.link, message)
-            channels.append(_ros(f"/{mounted.name}", message.type, messages))
+        if mounted.ros2 is not None:
+            codec, fields = _sensor_codec(mounted.ros2, mounted.link)
+            channels.append(_ros(f"/{mounted.name}", codec, partial(_numbers, port, fields)))
     drawn = scene_ports(run.header)
     if drawn is not None:
-        channels.append(_ros("/tf", "tf2_msgs/msg/TFMessage", partial(_poses, drawn, robot)))
+        names = [link.name for link in robot.links]
+        texts = {"frame_id": WORLD, "transforms.child_frame_id": names}
+        codec = _codec("tf2_msgs/msg/TFMessage", texts, sizes={"transforms": len(names)})
+        channels.append(_ros("/tf", codec, partial(_poses, drawn, robot)))
         start = int(nanoseconds(run.header.base_rate, run.ticks[:1]).sum())
         update = (start, json.dumps(scene_update(run, robot, start)).encode())
         channels.append(_json("/scene", "foxglove.SceneUpdate", (update,)))
         if drawn.contact_force is not None and drawn.contact_position is not None:
+            codec = _codec(WRENCH_TYPE, {"frame_id": WORLD})
             for k, foot in enumerate(robot.feet):
                 messages = partial(_wrench, drawn, [i == k for i in robot.foot_of_contact()])
-                name = "geometry_msgs/msg/WrenchStamped"
-                channels.append(_ros(f"/wrench/{foot.name}", name, messages))
+                channels.append(_ros(f"/wrench/{foot.name}", codec, messages))
     return channels
 
 
-def _ros(topic: str, name: str, messages: Messages) -> Channel:
-    return Channel(topic, name, "cdr", "ros2msg", DEFINITIONS[name], (), messages)
+_IMU_FIELDS = (
+    "orientation", "orientation_covariance", "angular_velocity", "linear_acceleration",
+)  # fmt: skip
+_NO_ORIENTATION = {
+    "orientation": np.array([0.0, 0.0, 0.0, 1.0]),
+    "orientation_covariance": np.array([-1.0, *[0.0] * 8]),  # ROS 2's sign for none
+}
+
+
+def _codec(
+    name: str,
+    texts: Mapping[str, str | Sequence[str]],
+    fields: Sequence[str] = (),
+    sizes: Mapping[str, int] | None = None,
+) -> Codec:
+    return Codec(MessageType(name, DISTRIBUTION, sizes or {}, fields), {}, texts)
+
+
+def _joint_codec(robot: RobotDescription) -> Codec:
+    names = [joint.name for joint in robot.joints]
+    kind = MessageType("sensor_msgs/msg/JointState", DISTRIBUTION, {})
+    return Codec(kind, {"n_joints": len(names)}, {"name": names})
+
+
+def _sensor_codec(message: RosMessage, frame: str) -> tuple[Codec, Mapping[str, str]]:
+    """The codec of a mounted sensor, whose numbers are in the axes of its link, and the names in the
+    message of its signal's fields."""
+    fields = {field: path.replace(".", "_") for field, path in message.fields.items()}
+    shown = _IMU_FIELDS if message.type == IMU_TYPE else tuple(fields.values())
+    return _codec(message.type, {"frame_id": frame}, shown), fields
+
+
+def _ros(
+    topic: str, codec: Codec, messages: Callable[[Codec, RecordedRows], Iterator[Timed]]
+) -> Channel:
+    name = codec.type.name
+    definition, _ = codec.type.store.generate_msgdef(name, ros_version=2)
+    return Channel(topic, name, "cdr", "ros2msg", definition, (), partial(messages, codec))
 
 
 def _json(topic: str, name: str, once: tuple[Timed, ...]) -> Channel:
@@ -117,52 +154,49 @@ def _instants(batch: RecordedRows) -> list[int]:
     return found
 
 
-def _joints(port: str, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
-    names = [joint.name for joint in robot.joints]
-    fields = ("position", "velocity", "torque")
-    lists = [batch.signal(f"{port}.{field}").tolist() for field in fields]
-    for instant, *values in zip(_instants(batch), *lists, strict=True):
-        yield instant, joint_state(instant, names, *values)
+def _joints(port: str, codec: Codec, batch: RecordedRows) -> Iterator[Timed]:
+    fields = {"position": "position", "velocity": "velocity", "torque": "effort"}
+    return _numbers(port, fields, codec, batch)
 
 
-def _imu(port: str, frame: str, batch: RecordedRows) -> Iterator[Timed]:
-    turn = batch.signal(f"{port}.angular_velocity").tolist()
-    force = batch.signal(f"{port}.specific_force").tolist()
-    for instant, *values in zip(_instants(batch), turn, force, strict=True):
-        yield instant, imu(instant, frame, *values)
+def _numbers(
+    port: str, fields: Mapping[str, str], codec: Codec, batch: RecordedRows
+) -> Iterator[Timed]:
+    """A message a tick with the ``fields`` of a port, each with its name in the message."""
+    values = {name: batch.signal(f"{port}.{field}") for field, name in fields.items()}
+    rest = _NO_ORIENTATION if codec.type.name == IMU_TYPE else {}
+    for k, instant in enumerate(_instants(batch)):
+        row = {name: value[k] for name, value in values.items()}
+        yield instant, codec.write({**rest, **row}, instant)
 
 
-def _sensor(port: str, frame: str, message: RosMessage, batch: RecordedRows) -> Iterator[Timed]:
-    """The messages of a mounted sensor; its numbers are in the axes of its link."""
-    write, paths = SENSOR_MESSAGES[message.type]
-    fields = {path: field for field, path in message.fields.items()}
-    lists = [batch.signal(f"{port}.{fields[path]}").tolist() for path in paths]
-    for instant, *values in zip(_instants(batch), *lists, strict=True):
-        yield instant, write(instant, frame, *values)
-
-
-def _wrench(ports: ScenePorts, on_foot: list[bool], batch: RecordedRows) -> Iterator[Timed]:
+def _wrench(
+    ports: ScenePorts, on_foot: list[bool], codec: Codec, batch: RecordedRows
+) -> Iterator[Timed]:
     """The force on a foot and its torque about the middle of the foot's contact points."""
     assert ports.contact_force is not None and ports.contact_position is not None
     force = batch.signal(ports.contact_force)[:, on_foot]
     place = batch.signal(ports.contact_position)[:, on_foot]
     arm = place - place.mean(axis=1, keepdims=True)
-    torques = np.cross(arm, force).sum(axis=1).tolist()
-    lists = zip(_instants(batch), force.sum(axis=1).tolist(), torques, strict=True)
-    for instant, total, torque in lists:
-        yield instant, wrench(instant, WORLD, total, torque)
+    torques = np.cross(arm, force).sum(axis=1)
+    for instant, total, torque in zip(_instants(batch), force.sum(axis=1), torques, strict=True):
+        yield instant, codec.write({"wrench_force": total, "wrench_torque": torque}, instant)
 
 
-def _poses(ports: ScenePorts, robot: RobotDescription, batch: RecordedRows) -> Iterator[Timed]:
+def _poses(
+    ports: ScenePorts, robot: RobotDescription, codec: Codec, batch: RecordedRows
+) -> Iterator[Timed]:
     every = max(1, round(batch.header.base_rate / PICTURE_RATE))
     due = np.flatnonzero(batch.ticks % every == 0)
     poses = Moments(batch, due, []).poses(robot, ports.pose)
     instants = nanoseconds(batch.header.base_rate, batch.ticks[due]).tolist()
-    places = poses.position.tolist()
-    turns = quaternions_of_matrices(poses.rotation).tolist()
+    turns = quaternions_of_matrices(poses.rotation)
     for k, instant in enumerate(instants):
-        listed = zip(poses.names, places[k], turns[k], strict=True)
-        yield instant, transforms(instant, WORLD, listed)
+        values = {
+            "transforms_transform_translation": poses.position[k],
+            "transforms_transform_rotation": turns[k],
+        }
+        yield instant, codec.write(values, instant)
 
 
 def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dict[str, Any]:
@@ -313,7 +347,7 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     Each port has a channel of its own, with one JSON message for each tick.
 
     Raises:
-        ExportError: the library ``mcap`` is not installed.
+        ExportError: the library ``mcap`` or ``rosbags`` is not installed.
         KeyError: no signal has such a name.
         OSError: the file cannot be written.
     """
@@ -321,6 +355,8 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
         from mcap.writer import Writer
     except ImportError:
         raise ExportError("MCAP needs the library mcap; pip install 'aloft[mcap]'") from None
+    if find_spec("rosbags") is None:
+        raise ExportError("MCAP needs the library rosbags; pip install 'aloft[mcap]'")
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)

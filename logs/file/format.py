@@ -49,7 +49,7 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain
 
-FORMAT = 4
+FORMAT = 5
 """The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"

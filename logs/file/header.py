@@ -19,7 +19,7 @@ from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 from .surroundings import contents, digests, files_read, parameter_files, project_state
 
 RECORDED_VERSIONS = (
-    "aloft", "numpy", "numba", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
+    "aloft", "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
 )  # fmt: skip
 _KERNEL_NAMES = (
     "scipy_openblas_get_corename64_", "scipy_openblas_get_corename",

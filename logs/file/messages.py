@@ -68,7 +68,7 @@ class Content(IntEnum):
 
 
 @dataclass(frozen=True)
-class Message:
+class FileMessage:
     """One message: where it begins, its size with its head, its kind, and what its seal says."""
 
     place: int
@@ -124,19 +124,19 @@ class Scan:
 
     path: Path
     size: int
-    messages: tuple[Message, ...]
+    messages: tuple[FileMessage, ...]
     damage: tuple[Damage, ...]
     sealed: bool
     closed: bool
     end: int
 
-    def of(self, content: Content) -> list[Message]:
+    def of(self, content: Content) -> list[FileMessage]:
         """The messages with that content; in a file without seals all messages with tables."""
         wanted = (content, Content.UNKNOWN)
         return [m for m in self.messages if m.kind == ARROW and m.content in wanted]
 
 
-def sealed(head: bytes, body: bytes, seal: Message, begun: int = 0) -> bytes:
+def sealed(head: bytes, body: bytes, seal: FileMessage, begun: int = 0) -> bytes:
     """A message with its seal: ``head`` and ``body`` as Rerun made them, ``begun`` the CRC-32 of the
     file's head for the first message of a file and else zero."""
     kind, length = HEAD.unpack(head)
@@ -147,7 +147,9 @@ def sealed(head: bytes, body: bytes, seal: Message, begun: int = 0) -> bytes:
 
 def closing(place: int, index: bytes, number: int) -> bytes:
     """What closes, at ``place``, a file of so many messages."""
-    message = sealed(HEAD.pack(END, len(index)), index, Message(0, 0, END, Content.INDEX, number))
+    message = sealed(
+        HEAD.pack(END, len(index)), index, FileMessage(0, 0, END, Content.INDEX, number)
+    )
     return message + footer(place + HEAD.size, message[HEAD.size :])
 
 
@@ -184,7 +186,7 @@ class _Scanner:
     def scan(self) -> Scan:
         if self._head[:4] != MAGIC and not self._sealed:
             raise ValueError(f"{self._path} is not a Rerun file of this format")
-        found: list[Message] = []
+        found: list[FileMessage] = []
         damage: list[Damage] = []
         place, closed = FILE_HEAD, False
         expected = 0
@@ -210,7 +212,7 @@ class _Scanner:
         named = tuple(_named(each, found) for each in damage)
         return Scan(self._path, self._size, tuple(found), named, self._sealed, closed, end)
 
-    def _at(self, place: int, *, first: bool) -> Message | None:
+    def _at(self, place: int, *, first: bool) -> FileMessage | None:
         """The intact message at ``place``."""
         if place + HEAD.size > self._size:
             return None
@@ -220,7 +222,7 @@ class _Scanner:
         if not END < kind <= _LAST_KIND or place + HEAD.size + length > self._size:
             return None
         if not self._sealed:
-            return Message(place, HEAD.size + length, kind)
+            return FileMessage(place, HEAD.size + length, kind)
         if length < SEAL_SIZE:
             return None
         body = self._file.read(length)
@@ -293,7 +295,7 @@ class _Scanner:
         return None
 
 
-def _checked(place: int, head: bytes, body: bytes, known: int) -> Message | None:
+def _checked(place: int, head: bytes, body: bytes, known: int) -> FileMessage | None:
     """The message, if its seal is right."""
     if body[-SEAL_SIZE : -_SEAL.size] != _MARK:
         return None
@@ -301,10 +303,10 @@ def _checked(place: int, head: bytes, body: bytes, known: int) -> Message | None
     if crc32(body[:-4], crc32(head, known)) != crc:
         return None
     kind = HEAD.unpack(head)[0]
-    return Message(place, HEAD.size + len(body), kind, Content(content), number, first, last)
+    return FileMessage(place, HEAD.size + len(body), kind, Content(content), number, first, last)
 
 
-def _named(damage: Damage, found: list[Message]) -> Damage:
+def _named(damage: Damage, found: list[FileMessage]) -> Damage:
     """The damage with the ticks around it."""
     rows = [m for m in found if m.content is Content.ROWS]
     after = max((m.last for m in rows if m.place < damage.begin), default=None)
@@ -312,7 +314,7 @@ def _named(damage: Damage, found: list[Message]) -> Damage:
     return replace(damage, after=after, before=before)
 
 
-def body_of(file: BinaryIO, message: Message) -> bytes:
+def body_of(file: BinaryIO, message: FileMessage) -> bytes:
     """The body of a message, read and verified once more.
 
     Raises:
@@ -330,7 +332,7 @@ def body_of(file: BinaryIO, message: Message) -> bytes:
     return body
 
 
-def renumbered(file: BinaryIO, message: Message, number: int) -> bytes:
+def renumbered(file: BinaryIO, message: FileMessage, number: int) -> bytes:
     """A sealed message with another number. Raises ``ValueError`` as ``body_of`` does."""
     file.seek(0)
     known = crc32(file.read(FILE_HEAD)) if number == 0 else 0
@@ -428,7 +430,7 @@ def tables(
             yield name, batch
 
 
-def located(found: Scan, content: Content) -> Iterator[tuple[Message, str, Any]]:
+def located(found: Scan, content: Content) -> Iterator[tuple[FileMessage, str, Any]]:
     """Message, entity and record batch of all messages with that content."""
     with found.path.open("rb") as file:
         for message in found.of(content):
@@ -439,14 +441,14 @@ def located(found: Scan, content: Content) -> Iterator[tuple[Message, str, Any]]
             yield message, name, batch
 
 
-def unreadable(found: Scan, message: Message, error: Exception) -> RecordingError:
+def unreadable(found: Scan, message: FileMessage, error: Exception) -> RecordingError:
     """The error for a message that cannot be taken apart."""
     return RecordingError(
         f"{found.path} cannot be read at byte {message.place} ({error}); the file is damaged there"
     )
 
 
-def tables_at(found: Scan, message: Message) -> tuple[str, Any]:
+def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
     """Entity and record batch of one message. Raises ``RecordingError``."""
     assert message.kind == ARROW
     with found.path.open("rb") as file:

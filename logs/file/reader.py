@@ -44,7 +44,7 @@ from .format import (
 from .messages import (
     Content,
     Damage,
-    Message,
+    FileMessage,
     NoRunError,
     RecordingError,
     Scan,
@@ -67,7 +67,7 @@ TickRows = tuple[NDArray[np.int64], NDArray[np.uint8]]
 class _PackedPiece:
     """Some ticks without a gap: the message that holds them, and the row of its table."""
 
-    message: Message
+    message: FileMessage
     row: int
     first: int
     last: int
@@ -97,7 +97,7 @@ class PackedRows:
                     yield _PackedPiece(message, row, first, first + len(rows) - 1)
 
     def _unpacked(
-        self, message: Message, batch: Any, row: int, part: tuple[int, int] | None = None
+        self, message: FileMessage, batch: Any, row: int, part: tuple[int, int] | None = None
     ) -> tuple[int, NDArray[np.uint8]]:
         """First tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
         try:

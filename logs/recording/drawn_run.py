@@ -19,7 +19,7 @@ from ..file.format import DIAGRAM
 from ..file.reader import RecordedRun
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import OTHER_RUN, Colors
-from ..viewing.plot_views import Shown
+from ..viewing.plot_views import ShownRun
 from .run_stream import RunStream
 
 DRAWN_TICKS = 4096
@@ -100,7 +100,7 @@ def write_comparison(path: str | PathLike[str], first: RecordedRun, second: Reco
     path = Path(path)
     name, other = _labels(first, second)
     shown = tuple(
-        Shown(f"{root}/", label)
+        ShownRun(f"{root}/", label)
         for root, label in zip(_roots(name, other), (name, other), strict=True)
     )
     layout = recording_blueprint(first.header, shown)

@@ -24,7 +24,7 @@ COLORS = Colors()
 
 
 @dataclass(frozen=True)
-class RecordedMotion:
+class MotionRecording:
     """A motion at ``n`` instants.
 
     Attributes:
@@ -52,7 +52,7 @@ class RecordedMotion:
     properties: Mapping[str, str] = field(default_factory=dict)
 
 
-def write_motion(path: str | Path, motion: RecordedMotion, name: str) -> Path:
+def write_motion(path: str | Path, motion: MotionRecording, name: str) -> Path:
     """Write the file, replacing an older one.
 
     Raises:
@@ -91,7 +91,7 @@ def series_entity(title: str) -> str:
     return f"series/{title.partition(' [')[0].replace(' ', '_')}"
 
 
-def motion_blueprint(motion: RecordedMotion) -> Any:
+def motion_blueprint(motion: MotionRecording) -> Any:
     """The robot on the left, every series on the right."""
     import rerun.blueprint as rrb
 
@@ -118,7 +118,7 @@ def _times(time: Array) -> list[Any]:
     return [rr.TimeColumn("t", duration=nanoseconds)]
 
 
-def _write_world(stream: Any, motion: RecordedMotion) -> None:
+def _write_world(stream: Any, motion: MotionRecording) -> None:
     """The links, the forces and the centre of mass."""
     import rerun as rr
 

@@ -60,7 +60,7 @@ def _lock(descriptor: int) -> bool:
 
 
 @dataclass
-class Place:
+class RecordingPlace:
     """A recording's place, locked by this process and by those that inherit ``descriptor``.
 
     Attributes:
@@ -136,7 +136,7 @@ def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.{number}{path.suffix}")
 
 
-def take_place(path: Path, keep: int = 0) -> Place:
+def take_place(path: Path, keep: int = 0) -> RecordingPlace:
     """Make and lock the file in which the recording ``path`` is written.
 
     If another run writes that recording, this one gets the next free name, ``jump-2.rrd``. A file
@@ -170,7 +170,7 @@ def _kind_of(path: Path) -> str:
     return "a socket" if path.is_socket() else "a device"
 
 
-def _take(target: Path, keep: int) -> Place | None:
+def _take(target: Path, keep: int) -> RecordingPlace | None:
     """The place of ``target``, or ``None`` if another run has it."""
     part, said = part_of(target), ""
     while True:
@@ -181,7 +181,7 @@ def _take(target: Path, keep: int) -> Place | None:
                 return None
             there = part.exists() and os.path.samestat(os.fstat(descriptor), os.stat(part))
             if there and not os.fstat(descriptor).st_size:
-                return Place(target, descriptor, keep, (said,) if said else ())
+                return RecordingPlace(target, descriptor, keep, (said,) if said else ())
             if there:
                 moved = _free(target)
                 os.replace(part, moved)

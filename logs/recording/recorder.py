@@ -32,8 +32,8 @@ from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
 from ..viewing.robot_shapes import missing_meshes
-from .place import Place, cause_of, part_of, remedy, replaced, take_place
-from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, Report, Task
+from .place import RecordingPlace, cause_of, part_of, remedy, replaced, take_place
+from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
 _MAIN = (
@@ -56,7 +56,7 @@ class RecorderLink:
         place: the file's place, if there is to be a file. The process takes it over.
         header: of the recording, as text.
         capacity: least size of the ring [bytes].
-        flush_period, sync_period, live, split: see ``Task``.
+        flush_period, sync_period, live, split: see ``RecorderTask``.
         least: the size with which the ring makes do where files may not be larger.
 
     Raises:
@@ -65,7 +65,7 @@ class RecorderLink:
 
     def __init__(
         self,
-        place: Place | None,
+        place: RecordingPlace | None,
         header: str,
         capacity: int,
         flush_period: float,
@@ -84,7 +84,7 @@ class RecorderLink:
             self.ring.write(HEADER, 0, text)
             path = str(place.target.absolute()) if place is not None else ""
             file, keep = (place.descriptor, place.keep) if place is not None else (-1, 0)
-            task = Task(
+            task = RecorderTask(
                 descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
             )
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
@@ -156,7 +156,7 @@ class RecorderLink:
 
     def finish(
         self, outcome: dict[str, Any], goes_on: Callable[[], bool]
-    ) -> tuple[Report | None, str]:
+    ) -> tuple[RecorderReport | None, str]:
         """Tell the outcome and wait for the end, as long as ``goes_on`` says so.
 
         Returns:
@@ -177,7 +177,7 @@ class RecorderLink:
         self.ring.close()
         lines = [json.loads(line) for line in self._said.splitlines()]
         if lines and "rows" in lines[-1]:
-            return Report(**lines[-1]), ""
+            return RecorderReport(**lines[-1]), ""
         how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
         return None, f"the recorder {how}"
 
@@ -255,7 +255,7 @@ class Recorder:
         self.before = ""
         self._keep = keep
         self._seen = 0
-        self.report: Report | None = None
+        self.report: RecorderReport | None = None
         self.link: RecorderLink | None = None
         self._when_full = when_full
         self._keyframe_period = keyframe_period
@@ -347,7 +347,7 @@ class Recorder:
 
     def _find_room(self, tick: int) -> None:
         """Wait for room in the ring if that is the policy; otherwise count the tick as dropped."""
-        if self._gap is None and self._waits and self._wait_for_room(tick):
+        if self._wait_for_room(ROW, tick, self._bus):
             return
         if self._gap is not None and self._note_gap(tick) and self._write(ROW, tick, self._bus):
             return
@@ -355,13 +355,16 @@ class Recorder:
         self._gap = (first, tick, count + 1)
         self.dropped += 1
 
-    def _wait_for_room(self, tick: int) -> bool:
+    def _wait_for_room(self, kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
+        """Wait for room in the ring, if that is the policy, and write. Returns whether that was done."""
+        if not self._waits or self._gap is not None:
+            return False
         assert self.link is not None
         self.link.reset_stall_timer()
         self.waits_for_others = True
         try:
             while self._waiting_helps():
-                if self._write(ROW, tick, self._bus):
+                if self._write(kind, tick, data):
                     return True
                 time.sleep(1e-3)
         finally:
@@ -411,15 +414,16 @@ class Recorder:
         size = len(self._bus)
         self._frame[:size] = self._bus
         self._frame[size:] = self._bound.memory.state.buffer.data
-        self._write(KEYFRAME, tick, self._frame)
+        if not self._write(KEYFRAME, tick, self._frame):
+            self._wait_for_room(KEYFRAME, tick, self._frame)
 
     def _note_change(self, change: ParameterChange) -> None:
         self.note(parameter_note(change))
 
     def note(self, note: Note) -> None:
         """Put a note into the ring; there is nearly always room."""
-        if self.link is not None:
-            self._write(NOTE, note.tick, _encoded(note))
+        if self.link is not None and not self._write(NOTE, note.tick, _encoded(note)):
+            self._wait_for_room(NOTE, note.tick, _encoded(note))
 
     def close(self) -> None:
         """No-op: the recording ends when the outcome is known, in ``finish``."""
@@ -448,7 +452,7 @@ class Recorder:
             self._tell_of_a_problem(self.report)
         return self.warnings
 
-    def _tell_of_a_problem(self, report: Report) -> None:
+    def _tell_of_a_problem(self, report: RecorderReport) -> None:
         """Say that nothing, or not all, could be written."""
         fix = remedy(report.error_number, self.path)
         if report.rows:

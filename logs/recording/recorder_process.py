@@ -1,10 +1,10 @@
 """The process beside the robot that writes the recording; see ``recorder`` for the other side.
 
-It is told what to do by a ``Task`` on its command line and by the first record in the ring, the
+It is told what to do by a ``RecorderTask`` on its command line and by the first record in the ring, the
 header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
 written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
-that it is ready and, at the end, a ``Report``.
+that it is ready and, at the end, a ``RecorderReport``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
 from .live_feed import LiveFeed
-from .place import Place, cause_of, split_name, take_place
+from .place import RecordingPlace, cause_of, split_name, take_place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
 
@@ -49,7 +49,7 @@ DRAW_PERIOD = 10.0
 
 
 @dataclass(frozen=True)
-class Task:
+class RecorderTask:
     """What to write.
 
     Attributes:
@@ -77,7 +77,7 @@ class Task:
 
 
 @dataclass
-class Report:
+class RecorderReport:
     """What was done.
 
     Attributes:
@@ -106,8 +106,8 @@ class Report:
 class RecorderProcess:
     """Takes records out of the ring and writes them: ticks and notes at every flush."""
 
-    def __init__(self, task: Task) -> None:
-        self.report = Report()
+    def __init__(self, task: RecorderTask) -> None:
+        self.report = RecorderReport()
         self._task = task
         self._ring = RingReader(task.descriptor, task.capacity)
         record = next(self._ring.records())
@@ -126,10 +126,10 @@ class RecorderProcess:
         self._files: list[str] = []
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
-        self._place: Place | None = None
+        self._place: RecordingPlace | None = None
         warm_up()
         if task.path:
-            self._place = Place(Path(task.path), task.file, task.keep)
+            self._place = RecordingPlace(Path(task.path), task.file, task.keep)
             self._guard(lambda: self._open(header))
         self.feed = LiveFeed(task.live, header) if task.live else None
         self._fed_rows = 0
@@ -233,7 +233,7 @@ class RecorderProcess:
         finally:
             os.close(descriptor)
 
-    def finish(self, outcome: dict[str, Any] | None) -> Report:
+    def finish(self, outcome: dict[str, Any] | None) -> RecorderReport:
         """Write what is left, close the file and give it its name."""
         self.take()
         self._write_batch()
@@ -359,7 +359,7 @@ def main(task: str) -> None:
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    recorder = RecorderProcess(Task(**json.loads(task)))
+    recorder = RecorderProcess(RecorderTask(**json.loads(task)))
     _say({"ready": True})
     told: set[str] = set()
     text, source = b"", sys.stdin.fileno()

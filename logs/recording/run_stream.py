@@ -29,7 +29,7 @@ from ..file.format import (
 from ..viewing.blueprint import is_main
 from ..viewing.drawing import WHOLE, Colors, Detail
 from ..viewing.plot_views import EVERY_VALUE, limits_of, main_fields
-from ..viewing.scene import Scene
+from ..viewing.scene import SceneWriter
 from ..viewing.scene_ports import scene_ports
 from ..viewing.signal_names import axis_colors, element_names
 from ..viewing.state_lanes import LaneReader, all_lanes, times_table
@@ -82,7 +82,7 @@ class RunStream:
         ]
         self._scene = None
         if ports is not None:
-            self._scene = Scene(stream, header, ports, root, colors or Colors(), detail)
+            self._scene = SceneWriter(stream, header, ports, root, colors or Colors(), detail)
 
     def write_start(self) -> None:
         """Write what does not change: the graph, legends, colours and shapes."""

@@ -35,7 +35,7 @@ from ..file.messages import (
     HEAD,
     SEAL_SIZE,
     Content,
-    Message,
+    FileMessage,
     closing,
     sealed,
     split,
@@ -43,7 +43,7 @@ from ..file.messages import (
 from ..file.row_codec import pack
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import RECORDED
-from .place import Place, take_place
+from .place import RecordingPlace, take_place
 from .run_stream import RunStream
 
 DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
@@ -76,7 +76,7 @@ class RecordingWriter:
         path: str | PathLike[str],
         header: Header,
         recording_id: str = "",
-        place: Place | None = None,
+        place: RecordingPlace | None = None,
     ) -> None:
         import rerun as rr
 
@@ -222,7 +222,7 @@ class RecordingWriter:
                 break
             places[place + HEAD.size] = self._size + len(out) + HEAD.size
             holds = content if kind == ARROW else Content.PICTURE
-            seal = Message(0, 0, ARROW, holds, messages, first, last)
+            seal = FileMessage(0, 0, ARROW, holds, messages, first, last)
             out += sealed(head, body, seal, known)
             known = 0
             messages += 1

@@ -22,15 +22,13 @@ read when a recording is looked at, not when it is made.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from ...robots.placed_yaml import PlacedYaml
-from ...robots.validation import RobotError, RobotFault
-from ...runtime.language.errors import AloftError
+from ...files.problems import Code, LoadError, Problems, nearest
+from ...files.validation import path_text, place_of, read_model
 from ..file.format import (
     DIAGRAM,
     EVENTS,
@@ -42,7 +40,7 @@ from ..file.format import (
     RecordedField,
     entity_of,
 )
-from .plot_views import MOST_IN_TAB, Shown, block_tabs, legend, main_plots
+from .plot_views import MOST_IN_TAB, ShownRun, block_tabs, legend, main_plots
 from .robot_shapes import eye_controls
 from .scene import EYE
 from .scene_ports import scene_ports
@@ -56,7 +54,7 @@ HIDDEN_LANES = ("mode",)
 
 def recording_blueprint(
     header: Header,
-    shown: Sequence[Shown] = (Shown(),),
+    shown: Sequence[ShownRun] = (ShownRun(),),
     *,
     live: bool = False,
     first_tabs: Sequence[Any] = (),
@@ -104,7 +102,7 @@ def recording_blueprint(
     )
 
 
-def events_view(shown: Sequence[Shown]) -> Any:
+def events_view(shown: Sequence[ShownRun]) -> Any:
     """What happened: each text begins with its time, as the viewer's column cuts times off."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, TimelineColumn
@@ -126,7 +124,7 @@ def events_view(shown: Sequence[Shown]) -> Any:
     )
 
 
-def scene_view(header: Header, shown: Sequence[Shown], *, follow: bool = True) -> Any:
+def scene_view(header: Header, shown: Sequence[ShownRun], *, follow: bool = True) -> Any:
     """The robot in 3D; of a comparison both robots."""
     import rerun.blueprint as rrb
 
@@ -152,7 +150,7 @@ def is_main(lane: Lane) -> bool:
     return name in LANES or (bool(lane.field.values) and name not in HIDDEN_LANES)
 
 
-def states_view(header: Header, shown: Sequence[Shown]) -> Any:
+def states_view(header: Header, shown: Sequence[ShownRun]) -> Any:
     """One lane each for phases, contacts and whether the quadratic program was solved."""
     import rerun.blueprint as rrb
 
@@ -168,8 +166,8 @@ def states_view(header: Header, shown: Sequence[Shown]) -> Any:
 FILE_NAME = "view.yaml"
 
 
-class LayoutError(AloftError):
-    """Raised for a layout that cannot be used; the message has every fault with its place."""
+class LayoutError(LoadError):
+    """A layout that cannot be used; the text reports every mistake at its place."""
 
 
 class PlotEntry(BaseModel):
@@ -213,49 +211,26 @@ def read_layout(path: Path, header: Header) -> ViewLayout:
     Raises:
         LayoutError: the file cannot be read or has faults; the message names all, with their places.
     """
-    try:
-        file = PlacedYaml.read(path)
-    except RobotError as error:
-        raise LayoutError(str(error)) from None
-    faults: list[tuple[tuple[str | int, ...], str]] = []
-    layout = None
-    try:
-        layout = ViewLayout.model_validate({} if file.data is None else file.data)
-    except ValidationError as error:
-        for entry in error.errors():
-            # pydantic names the kind of a plot that it tried, which is no key of the file
-            at = tuple(key for key in entry["loc"] if key not in ("str", "PlotEntry"))
-            if not (entry["loc"][-1:] == ("str",) and isinstance(_value(file.data, at), dict)):
-                faults.append((at, entry["msg"]))
-    if layout is not None:
-        faults += _unknown_signals(layout, header)
-    lines = [*map(_described, file.faults)]
-    for at, text in faults:
-        line, column = file.place(at)
-        lines.append((line, column, f"{'.'.join(map(str, at)) or 'the file'}: {text}"))
-    if lines or layout is None:
-        texts = [f"{path}:{line}:{column}: {text}" for line, column, text in sorted(lines)]
-        raise LayoutError("\n".join(texts))
+    problems = Problems()
+    layout, tree = read_model(
+        path, ViewLayout, problems, ("a layout", "follow, tabs"), may_be_empty=True
+    )
+    if layout is not None and tree is not None:
+        for at, message, near in _unknown_signals(layout, header):
+            problems.add(
+                Code.UNKNOWN_SOURCE if near else Code.BAD_VALUE, message, place_of(tree, at),
+                at=path_text(at), nearest=near, fix=near[0] if near else "",
+            )  # fmt: skip
+    if len(problems) or layout is None:
+        raise LayoutError(problems.report(str(path)))
     return layout
-
-
-def _value(data: Any, at: tuple[str | int, ...]) -> Any:
-    for key in at:
-        try:
-            data = data[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
-
-
-def _described(fault: RobotFault) -> tuple[int, int, str]:
-    return fault.line, fault.column, fault.message
 
 
 def _unknown_signals(
     layout: ViewLayout, header: Header
-) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    """Signals that the run has not, that are too large to be drawn, or of another unit."""
+) -> Iterator[tuple[tuple[str | int, ...], str, tuple[str, ...]]]:
+    """Signals that the run has not, that are too large to be drawn, or of another unit, each with the names nearest
+    to it."""
     fields = _fields(header)
     for i, tab in enumerate(layout.tabs):
         for j, plot in enumerate(tab.plots):
@@ -265,15 +240,14 @@ def _unknown_signals(
             for k, name in enumerate(names):
                 here = at if isinstance(plot, str) else (*at, "signals", k)
                 if name not in fields:
-                    near = get_close_matches(name, fields, 3, 0.0)
-                    yield here, f"no signal {name!r}; the nearest are {', '.join(near)}"
+                    yield here, f"no signal {name!r}", nearest(name, fields, cutoff=0.0)
                 elif not element_names(fields[name], header.robot):
-                    yield here, f"{name} has too many elements for a plot"
+                    yield here, f"{name} has too many elements for a plot", ()
                 else:
                     units[unit_of(fields[name])] = name
             if len(units) > 1:
                 told = " and ".join(f"{name} [{unit}]" for unit, name in units.items())
-                yield at, f"one plot has one unit, but these have two: {told}"
+                yield at, f"one plot has one unit, but these have two: {told}", ()
 
 
 def _fields(header: Header) -> dict[str, RecordedField]:

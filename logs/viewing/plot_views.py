@@ -84,7 +84,7 @@ peak of a force, and shows one in the flight before it."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownRun:
     """A run in the stream: the ``root`` of its entities and, if there are several, its ``label``."""
 
     root: str = ""
@@ -92,7 +92,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Line:
+class PlotLine:
     """A field in a plot; ``label`` says what it is beside the others, ``colors`` are of x, y, z."""
 
     field: RecordedField
@@ -100,7 +100,7 @@ class Line:
     colors: NDArray[np.uint32] | None = None
 
 
-def plot(header: Header, name: str, lines: Sequence[Line], shown: Sequence[Shown]) -> Any:
+def plot(header: Header, name: str, lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> Any:
     """One plot of several fields of the same unit, for all runs."""
     import rerun.blueprint as rrb
 
@@ -136,7 +136,7 @@ def legend(count: int) -> Any:
     return rrb.PlotLegend("RightTop", visible=1 < count <= MOST_IN_LEGEND)
 
 
-def looks(lines: Sequence[Line], shown: Sequence[Shown]) -> str:
+def looks(lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> str:
     """What a title says of lines that lie over one another, in place of a legend."""
     if len(shown) > 1:
         return f" · bold {shown[0].label}, thin {shown[1].label}"
@@ -145,7 +145,7 @@ def looks(lines: Sequence[Line], shown: Sequence[Shown]) -> str:
     return f" · {', '.join(told)}" if told else ""
 
 
-def feet_plot(header: Header, shown: Sequence[Shown]) -> Any:
+def feet_plot(header: Header, shown: Sequence[ShownRun]) -> Any:
     """The vertical force on each foot, in a range that shows the stance."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -170,7 +170,7 @@ def feet_plot(header: Header, shown: Sequence[Shown]) -> Any:
     )
 
 
-def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
+def _series(header: Header, line: PlotLine, label: str, *, other: bool) -> Any:
     """The legend of a field that shares its plot with others."""
     import rerun as rr
 
@@ -182,7 +182,7 @@ def _series(header: Header, line: Line, label: str, *, other: bool) -> Any:
     return rr.SeriesLines(names=names, colors=colors, widths=widths, aggregation_policy=EVERY_VALUE)
 
 
-def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[Shown]) -> list[Any]:
+def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[ShownRun]) -> list[Any]:
     """The plots that are shown first.
 
     They show the robot's true, estimated and planned motion, forces and motors. For a graph without
@@ -199,11 +199,11 @@ def main_fields(header: Header, ports: ScenePorts | None) -> list[RecordedField]
     return [line.field for _, lines in main_lines(header, ports) for line in lines]
 
 
-def main_lines(header: Header, ports: ScenePorts | None) -> list[tuple[str, list[Line]]]:
+def main_lines(header: Header, ports: ScenePorts | None) -> list[tuple[str, list[PlotLine]]]:
     """Name and lines of each plot that is shown first; ``FEET`` has none of a field."""
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
-        return [(field.name, [Line(field)]) for field in list(fields.values())[:MOST_PLOTS]]
+        return [(field.name, [PlotLine(field)]) for field in list(fields.values())[:MOST_PLOTS]]
     pose = ports.pose.block
     velocity = next(
         (n for end in ("base_linear_velocity", "linear_velocity")
@@ -217,25 +217,25 @@ def main_lines(header: Header, ports: ScenePorts | None) -> list[tuple[str, list
         ("base", base, estimate, ""),
         ("velocity of the base", velocity, f"{block_of(estimate)}.linear_velocity", ""),
     )
-    plots: list[tuple[str, list[Line]]] = []
+    plots: list[tuple[str, list[PlotLine]]] = []
     for name, actual, guess, plan in overlays:
         known = (("planned", plan, DARK), ("", actual, AXES), ("estimated", guess, OTHER))
-        lines = [Line(fields[n], label, c) for label, n, c in known if n in fields]
+        lines = [PlotLine(fields[n], label, c) for label, n, c in known if n in fields]
         if lines:
             lines.sort(key=lambda line: line.label != "")  # the true one first: it names the unit
             plots.append((name, [_named(line) for line in lines]))
     if ports.contact_force is not None and header.robot is not None and header.robot.feet:
         plots.append((FEET, []))
     names = [f"{pose}.{field}" for field in MAIN_FIELDS]
-    plots += [(name, [Line(fields[name])]) for name in names if name in fields]
+    plots += [(name, [PlotLine(fields[name])]) for name in names if name in fields]
     return plots
 
 
-def _named(line: Line) -> Line:
-    return line if line.label else Line(line.field, "true", line.colors)
+def _named(line: PlotLine) -> PlotLine:
+    return line if line.label else PlotLine(line.field, "true", line.colors)
 
 
-def block_tabs(header: Header, shown: Sequence[Shown]) -> list[Any]:
+def block_tabs(header: Header, shown: Sequence[ShownRun]) -> list[Any]:
     """One tab a block, in it all its signals but for large matrices.
 
     A block with more plots than fit has a tab in its tab for each port, or for each few plots.
@@ -247,7 +247,7 @@ def block_tabs(header: Header, shown: Sequence[Shown]) -> list[Any]:
         for field in fields.values():
             if len(element_names(field, header.robot)):
                 short = port.rpartition(".")[2]
-                view = plot(header, f"{short}.{field.field_name}", [Line(field)], shown)
+                view = plot(header, f"{short}.{field.field_name}", [PlotLine(field)], shown)
                 blocks.setdefault(block_of(port), {}).setdefault(short, []).append(view)
     tabs = []
     for block, ports in blocks.items():

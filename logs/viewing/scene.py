@@ -324,7 +324,7 @@ PARTS = (
 )
 
 
-class Scene:
+class SceneWriter:
     """Writes the scene to a Rerun ``stream``, batch by batch, below ``root``."""
 
     def __init__(

@@ -1,8 +1,6 @@
 """The arguments of a kernel as machine code gets them: types, and one row of 64-bit words.
 
-A number is one word. An array is the record that numba keeps for it: two words that are zero
-because the memory belongs to the caller, the number of elements, the bytes of an element, the
-address, the shape and the strides. A named tuple is its parts, one after the other. Before the
+A number is one word. An array is its address, its shape and its strides in bytes. A named tuple is its parts, one after the other. Before the
 arguments there are two words with which machine code reports a division by zero to Python.
 """
 
@@ -147,7 +145,7 @@ def _report_module() -> Any:
 
 def _append(argument: Any, words: list[int]) -> None:
     if isinstance(argument, np.ndarray):
-        words += (0, 0, argument.size, argument.itemsize, argument.ctypes.data)
+        words.append(argument.ctypes.data)
         words += argument.shape
         words += argument.strides
     elif isinstance(argument, tuple):

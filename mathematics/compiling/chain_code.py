@@ -48,7 +48,7 @@ def chain_function() -> Callable[[ctypes.c_size_t], int]:
     """
     code = written_code(_module())
     function: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_size_t)(code.address)
-    return function  # type: ignore[no-any-return]  # numba is not typed
+    return function  # type: ignore[no-any-return]  # llvmlite is not typed
 
 
 class HasAddresses(Protocol):

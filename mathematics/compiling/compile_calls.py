@@ -15,7 +15,7 @@ from .arguments import ArgumentType, pack, type_of
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
 from .machine_code import MachineCode, tools
-from .sharing import Job, divide, helpers, processors
+from .sharing import CompileJob, divide, helpers, processors
 from .translate import CompileError, Translator
 
 Watcher = Callable[[int, int], None]
@@ -29,8 +29,7 @@ LONGEST_WAIT = 300.0
 _BETWEEN_LOOKS = 0.2
 
 _one_at_a_time = threading.Lock()
-"""Held while kernels are compiled: ``linked_once`` changes numba for the whole process, so a second
-thread would have its kernels linked, or put in memory, in a mixture of both ways."""
+"""Held while kernels are compiled, so that a second thread finds what the first has made."""
 _loaded: dict[str, MachineCode] = {}
 _names: dict[tuple[Callable[..., None], tuple[ArgumentType, ...]], str] = {}
 
@@ -89,7 +88,9 @@ class _Compilation:
         refused: list[str] = []
         if not missing:
             return refused
-        jobs = [Job(name, self._calls[k].kernel, self._types[k]) for name, k in missing.items()]
+        jobs = [
+            CompileJob(name, self._calls[k].kernel, self._types[k]) for name, k in missing.items()
+        ]
         own, *shares = divide(jobs, processors())
         others = [job for share in shares for job in share]
         translator = Translator()
@@ -105,7 +106,7 @@ class _Compilation:
         _tell(len(jobs), len(jobs))
         return refused
 
-    def _translate(self, job: Job, translator: Translator, refused: list[str]) -> None:
+    def _translate(self, job: CompileJob, translator: Translator, refused: list[str]) -> None:
         try:
             code = translator.object_code(job.kernel, job.signature)
             _loaded[job.name] = MachineCode(code)
@@ -119,12 +120,12 @@ def _tell(done: int, total: int) -> None:
         watch(done, total)
 
 
-def _finished(jobs: Sequence[Job]) -> int:
+def _finished(jobs: Sequence[CompileJob]) -> int:
     """How many kernels other processes have finished."""
     return sum(store.holds(job.name) for job in jobs)
 
 
-def _wait(process: subprocess.Popen[bytes], own: int, others: Sequence[Job]) -> None:
+def _wait(process: subprocess.Popen[bytes], own: int, others: Sequence[CompileJob]) -> None:
     """Wait for another process, and tell how far it is."""
     for _ in range(int(LONGEST_WAIT / _BETWEEN_LOOKS)):
         with suppress(subprocess.TimeoutExpired):

@@ -8,7 +8,7 @@
             sum1 += float(R[i, j]) * float(v[j])
         out[i] = sum1 + s * float(x[i])
 
-The rewritten function is what plain Python runs and what numba compiles, so both round alike, and
+The rewritten function is what plain Python runs and what is compiled, so both round alike, and
 nothing is allocated. Which names are arrays, and of how many dimensions, follows from the types of
 the arguments: ``Array1D``, signals, and named tuples of these.
 
@@ -42,17 +42,35 @@ def expanded_code(function: Any, code: CodeType) -> CodeType:
     Raises:
         EquationError: a statement cannot be rewritten.
     """
+    definition = expanded_definition(function, code)
+    if definition is None:
+        return code  # typed in where no source is kept: there it can use no equations
+    module = ast.fix_missing_locations(ast.Module([definition], []))
+    compiled = compile(module, code.co_filename, "exec", dont_inherit=True)
+    (made,) = (each for each in compiled.co_consts if isinstance(each, CodeType))
+    return made.replace(co_qualname=code.co_qualname, co_firstlineno=code.co_firstlineno)
+
+
+def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
+    """The definition of a kernel with loops in place of equations; none where there is no source.
+
+    A function that has variables of another function stays as it is written.
+
+    Raises:
+        EquationError: a statement cannot be rewritten.
+    """
     import inspect  # costs a start of the command line more than all of this module
 
     try:
         lines, first = inspect.getsourcelines(code)
     except (OSError, TypeError):
-        return code  # typed in where no source is kept: there it can use no equations
+        return None
     tree = ast.parse(textwrap.dedent("".join(lines)))
     ast.increment_lineno(tree, first - 1)
     (definition,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
-    rewriter = _Rewriter(function, code.co_filename)
-    definition.body = rewriter.body(definition.body)
+    if function.__closure__ is None:
+        rewriter = _Rewriter(function, code.co_filename)
+        definition.body = rewriter.body(definition.body)
     if reports_event(function):
         definition.args.args.append(ast.arg(EVENT))
         none = ast.Assign([_event_place()], ast.Constant(False))
@@ -60,10 +78,7 @@ def expanded_code(function: Any, code: CodeType) -> CodeType:
     definition.decorator_list, definition.returns = [], None
     for argument in definition.args.args:
         argument.annotation = None
-    module = ast.fix_missing_locations(ast.Module([definition], []))
-    compiled = compile(module, code.co_filename, "exec", dont_inherit=True)
-    (made,) = (each for each in compiled.co_consts if isinstance(each, CodeType))
-    return made.replace(co_qualname=code.co_qualname, co_firstlineno=code.co_firstlineno)
+    return definition
 
 
 EVENT = "event_"
@@ -429,21 +444,30 @@ class _Rewriter(Expressions):
         left, right = self._kind(node.left), self._kind(node.right)
         assert isinstance(left, ArrayKind) and isinstance(right, ArrayKind)
         own = left.rank - 1
-        j = ast.Name(self._name("j"), ast.Load())
         total = self._name("sum")
-        outer, self._ahead = self._ahead, []
-        a = self._element(copy.deepcopy(node.left), [*places[:own], j])
-        b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
-        product = ast.BinOp(a, ast.Mult(), b)
-        within = [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
+        outer = self._ahead
+
+        def term(j: ast.expr) -> list[ast.stmt]:
+            self._ahead = []
+            a = self._element(copy.deepcopy(node.left), [*places[:own], j])
+            b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
+            product = ast.BinOp(a, ast.Mult(), b)
+            return [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
+
+        statements: list[ast.stmt] = [ast.Assign([ast.Name(total, ast.Store())], ast.Constant(0.0))]
+        if any(isinstance(each, ast.Name) and each.id in self._products for each in ast.walk(node)):
+            # a cross product is three numbers, which no index finds
+            statements += [each for k in range(3) for each in term(ast.Constant(k))]
+        else:
+            size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
+            if size is None:
+                raise self._error(node, "the length of this product is not known")
+            j = self._name("j")
+            within = term(ast.Name(j, ast.Load()))
+            called = _called("range", size, node)
+            statements.append(ast.For(ast.Name(j, ast.Store()), called, within, [], None))
         self._ahead = outer
-        assert self._ahead is not None
-        size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
-        if size is None:
-            raise self._error(node, "the length of this product is not known")
-        begin = ast.Assign([ast.Name(total, ast.Store())], ast.Constant(0.0))
-        loop = ast.For(ast.Name(j.id, ast.Store()), _called("range", size, node), within, [], None)
-        for statement in (begin, loop):
+        for statement in statements:
             for each in ast.walk(statement):
                 if not hasattr(each, "lineno"):
                     ast.copy_location(each, node)

@@ -1,8 +1,4 @@
-"""Machine code in memory: an object file becomes a function that takes one address.
-
-Only LLVM is needed for that. numba, which takes longer to import, is imported where a kernel has to
-be compiled.
-"""
+"""Machine code in memory: LLVM's language becomes an object file, and this a function of one address."""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ from typing import Any
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
-OPTIONS = "strict floating point, errors as in Python, no allocation, 3"
+OPTIONS = "strict floating point, errors as in Python, 4"
 """What is asked of the compiler; the number at the end counts changes of the calling convention."""
 
 
@@ -25,14 +21,13 @@ def tools() -> str:
     """The versions, options and processor on which machine code depends.
 
     Raises:
-        ImportError: there is no LLVM, or no numba to compile with.
+        ImportError: there is no LLVM.
     """
     import platform
 
     binding = _binding()
     names = (
         f"python {platform.python_version()}",
-        f"numba {version('numba')}",
         f"llvmlite {version('llvmlite')}",
         f"{binding.get_process_triple()} {' '.join(processor())}",
         OPTIONS,
@@ -52,11 +47,11 @@ def _binding() -> Any:
 def processor() -> tuple[str, str]:
     """LLVM's name of the processor for which code is made, and its features.
 
-    It is this computer's, or the one that numba's ``NUMBA_CPU_NAME`` and ``NUMBA_CPU_FEATURES`` name.
+    It is this computer's, or the one that ``ALOFT_CPU_NAME`` and ``ALOFT_CPU_FEATURES`` name.
     The results are the same bits for all of them.
     """
-    if name := os.environ.get("NUMBA_CPU_NAME"):
-        return name, os.environ.get("NUMBA_CPU_FEATURES", "")
+    if name := os.environ.get("ALOFT_CPU_NAME"):
+        return name, os.environ.get("ALOFT_CPU_FEATURES", "")
     binding = _binding()
     return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
 
@@ -71,6 +66,25 @@ def target_machine() -> Any:
         reloc="pic",
         codemodel="jitdefault",
     )
+
+
+def optimised(assembly: str) -> bytes:
+    """The object file of a module in LLVM's language, which LLVM optimises as far as it can.
+
+    Raises:
+        RuntimeError: the module is not valid.
+    """
+    binding, machine = _binding(), target_machine()
+    module = binding.parse_assembly(assembly)
+    module.triple = binding.get_process_triple()
+    module.data_layout = str(machine.target_data)
+    module.verify()
+    options = binding.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization, options.slp_vectorization = True, False
+    builder = binding.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    code: bytes = machine.emit_object(module)
+    return code
 
 
 def assemble(assembly: str) -> bytes:

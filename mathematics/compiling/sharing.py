@@ -28,7 +28,7 @@ MOST_PROCESSES = 4
 _START = "import sys; sys.path[:] = {path!r}; from {module} import main; main()"
 
 
-class Job(NamedTuple):
+class CompileJob(NamedTuple):
     """A kernel to compile: the name of its machine code, the kernel, and the types for it."""
 
     name: str
@@ -36,7 +36,7 @@ class Job(NamedTuple):
     signature: tuple[ArgumentType, ...]
 
 
-def divide(jobs: Sequence[Job], processors: int) -> list[list[Job]]:
+def divide(jobs: Sequence[CompileJob], processors: int) -> list[list[CompileJob]]:
     """Share out jobs so that all processes take about as long; the first share is never empty.
 
     A job costs the bytes of Python's code of the functions that its process does not have yet. There
@@ -48,7 +48,9 @@ def divide(jobs: Sequence[Job], processors: int) -> list[list[Job]]:
     for sizes in below.values():
         everything |= sizes
     worth = sum(everything.values()) // WORTH_A_PROCESS
-    shares: list[list[Job]] = [[] for _ in range(max(1, min(processors, worth, MOST_PROCESSES)))]
+    shares: list[list[CompileJob]] = [
+        [] for _ in range(max(1, min(processors, worth, MOST_PROCESSES)))
+    ]
     known: list[dict[int, int]] = [{} for _ in shares]
     for job in sorted(jobs, key=lambda job: -sum(below[job.name].values())):
         totals = [sum((have | below[job.name]).values()) for have in known]
@@ -73,7 +75,7 @@ def processors() -> int:
 
 
 @contextmanager
-def helpers(shares: Sequence[Sequence[Job]]) -> Iterator[list[subprocess.Popen[bytes]]]:
+def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[subprocess.Popen[bytes]]]:
     """A process for each share, whose end the caller waits for; none is left behind."""
     started: list[subprocess.Popen[bytes]] = []
     try:
@@ -87,7 +89,7 @@ def helpers(shares: Sequence[Sequence[Job]]) -> Iterator[list[subprocess.Popen[b
             process.wait()
 
 
-def _start(share: Sequence[Job]) -> subprocess.Popen[bytes]:
+def _start(share: Sequence[CompileJob]) -> subprocess.Popen[bytes]:
     words = pickle.dumps([_packed(job) for job in share])
     code = _START.format(path=sys.path, module=__name__)
     process = subprocess.Popen(
@@ -100,7 +102,7 @@ def _start(share: Sequence[Job]) -> subprocess.Popen[bytes]:
     return process
 
 
-def _packed(job: Job) -> bytes:
+def _packed(job: CompileJob) -> bytes:
     """A job for another process; empty where that could not find the kernel by its name."""
     try:
         kernel = job.kernel

@@ -17,7 +17,7 @@ from ...plotting import (
     COLOURS,
     FAINT,
     INK,
-    Line,
+    Curve,
     Panel,
     Shade,
     draw_panels,
@@ -170,61 +170,61 @@ def phases_of(plan: PlannedJump) -> list[Shade]:
     ]
 
 
-def com_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
+def com_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
     """The path of the centre of mass, from where it stands at first."""
     path = 100.0 * (plan.com - plan.com[0])
-    lines = [Line(name, plan.time, path[:, k]) for k, name in enumerate(("forward", "left", "up"))]
+    lines = [Curve(name, plan.time, path[:, k]) for k, name in enumerate(("forward", "left", "up"))]
     return "centre of mass, from standing [cm]", lines
 
 
-def velocity_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
+def velocity_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
     """The velocity of the centre of mass."""
     names = ("forward", "left", "up")
-    lines = [Line(name, plan.time, plan.com_velocity[:, k]) for k, name in enumerate(names)]
+    lines = [Curve(name, plan.time, plan.com_velocity[:, k]) for k, name in enumerate(names)]
     return "velocity of the centre of mass [m/s]", lines
 
 
-def momentum_lines(plan: PlannedJump) -> tuple[str, list[Line]]:
+def momentum_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
     """The angular momentum about the centre of mass."""
     names = ("roll", "pitch", "yaw")
-    lines = [Line(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
+    lines = [Curve(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
     return "angular momentum about the centre of mass [N m s]", lines
 
 
-def force_lines(e: Evidence) -> tuple[str, list[Line]]:
+def force_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """The vertical force on every contact point, and the sum of all; constant over each interval."""
     time, k = _interval_ends(e.plan)
     up = e.plan.contact_force[k, :, 2]
-    lines = [Line(c.name, time, up[:, n]) for n, c in enumerate(e.robot.contacts)]
-    return "vertical contact force [N]", [*lines, Line("all", time, up.sum(axis=1))]
+    lines = [Curve(c.name, time, up[:, n]) for n, c in enumerate(e.robot.contacts)]
+    return "vertical contact force [N]", [*lines, Curve("all", time, up.sum(axis=1))]
 
 
-def friction_lines(e: Evidence) -> tuple[str, list[Line]]:
+def friction_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """How much of its friction cone the force on every contact point uses; no line without force."""
     time, k = _interval_ends(e.plan)
     force = e.plan.contact_force[k]
     up = force[:, :, 2]
     most = e.plan.task.friction * np.where(up > 0.5, up, np.nan)
     share = 100.0 * np.hypot(force[:, :, 0], force[:, :, 1]) / most
-    lines = [Line(c.name, time, share[:, n]) for n, c in enumerate(e.robot.contacts)]
+    lines = [Curve(c.name, time, share[:, n]) for n, c in enumerate(e.robot.contacts)]
     return "friction used [% of the cone]", [*lines, _limit(time, 100.0)]
 
 
-def feet_lines(e: Evidence) -> tuple[str, list[Line]]:
+def feet_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """The heights of the contact points, and of the ground under each of them."""
     s = e.replay.samples
     ground = 100.0 * (s.points[:, :, 2] - e.point_height)
     lines = [
-        Line(contact.name, s.time, 100.0 * s.points[:, k, 2])
+        Curve(contact.name, s.time, 100.0 * s.points[:, k, 2])
         for k, contact in enumerate(e.robot.contacts)
     ]
     for k in range(len(e.robot.contacts)):
         last = k == len(e.robot.contacts) - 1
-        lines.append(Line("ground" if last else "", s.time, ground[:, k], limit=True))
+        lines.append(Curve("ground" if last else "", s.time, ground[:, k], limit=True))
     return "height of the contact points [cm]", lines
 
 
-def torque_lines(e: Evidence) -> tuple[str, list[Line]]:
+def torque_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """The torques of the two motors that work hardest, and what their speed allows at each instant.
 
     Of two motors that do the same, as the legs' do in a jump straight ahead, one is shown.
@@ -233,22 +233,22 @@ def torque_lines(e: Evidence) -> tuple[str, list[Line]]:
     lines, limits = [], []
     for k in _busiest(_torque_share(e), np.abs(e.motor_torque))[:2]:
         torque = e.motor_torque[:, k]
-        lines.append(Line(_name(e, k), time, torque))
+        lines.append(Curve(_name(e, k), time, torque))
         # The limit on the side on which the motor works; braking and driving differ.
         limit = np.where(torque < 0.0, -allowed[:, k], allowed[:, k])
         limit[np.flatnonzero(np.diff(np.sign(limit)))] = np.nan
-        limits.append(Line("", time, limit, limit=True))
-    limits[-1] = Line("limit at its speed", limits[-1].x, limits[-1].y, limit=True)
+        limits.append(Curve("", time, limit, limit=True))
+    limits[-1] = Curve("limit at its speed", limits[-1].x, limits[-1].y, limit=True)
     return "motor torque [N m]", [*lines, *limits]
 
 
-def torque_share_lines(e: Evidence) -> tuple[str, list[Line]]:
+def torque_share_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """All motor torques as shares of what the motors can do at their speed."""
     lines = _motor_lines(e, 100.0 * _torque_share(e))
     return "motor torque [% of the limit at its speed]", lines
 
 
-def speed_lines(e: Evidence) -> tuple[str, list[Line]]:
+def speed_lines(e: Evidence) -> tuple[str, list[Curve]]:
     """Motor speeds as shares of the speed without load."""
     share = np.abs(e.motor_speed) / e.plan.task.equipped(e.robot).motors.no_load_speed
     return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
@@ -269,14 +269,14 @@ def _torque_share(e: Evidence) -> Array:
     return np.asarray(np.abs(e.motor_torque) / np.maximum(allowed_motor_torque(e, 1.0), 1e-3))
 
 
-def _motor_lines(e: Evidence, shares: Array) -> list[Line]:
+def _motor_lines(e: Evidence, shares: Array) -> list[Curve]:
     """The three motors that work hardest with their names, all others grey below them, the limit."""
     time, shares = e.replay.samples.time, np.minimum(shares, MOST_SHARE)
     named = _busiest(shares / 100.0, shares)[:3]
     others = [k for k in range(shares.shape[1]) if k not in named]
-    lines = [Line("", time, shares[:, k], OTHER) for k in others]
-    lines += [Line(_name(e, k), time, shares[:, k]) for k in named]
-    limit = Line("limit", time, 100.0 * e.effort[:, 0], limit=True)
+    lines = [Curve("", time, shares[:, k], OTHER) for k in others]
+    lines += [Curve(_name(e, k), time, shares[:, k]) for k in named]
+    limit = Curve("limit", time, 100.0 * e.effort[:, 0], limit=True)
     return [*lines, limit]
 
 
@@ -298,6 +298,6 @@ def _name(e: Evidence, motor: int) -> str:
     return e.robot.transmission.motors[motor].removesuffix("_motor")
 
 
-def _limit(time: Array, value: float) -> Line:
+def _limit(time: Array, value: float) -> Curve:
     """A limit that does not change."""
-    return Line("limit", np.array([time[0], time[-1]]), np.full(2, value), limit=True)
+    return Curve("limit", np.array([time[0], time[-1]]), np.full(2, value), limit=True)

@@ -10,11 +10,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any, Literal
 
 from pydantic import ValidationError, model_validator
 
+from ...files.problems import nearest
+from ...files.validation import describe, names_at
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .files import JumpTaskError, PlacedFile
@@ -354,21 +355,10 @@ def make_task(
 
 def _explain(problem: Any) -> str:
     """One of pydantic's problems as a line: the key, what is expected and what was found."""
-    key = ".".join(map(str, problem["loc"]))
-    message = str(problem["msg"]).removeprefix("Value error, ")
+    location = problem["loc"]
     if problem["type"] == "extra_forbidden":
-        nested: dict[str, type[Parameters]] = {
-            "knots": Knots, "weights": Weights, "margins": Margins, "jumps": Hop, "phases": PhaseSpec,
-            "rough": RoughGround,
-        }  # fmt: skip
-        owner = nested.get(str(problem["loc"][0]), JumpTask)
-        near = get_close_matches(key.rpartition(".")[2], owner.model_fields, 1, 0.0)
-        return f"{key}: is no parameter of a task; the nearest is {near[0]}"
-    if problem["type"] == "float_parsing":
-        field = JumpTask.model_fields.get(str(problem["loc"][0]))
-        extra = field.json_schema_extra if field else None
-        unit = extra.get("unit") if isinstance(extra, dict) else ""
-        message = f"expected a number in {unit}" if unit else "expected a number"
-    if not key or isinstance(problem["input"], Mapping):
-        return message
-    return f"{key}: {message}, found {problem['input']!r}"
+        near = nearest(str(location[-1]), names_at(JumpTask, location[:-1]), 1, 0.0)
+        return (
+            f"{'.'.join(map(str, location))}: is no parameter of a task; the nearest is {near[0]}"
+        )
+    return describe(problem, JumpTask)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ...files.problems import listing
 from ...mathematics.arrays import Array
 from ..validation import RobotError, RobotFault
-from ..validation.faults import listing
 from .capsules import Capsule, coarse
 from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
 

@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from ...files.problems import listing
 from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
 from ..validation import RobotFault
-from ..validation.faults import listing, nearest
+from ..validation.faults import nearest
 from ..validation.find_faults import shown
 from .build import BodyFrame, LinkTree, build, tidy
 from .looks import link_looks

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from ...files.problems import listing
 from ..validation import RobotError, RobotFault
-from ..validation.faults import listing, number
+from ..validation.faults import number
 
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")

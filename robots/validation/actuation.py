@@ -8,8 +8,9 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from ...files.problems import listing
 from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Transmission
-from .faults import Draft, Path, listing, nearest, number, read
+from .faults import Draft, Path, nearest, number, read
 
 LARGEST_CONDITION = 1e8
 """The largest condition number of a transmission; beyond it motor torques are rounding errors."""

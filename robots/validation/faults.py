@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+
+from ...files import problems
+from ...files.problems import listing
 
 Path = tuple[str | int, ...]
 
@@ -72,14 +74,7 @@ class RobotError(ValueError):
 
 def nearest(name: str, legal: Iterable[str]) -> str:
     """The legal name most like ``name``; empty when none is alike."""
-    return next(iter(get_close_matches(name, list(legal), n=1, cutoff=0.6)), "")
-
-
-def listing(names: Sequence[str], limit: int = 12) -> str:
-    """Names in one line, cut off where there are many."""
-    if len(names) > limit:
-        return f"{', '.join(names[:limit])}, ... ({len(names)} in all)"
-    return ", ".join(names) or "none"
+    return next(iter(problems.nearest(name, legal, 1)), "")
 
 
 def number(value: float) -> str:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args, get_origin
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from ...files.problems import listing
+from ...files.validation import explain, names_at
 from ..robot_description import RobotDescription
 from .actuation import check_actuation
-from .faults import Draft, Path, RobotFault, listing, nearest
+from .faults import Draft, Path, RobotFault, nearest
 from .stance import check_feet, check_poses
 from .structure import check_bodies, check_joints, check_looks, check_names, check_tree
 
@@ -43,15 +45,14 @@ def check_types(draft: Draft, kind: type[BaseModel]) -> None:
         kind.model_validate(draft.data)
     except ValidationError as error:
         for each in error.errors(include_url=False):
-            _report(draft, kind, each["loc"], each["type"], each.get("input"), each["msg"])
+            _report(draft, kind, each)
 
 
-def _report(
-    draft: Draft, kind: type[BaseModel], path: Path, code: str, value: Any, said: str
-) -> None:
+def _report(draft: Draft, kind: type[BaseModel], error: Mapping[str, Any]) -> None:
+    path, code, value = error["loc"], error["type"], error.get("input")
     owner, key = where(draft.data, path[:-1]), path[-1]
     if code == "extra_forbidden":
-        legal = list(_model_at(kind, path[:-1]).model_fields)
+        legal = names_at(kind, path[:-1])
         right = nearest(str(key), legal)
         draft.add(
             path, f"{owner} has no key {key!r}", listing(legal, 20), repr(key),
@@ -69,17 +70,11 @@ def _report(
         else:
             draft.add(path, f"{owner} lacks {key!r}", f"a value for {key!r}", "nothing")
     else:
-        said = said.removeprefix("Input should be ").removeprefix("Value should have ")
-        said = said.replace("a valid string", "text").replace("a valid tuple", "a list")
-        said = said.replace("a valid dictionary", "a mapping").replace(
-            "a valid boolean", "true or false"
-        )
-        said = said.replace(", unable to parse string as a number", "").replace(
-            "a valid number", "a number"
-        )
-        said = said.partition(" or instance of")[0].partition(" after validation")[0]
+        expected, reason = explain(error)
         name = key if not isinstance(key, int) else f"value {key + 1}"
-        draft.add(path, f"{owner}: {name} cannot be {shown(value)}", said, shown(value))
+        draft.add(
+            path, f"{owner}: {name} cannot be {shown(value)}", expected or reason, shown(value)
+        )
 
 
 def shown(value: Any) -> str:
@@ -116,17 +111,3 @@ def _inside(data: Any, key: str | int) -> Any:
         return data[key]
     except (KeyError, IndexError, TypeError):
         return None
-
-
-def _model_at(kind: type[BaseModel], path: Path) -> type[BaseModel]:
-    """The model that describes what stands at a path."""
-    found: Any = kind
-    for key in path:
-        if isinstance(found, type) and issubclass(found, BaseModel):
-            found = found.model_fields[str(key)].annotation
-        else:
-            found = next(arg for arg in reversed(get_args(found)) if arg is not Ellipsis)
-        while get_origin(found) is not None and type(None) in get_args(found):
-            found = next(arg for arg in get_args(found) if arg is not type(None))
-    assert isinstance(found, type) and issubclass(found, BaseModel)
-    return found

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...files.problems import listing
 from ..robot_description import Appearance, Joint, Link
-from .faults import Draft, Path, listing, nearest, number, read, vector
+from .faults import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
 """Names that the models keep for themselves."""

@@ -30,7 +30,7 @@ class RingPosition(Signal):
     oldest = Field(dtype="int64", text="index of the entry that is emitted next")
 
 
-class Delay(Block):
+class WireDelay(Block):
     """Delays its input by k runs: y[n] = u[n - k]; the first k runs give the initial values.
 
     Runs are counted at the block's own rate, which for a delayed wire is the rate of the source's
@@ -107,10 +107,10 @@ def initial_problems(
     return problems
 
 
-_TYPES: dict[tuple[type[Signal], int], type[Delay]] = {}
+_TYPES: dict[tuple[type[Signal], int], type[WireDelay]] = {}
 
 
-def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
+def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
     """The block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
     if k < 1:
         raise ValueError(f"a delay is at least 1 run, not {k}")
@@ -124,10 +124,10 @@ def delay_block_type(signal: type[Signal], k: int) -> type[Delay]:
         f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
     )
     kind = type(
-        f"Delay{signal.__name__}{k}",
-        (Delay,),
+        f"WireDelay{signal.__name__}{k}",
+        (WireDelay,),
         {
-            "__doc__": Delay.__doc__,
+            "__doc__": WireDelay.__doc__,
             "u": Input(signal, text="what is delayed"),
             "y": Output(signal, text=f"the input {k} runs ago"),
             "past": State(past, text="the last inputs"),

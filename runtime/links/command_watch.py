@@ -12,13 +12,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from ..placement.placed import Link, PlacedGraph, command_sources, silence_limit
+from ..placement.placed import MachineLink, PlacedGraph, command_sources, silence_limit
 
 
 class WatchedLink(Protocol):
     """The receiving end of a link, as the watch needs it."""
 
-    link: Link
+    link: MachineLink
     received_at: int
 
 

@@ -28,7 +28,7 @@ from ..transports.transport import MessageCallback, Transport, tick_key
 from .command_watch import CommandWatch
 from .free_link import LatestReceiver
 from .lockstep_link import LinkOutput, LockstepReceiver, Mailbox, MailTimeoutError
-from .peers import PeerError, PeerStates, Phase
+from .peers import PartPhase, PeerError, PeerStates
 
 
 class PartClock(Clock):
@@ -226,8 +226,8 @@ class LockstepCoordinator(Block):
         self.peers.open()
         self.listen()
         self._on_open()
-        self.peers.reach_phase(Phase.HELLO, self._connect_timeout)
-        self.peers.reach_phase(Phase.LINKED, self._connect_timeout, before=self._all_links_work)
+        self.peers.reach_phase(PartPhase.HELLO, self._connect_timeout)
+        self.peers.reach_phase(PartPhase.LINKED, self._connect_timeout, before=self._all_links_work)
 
     def listen(self) -> None:
         """Listen to what the others say of each tick."""
@@ -249,7 +249,7 @@ class LockstepCoordinator(Block):
             sender.probe()
         return not waiting and all(self.peers.checked(box.link.name) for box in self._receivers)
 
-    def reach_phase(self, phase: Phase) -> None:
+    def reach_phase(self, phase: PartPhase) -> None:
         """Wait until all parts have started those blocks that ``phase`` says."""
         self.peers.reach_phase(phase, self._connect_timeout)
 
@@ -432,7 +432,7 @@ class StartBarrier(Block):
 
     waits_for_others = True
 
-    def connect(self, coordinator: LockstepCoordinator, phase: Phase) -> None:
+    def connect(self, coordinator: LockstepCoordinator, phase: PartPhase) -> None:
         """Take what it waits with, and how far all must be."""
         self._coordinator, self._phase = coordinator, phase
 
@@ -461,19 +461,19 @@ class FreeRunningCoordinator(LockstepCoordinator):
     def listen(self) -> None:
         """Nothing to listen to: a tick ends when it ends here."""
 
-    def reach_phase(self, phase: Phase) -> None:
+    def reach_phase(self, phase: PartPhase) -> None:
         """Wait for the others; a part that moves actuators does not join a run that goes on.
 
         Raises:
             AloftError: the others are running, and this part has actuators.
         """
-        if phase is Phase.PREPARED and self.moves and self.peers.are_running():
+        if phase is PartPhase.PREPARED and self.moves and self.peers.are_running():
             raise AloftError(
                 "the other machines are running already, and this part moves actuators, which it "
                 "never enables by itself. Stop the run everywhere and start it again"
             )
         super().reach_phase(phase)
-        if phase is Phase.STARTED:
+        if phase is PartPhase.STARTED:
             self._quiet = threading.Event()
             threading.Thread(target=self._repeat, args=(self._quiet,), daemon=True).start()
 

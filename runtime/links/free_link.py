@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..language.block import Block, Output
 from ..language.signals import Field, Signal
 from ..language.stages import LinkPolicy
-from ..placement.placed import Link
+from ..placement.placed import MachineLink
 from .lockstep_link import PROBE
 from .message import DamagedMessageError, Message, MessageReader
 from .peers import PeerStates
@@ -70,7 +70,7 @@ class LinkMonitor(Block):
         """Never called: the link writes when the stand-in of its source runs."""
 
 
-def health_path(link: Link) -> str:
+def health_path(link: MachineLink) -> str:
     """The path of the block that shows how a free-running link does."""
     return f"{link.source}~from~{link.sender}"
 
@@ -98,7 +98,7 @@ class LatestReceiver:
 
     def __init__(
         self,
-        link: Link,
+        link: MachineLink,
         reader: MessageReader,
         peers: PeerStates,
         policy: LinkPolicy,

@@ -12,7 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from ..language.block import Block
 from ..language.errors import RunError
-from ..placement.placed import Link
+from ..placement.placed import MachineLink
 from ..transports.transport import MessageCallback
 from .message import DamagedMessageError, MessageReader, MessageWriter
 from .peers import PeerStates
@@ -97,7 +97,7 @@ class LockstepReceiver:
     """
 
     def __init__(
-        self, link: Link, reader: MessageReader, peers: PeerStates, timeout: float
+        self, link: MachineLink, reader: MessageReader, peers: PeerStates, timeout: float
     ) -> None:
         self.link = link
         self.damaged = 0

@@ -25,7 +25,7 @@ from typing import NamedTuple
 from zlib import crc32
 
 from ..language.layout import Layout
-from ..placement.placed import Link
+from ..placement.placed import MachineLink
 
 _HEAD = Struct("<II8s8sQqq")
 _FIELDS = Struct("<I8s8sQqq")
@@ -47,7 +47,7 @@ class DamagedMessageError(ValueError):
     """A message was cut, changed on its way, or is of another link or run."""
 
 
-def schema_of(link: Link) -> bytes:
+def schema_of(link: MachineLink) -> bytes:
     """The schema hash of a link, 8 bytes."""
     lines = [field.describe() for field in link.fields]
     return blake2b(json.dumps(lines).encode(), digest_size=8).digest()
@@ -62,7 +62,7 @@ class Span:
     size: int
 
 
-def spans_of(link: Link, layout: Layout) -> tuple[Span, ...]:
+def spans_of(link: MachineLink, layout: Layout) -> tuple[Span, ...]:
     """Where the fields of a link lie in the bus; neighbouring fields are one stretch.
 
     The fields of a port that have one type are neighbours, so a port with fields of one type that
@@ -84,7 +84,7 @@ def spans_of(link: Link, layout: Layout) -> tuple[Span, ...]:
 class MessageWriter:
     """Makes the messages of one link in one buffer that is made once."""
 
-    def __init__(self, link: Link, layout: Layout, bus: memoryview, run: bytes) -> None:
+    def __init__(self, link: MachineLink, layout: Layout, bus: memoryview, run: bytes) -> None:
         self._message = bytearray(HEADER + link.payload)
         self._view = memoryview(self._message)
         payload = self._view[HEADER:]
@@ -111,7 +111,7 @@ class MessageWriter:
 class MessageReader:
     """Checks the messages of one link and writes their payload into the bus."""
 
-    def __init__(self, link: Link, layout: Layout, bus: memoryview) -> None:
+    def __init__(self, link: MachineLink, layout: Layout, bus: memoryview) -> None:
         self._spans = tuple(
             (bus[span.bus :][: span.size], span.payload, span.payload + span.size)
             for span in spans_of(link, layout)

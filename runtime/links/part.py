@@ -19,7 +19,7 @@ from ..language.block import Block
 from ..language.layout import Layout
 from ..language.parameters import Parameters
 from ..language.stages import BlockSpec, CheckedGraph, ClockSpec
-from ..placement.placed import Link, PlacedGraph
+from ..placement.placed import MachineLink, PlacedGraph
 from ..running.executor import Executor
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
@@ -38,7 +38,7 @@ from .free_link import TICK_TIME, LatestReceiver, LinkMonitor, TickTime, health_
 from .lockstep_link import LinkInput, LinkOutput, LockstepReceiver, link_input_type
 from .message import MessageReader, MessageWriter
 from .path_ages import PathAges, path_sinks
-from .peers import PeerStates, Phase
+from .peers import PartPhase, PeerStates
 
 MESSAGE_TIMEOUT = 30.0
 """Seconds that a part in lockstep waits for a message before it gives up."""
@@ -47,7 +47,7 @@ CONNECT_TIMEOUT = 180.0
 COORDINATOR, PREPARED, STARTED = "~coordinator", "~prepared", "~started"
 
 
-def sender_path(link: Link) -> str:
+def sender_path(link: MachineLink) -> str:
     """The path of the block that sends on a link."""
     return f"{link.source}~to~{link.receiver}"
 
@@ -156,7 +156,7 @@ class BoundPart(BoundGraph):
         self.path_ages: list[PathAges] = []
         self.transport = transport
         coordinator = self._block(COORDINATOR, LockstepCoordinator)
-        for path, phase in ((PREPARED, Phase.PREPARED), (STARTED, Phase.STARTED)):
+        for path, phase in ((PREPARED, PartPhase.PREPARED), (STARTED, PartPhase.STARTED)):
             self._block(path, StartBarrier).connect(coordinator, phase)
         self._make_receivers(timeout)
         self.watch = CommandWatch(placed, machine, self.receivers, clock)

@@ -70,7 +70,7 @@ REPEAT = 0.05
 """Seconds between two beacons while a part waits for the others."""
 
 
-class Phase(IntEnum):
+class PartPhase(IntEnum):
     """How far a part is."""
 
     HELLO = 0
@@ -126,7 +126,7 @@ class PeerStates:
         self._free = free
         self._clocks = {name: ClockOffset() for name in self.names}
         self._stop_reason = stop_reason
-        self._phase = Phase.HELLO
+        self._phase = PartPhase.HELLO
         self._problem = ""
         self._ended = -1
         self._checked: dict[str, None] = {}
@@ -150,7 +150,7 @@ class PeerStates:
 
     def assume_started(self, name: str, run: bytes) -> None:
         """Take another part for started without having heard it: for runs in virtual time."""
-        state = {"run": run.hex(), "phase": int(Phase.STARTED), "checked": [], "ended": -1}
+        state = {"run": run.hex(), "phase": int(PartPhase.STARTED), "checked": [], "ended": -1}
         self._states[name] = state
 
     def note_checked(self, link: str) -> None:
@@ -169,18 +169,18 @@ class PeerStates:
         return self._hashes[0]
 
     @property
-    def phase(self) -> Phase:
+    def phase(self) -> PartPhase:
         """How far this part is."""
         return self._phase
 
     @property
     def started(self) -> bool:
         """Whether all blocks of this part have started."""
-        return self._phase >= Phase.STARTED
+        return self._phase >= PartPhase.STARTED
 
     def are_running(self) -> bool:
         """Whether some other part is past its start."""
-        return any(heard["phase"] >= Phase.STARTED for heard in tuple(self._states.values()))
+        return any(heard["phase"] >= PartPhase.STARTED for heard in tuple(self._states.values()))
 
     def ended(self) -> str:
         """Why this part is to end, where another has ended in order; else empty.
@@ -230,7 +230,7 @@ class PeerStates:
 
     def reach_phase(
         self,
-        phase: Phase,
+        phase: PartPhase,
         timeout: float,
         *,
         before: Callable[[], bool] | None = None,
@@ -278,7 +278,7 @@ class PeerStates:
         it says why until all have heard it. ``tick`` is the first that this part will not run.
         """
         end = time.monotonic() + timeout
-        self._phase, self._ended = Phase.RESTING, tick
+        self._phase, self._ended = PartPhase.RESTING, tick
         next_time = 0.0
         while (now := time.monotonic()) < end:
             if now >= next_time:
@@ -289,7 +289,7 @@ class PeerStates:
                 for name in self.names
                 if name not in self._gone
                 and (self._problem or name in self._states)
-                and self._states.get(name, {}).get("phase", -1) < Phase.RESTING
+                and self._states.get(name, {}).get("phase", -1) < PartPhase.RESTING
             ]
             if not waiting:
                 return
@@ -314,7 +314,7 @@ class PeerStates:
             "checked": list(self._checked),
             "heard": self._states.get(name, {}).get("phase", -1),
         }
-        if self._phase is Phase.HELLO:
+        if self._phase is PartPhase.HELLO:
             state["graph"] = self._identity.graph
             state["schema"] = self._identity.schema
         if name in self._publishers:
@@ -339,11 +339,11 @@ class PeerStates:
                 checked = list(dict.fromkeys([*before["checked"], *checked]))
             self._states[name] = {**before, **state, "phase": phase, "checked": checked}
             if state["problem"]:
-                what = "does not start" if phase < Phase.STARTED else "failed"
+                what = "does not start" if phase < PartPhase.STARTED else "failed"
                 error = PeerError(f"machine {name!r} {what}: {state['problem']}")
                 error.heard = True
                 self.fail(name, -1, error)
-            elif phase >= Phase.RESTING:
+            elif phase >= PartPhase.RESTING:
                 error = PeerError(f"machine {name!r} has ended its run")
                 self.fail(name, int(state["ended"]), error)
             self._changed_event.set()
@@ -352,10 +352,10 @@ class PeerStates:
 
     def _on_lost(self, name: str) -> None:
         heard = self._states.get(name)
-        if heard is None or heard["phase"] >= Phase.RESTING:
+        if heard is None or heard["phase"] >= PartPhase.RESTING:
             return  # it was not there yet, or has ended in good order
         self._gone[name] = None
-        if self._free and self._phase >= Phase.STARTED:
+        if self._free and self._phase >= PartPhase.STARTED:
             return  # its links say what to do without it
         text = f"machine {name!r} is gone: its process ended or froze, or the network to it is cut"
         self.fail(name, -1, PeerError(text))
@@ -373,7 +373,7 @@ class PeerStates:
         Raises:
             PeerError: both hashes, and the first difference.
         """
-        if self._phase > Phase.HELLO:
+        if self._phase > PartPhase.HELLO:
             return
         for name in self.names:
             heard = self._states.get(name, {})
@@ -392,7 +392,7 @@ class PeerStates:
                 self.send_beacon(str(error))
                 raise error
 
-    def _missing_text(self, missing: list[str], phase: Phase, timeout: float) -> str:
+    def _missing_text(self, missing: list[str], phase: PartPhase, timeout: float) -> str:
         silent = [name for name in missing if name not in self._states]
         if silent:
             return (

@@ -16,7 +16,7 @@ from ..loading import LoadError, load, load_text
 from ..running.memory import Memory
 from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
 from .texts import ValueTexts, tick_text, time_texts
-from .window import ENDED, RATE, STARTING, Shape, WindowContents, WindowReader, digest
+from .window import ENDED, RATE, STARTING, WindowContents, WindowLayout, WindowReader, digest
 
 STALLED_AFTER = 1.0
 """Seconds without a new tick after which it is said that the graph stands still."""
@@ -54,7 +54,7 @@ class LiveRun:
         try:
             graph = _load(about)
             layout, machine, paths = _bus_of(graph, about["digest"])
-            shape = Shape(**about["shape"])
+            shape = WindowLayout(**about["shape"])
         except BaseException:
             os.close(descriptor)
             raise

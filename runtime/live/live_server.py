@@ -121,7 +121,7 @@ class LiveServer(ThreadingHTTPServer):
     def __init__(
         self, run: WatchedRun, save: Path, opened: Opened = "diagram", port: int = 0
     ) -> None:
-        super().__init__((ADDRESS, port), _Handler)
+        super().__init__((ADDRESS, port), _RequestHandler)
         self.run, self.save, self.opened = run, save, opened
         self.token = secrets.token_urlsafe(24)
         self._tunables: tuple[CheckedGraph, Tunables] | None = None
@@ -139,7 +139,7 @@ class LiveServer(ThreadingHTTPServer):
         return self._tunables[1].rows(self.run.parameters())
 
 
-class _Handler(LoopbackHandler):
+class _RequestHandler(LoopbackHandler):
     content_policy = live_policy()
     timeout = REQUEST_TIMEOUT
     server: LiveServer

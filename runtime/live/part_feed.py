@@ -22,7 +22,7 @@ from ..running.run_result import RunResult
 from ..running.sinks import Note
 from ..running.ticker import Ticker
 from ..transports.transport import MessageCallback, Transport, window_key
-from .window import Shape, Window, WindowContents, WindowReader, digest, parse_window
+from .window import Window, WindowContents, WindowLayout, WindowReader, digest, parse_window
 
 RATE = 5.0
 """How often the window is sent [Hz]."""
@@ -124,7 +124,7 @@ class PartWindow:
 
     digest: str
     ended: str | None
-    shape: Shape
+    shape: WindowLayout
     look: WindowContents
 
 
@@ -143,7 +143,7 @@ def read_part(data: bytes) -> PartWindow | None:
         return None
     with suppress(Exception):  # whatever bytes do, a thread of the network goes on
         about = json.loads(data[_HEAD.size : _HEAD.size + length])
-        shape, copy = Shape(**about["shape"]), data[_HEAD.size + length :]
+        shape, copy = WindowLayout(**about["shape"]), data[_HEAD.size + length :]
         if len(copy) == shape.size:
             ended = about["ended"]
             text = None if ended is None else str(ended)

@@ -42,7 +42,7 @@ MOST_STAMPS = 1 << 20
 
 
 @dataclass(frozen=True)
-class Shape:
+class WindowLayout:
     """Where what lies in a window.
 
     Attributes:
@@ -89,7 +89,7 @@ class Window:
     """The side of the running graph; a sink for the executor."""
 
     def __init__(self) -> None:
-        self.shape: Shape | None = None
+        self.shape: WindowLayout | None = None
         self.descriptor = -1
         self._map: mmap.mmap | None = None
         self._next = self._tick = 0
@@ -110,7 +110,7 @@ class Window:
             room -= program.last_stamps[0].nbytes
             if room >= 0:
                 programs.append(program)
-        shape = Shape(
+        shape = WindowLayout(
             tuple(ticker.overruns_by_block),
             tuple(program.owners for program in programs),
             tuple(program.stamp_order for program in programs),
@@ -224,7 +224,7 @@ class WindowContents:
 class WindowReader:
     """Reads a window; it takes the descriptor over."""
 
-    def __init__(self, descriptor: int, shape: Shape) -> None:
+    def __init__(self, descriptor: int, shape: WindowLayout) -> None:
         self.shape = shape
         try:
             self._map = mmap.mmap(descriptor, shape.size, access=mmap.ACCESS_READ)
@@ -259,7 +259,7 @@ class WindowReader:
         return int.from_bytes(self._map[8 * SEQUENCE : 8 * SEQUENCE + 8], "little", signed=True)
 
 
-def parse_window(copy: bytes, shape: Shape) -> WindowContents:
+def parse_window(copy: bytes, shape: WindowLayout) -> WindowContents:
     """What the bytes of a window say, which must be as many as its shape has."""
     words = np.frombuffer(copy, np.int64, shape.text_start // 8)
     length = min(int(words[SAID]), TEXT)
@@ -277,7 +277,9 @@ def parse_window(copy: bytes, shape: Shape) -> WindowContents:
     )
 
 
-def _stamps(copy: bytes, shape: Shape, words: NDArray[np.int64], number: int) -> NDArray[np.int64]:
+def _stamps(
+    copy: bytes, shape: WindowLayout, words: NDArray[np.int64], number: int
+) -> NDArray[np.int64]:
     """The rows of a program that hold stamps, the oldest first, each in the order of time."""
     ticks, newest = words[shape.cursors + 2 * number :][:2].tolist()
     first, last = shape.stamps(number)

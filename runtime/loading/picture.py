@@ -7,7 +7,7 @@ from itertools import cycle
 from typing import Any
 
 from ..language.block import Block
-from ..language.delay import Delay
+from ..language.delay import WireDelay
 from ..language.quantities import Quantity
 from ..language.registry import block_name
 from ..language.stages import BlockSpec, CheckedGraph, Wire
@@ -17,7 +17,7 @@ _COLOURS = ("#cfe2f3", "#fce5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d9d2e9")
 """The colours of the machines in a diagram."""
 
 
-INSERTED = (Delay, ConstantSignal, Gather)
+INSERTED = (WireDelay, ConstantSignal, Gather)
 """The blocks that loading inserts and diagrams leave out."""
 
 
@@ -106,7 +106,7 @@ def _row(
 
 
 def _use(block_type: type[Block]) -> str:
-    for inserted, word in ((Delay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
+    for inserted, word in ((WireDelay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
         if issubclass(block_type, inserted):
             return word
     return block_name(block_type)
@@ -159,7 +159,7 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
 def _origin(specs: dict[str, BlockSpec], wire: Wire) -> str:
     """The output a wire comes from, seen through the delay block that loading has inserted."""
     source = specs[wire.source_block]
-    if wire.delay and issubclass(source.block_type, Delay):
+    if wire.delay and issubclass(source.block_type, WireDelay):
         return source.wires["u"].source
     return wire.source
 

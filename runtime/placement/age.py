@@ -18,7 +18,7 @@ from math import lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from ..language.delay import Delay
+from ..language.delay import WireDelay
 from ..language.schedule import runs_at
 from ..language.stages import BlockSpec, CheckedGraph
 from .placed import PlacementError
@@ -82,7 +82,7 @@ class _SampleTimes:
 
 def depth(spec: BlockSpec) -> int:
     """After how many runs of a Moore block its output depends on an input."""
-    if not issubclass(spec.block_type, Delay):
+    if not issubclass(spec.block_type, WireDelay):
         return 1
     entries = next(iter(spec.block_type.states["past"].signal.fields.values()))
     return int(entries.shape[0])

@@ -45,7 +45,7 @@ class LinkField:
 
 
 @dataclass(frozen=True)
-class Link:
+class MachineLink:
     """What one block sends to one other machine whenever it has run: one message.
 
     ``fields`` holds only the fields that some block over there reads, in the order of the source's
@@ -75,7 +75,7 @@ class PlacedGraph:
     """A graph and its links. The machines and the place of every block are in ``graph``."""
 
     graph: CheckedGraph
-    links: tuple[Link, ...]
+    links: tuple[MachineLink, ...]
 
     @property
     def machines(self) -> tuple[MachineSpec, ...]:
@@ -98,11 +98,11 @@ class PlacedGraph:
         """The blocks that a machine runs, in file order."""
         return tuple(spec for spec in self.graph.blocks if spec.machine == machine)
 
-    def sent_by(self, machine: str) -> tuple[Link, ...]:
+    def sent_by(self, machine: str) -> tuple[MachineLink, ...]:
         """The links on which a machine sends."""
         return tuple(link for link in self.links if link.sender == machine)
 
-    def received_by(self, machine: str) -> tuple[Link, ...]:
+    def received_by(self, machine: str) -> tuple[MachineLink, ...]:
         """The links on which a machine receives."""
         return tuple(link for link in self.links if link.receiver == machine)
 
@@ -137,7 +137,7 @@ def place(graph: CheckedGraph) -> PlacedGraph:
             if key not in read:
                 continue
             links.append(
-                Link(
+                MachineLink(
                     source.path,
                     source.machine,
                     machine.name,
@@ -283,7 +283,7 @@ def placement_json(placed: PlacedGraph) -> dict[str, Any]:
     }
 
 
-def _load(links: tuple[Link, ...]) -> str:
+def _load(links: tuple[MachineLink, ...]) -> str:
     """Links in total, as ``3 links, 240 kB/s``."""
     if not links:
         return "nothing"

@@ -1,6 +1,6 @@
 """The program beside a run that ends it where compiled code keeps the interpreter to itself.
 
-Such code (an endless loop in a solver, or in a function compiled by numba) lets no thread of Python
+Such code (an endless loop in a solver, or in a function compiled to machine code) lets no thread of Python
 run, so nothing in the process of the run can help. This process hears a beat from a thread there.
 When the beats stop, it asks with a signal for the stacks of all threads, which Python's fault
 handler writes without the interpreter, says which block hangs and where, and kills the process. It

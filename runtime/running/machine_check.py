@@ -152,7 +152,7 @@ def _read(path: Path) -> str:
 LIBRARIES = {
     "numpy": "numpy",
     "pydantic": "pydantic",
-    "numba": "numba",
+    "llvmlite": "llvmlite",
     "pin": "pinocchio",
     "mujoco-core": "mujoco",
     "casadi": "casadi",

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...plotting import Line, Panel, panels_svg, save_panels
+from ...plotting import Curve, Panel, panels_svg, save_panels
 from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
 from ..loading.reading.selection import Selection, read_selection, select
@@ -92,7 +92,7 @@ def plot_signals(
                 raise ValueError(f"{name}: {error}") from error
             flat = values.reshape(len(values), -1).astype(np.float64)
             lines = [
-                Line(labels[k] if shape else "", time[kept], flat[:, k]) for k in places.tolist()
+                Curve(labels[k] if shape else "", time[kept], flat[:, k]) for k in places.tolist()
             ]
             panels.append(Panel(f"{each} [{unit}]" if unit else each, lines))
     title = run.graph.name if run.graph is not None else ""

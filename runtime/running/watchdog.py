@@ -101,7 +101,7 @@ LOOKS = 8
 """How often the watchdog looks at the run in every limit of time."""
 TRIES = 3
 """How often it interrupts a call before the run is abandoned: a block may catch what it gets."""
-_SLOW_MODULES = ("numba.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
+_SLOW_MODULES = ("llvmlite.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
 """Modules in which a call may stay for long: a compiler, an import, a debugger."""
 
 

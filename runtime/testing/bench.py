@@ -36,7 +36,7 @@ class BlockBench(Generic[B]):
         wired: the inputs that are wired; all by default. The others read their defaults and cannot
             be set.
         plain: run the block's kernels as plain Python. By default they run as machine code, as in
-            a graph, which computes the same bits; where numba is not installed they always run as
+            a graph, which computes the same bits; where llvmlite is not installed they always run as
             plain Python.
 
     Raises:

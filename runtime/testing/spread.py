@@ -33,7 +33,7 @@ Interfere = Callable[[str, bytes], Iterable[bytes]]
 
 
 @dataclass(frozen=True)
-class SpreadRun:
+class SpreadResult:
     """What the parts of a run gave, by machine."""
 
     placed: PlacedGraph
@@ -74,7 +74,7 @@ def run_spread(
     timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
-) -> SpreadRun:
+) -> SpreadResult:
     """Run every part in a thread of its own.
 
     Args:
@@ -107,7 +107,7 @@ def run_parts_of(
     timeout: float = 5.0,
     wall_time: float = 60.0,
     **options: Any,
-) -> SpreadRun:
+) -> SpreadResult:
     """As ``run_spread``, with a hub and with sinks for each machine."""
     parts = {
         machine.name: BoundPart(
@@ -136,7 +136,7 @@ def run_parts_of(
         failures.append(f"not all parts ended within {wall_time:g} s")
     if failures:
         raise AloftError("; ".join(failures))
-    return SpreadRun(placed, {name: results[name] for name in parts}, parts)
+    return SpreadResult(placed, {name: results[name] for name in parts}, parts)
 
 
 Travel = Callable[[str, int], int | None]

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...plotting import COLOURS, FAINT, Line, Panel, Shade, draw_panels, image, new_figure, style
+from ...plotting import (
+    COLOURS,
+    FAINT,
+    Curve,
+    Panel,
+    Shade,
+    draw_panels,
+    image,
+    new_figure,
+    style,
+)
 from .trace import Trace, pitch_and_roll
 
 if TYPE_CHECKING:
@@ -82,22 +92,22 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
     x_range = (max(float(t[0]), start - BEFORE), min(float(t[-1]), end + AFTER))
     mass = robot.total_mass
 
-    def panel(title: str, *lines: Line) -> Panel:
+    def panel(title: str, *lines: Curve) -> Panel:
         return Panel(title, lines, "time [s]", x_range, shades)
 
     def both(title: str, name: str, axis: int, scale: float = 1.0) -> Panel:
         return panel(
             title,
-            Line("simulated", t, scale * trace.truth(name)[:, axis], MEASURED),
-            Line("plan", t, scale * trace.plan(name)[:, axis], PLANNED, True),
+            Curve("simulated", t, scale * trace.truth(name)[:, axis], MEASURED),
+            Curve("plan", t, scale * trace.plan(name)[:, axis], PLANNED, True),
         )
 
     momentum = [
-        Line(f"l_{axis}", t, mass * trace.truth("com_velocity")[:, k], COLOURS[k])
+        Curve(f"l_{axis}", t, mass * trace.truth("com_velocity")[:, k], COLOURS[k])
         for k, axis in enumerate(AXES)
     ]
     angular = [
-        Line(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], COLOURS[k])
+        Curve(f"k_{axis}", t, trace.truth("angular_momentum")[:, k], COLOURS[k])
         for k, axis in enumerate(AXES)
     ]
     pitch, _ = pitch_and_roll(trace.truth("base_orientation"))
@@ -109,11 +119,11 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
         if joint.name in ("left_hip_pitch", "left_knee", "left_ankle")
     ]
     velocity = [
-        Line(name, t, trace.truth("joint_velocity")[:, k], COLOURS[n])
+        Curve(name, t, trace.truth("joint_velocity")[:, k], COLOURS[n])
         for n, (k, name) in enumerate(left)
     ]
     torque = [
-        Line(name, t, trace.signals["robot.joints.torque"][:, k], COLOURS[n])
+        Curve(name, t, trace.signals["robot.joints.torque"][:, k], COLOURS[n])
         for n, (k, name) in enumerate(left)
     ]
     body = Column(
@@ -124,10 +134,10 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
             both("CoM forward position [cm]", "com", 0, 100.0),
             panel(
                 "torso pitch [deg], forward positive",
-                Line("simulated", t, np.degrees(pitch), MEASURED),
-                Line("plan", t, np.degrees(planned_pitch), PLANNED, True),
+                Curve("simulated", t, np.degrees(pitch), MEASURED),
+                Curve("plan", t, np.degrees(planned_pitch), PLANNED, True),
             ),
-            panel("contact force, vertical [N]", Line("", t, force, MEASURED)),
+            panel("contact force, vertical [N]", Curve("", t, force, MEASURED)),
         ],
     )
     legs = Column(
@@ -194,7 +204,7 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
 def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
     """``axis`` is 0 for a push along x, 1 along y."""
     other, letter, about = (1, "x", "y") if axis == 0 else (0, "y", "x")
-    rows: list[list[Line]] = [[], [], [], [], []]
+    rows: list[list[Curve]] = [[], [], [], [], []]
     shades: list[Shade] = []
     longest = 0.0
     for number, (arm, trace) in enumerate(traces.items()):
@@ -209,15 +219,15 @@ def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
         tilt = np.degrees(pitch if axis == 0 else roll)[ticks]
         placed = 100.0 * trace.signals["landing.feet.landing"][ticks]
         reached = 100.0 * (trace.feet - trace.truth("com")[:, None])[ticks]
-        rows[0].append(Line(arm, t, trace.truth("com_velocity")[ticks, axis], look))
-        rows[1].append(Line(arm, t, trace.truth("angular_momentum")[ticks, other], look))
+        rows[0].append(Curve(arm, t, trace.truth("com_velocity")[ticks, axis], look))
+        rows[1].append(Curve(arm, t, trace.truth("angular_momentum")[ticks, other], look))
         if axis == 0:
-            rows[2].append(Line(arm, t, placed[:, :, 0].mean(axis=1), look))
-            rows[3].append(Line(arm, t, reached[:, :, 0].mean(axis=1), look))
+            rows[2].append(Curve(arm, t, placed[:, :, 0].mean(axis=1), look))
+            rows[3].append(Curve(arm, t, reached[:, :, 0].mean(axis=1), look))
         else:
             rows[2] += _feet(arm, t, placed, look)
             rows[3] += _feet(arm, t, reached, look)
-        rows[4].append(Line(arm, t, tilt, look))
+        rows[4].append(Curve(arm, t, tilt, look))
     feet = "both feet's middle" if axis == 0 else "left solid, right dashed"
     lean = "pitch" if axis == 0 else "roll"
     titles = (
@@ -234,10 +244,10 @@ def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
     return Column(header, panels)
 
 
-def _feet(arm: str, t: Array, places: Array, look: str) -> list[Line]:
+def _feet(arm: str, t: Array, places: Array, look: str) -> list[Curve]:
     return [
-        Line(arm, t, places[:, LEFT, 1], look),
-        Line("", t, places[:, RIGHT, 1], look, dashed=True),
+        Curve(arm, t, places[:, LEFT, 1], look),
+        Curve("", t, places[:, RIGHT, 1], look, dashed=True),
     ]
 
 

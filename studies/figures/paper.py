@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...robots.description import RobotDescription
     from ...runtime.language.terrain import Terrain
     from ..expansion import Cell
-    from ..summary import Row
+    from ..summary import StudyRow
     from .trace import Trace
 
 
@@ -52,7 +52,7 @@ def push_task(direction: str, arm: str) -> str:
 
 
 def draw(
-    traces: Mapping[str, Trace], rows: Sequence[Row], seeds: Sequence[int], out: Path
+    traces: Mapping[str, Trace], rows: Sequence[StudyRow], seeds: Sequence[int], out: Path
 ) -> dict[str, Any]:
     """Draw all figures into the folder ``out``. A figure that cannot be drawn has the ``reason`` instead."""
     from PIL import Image
@@ -103,7 +103,7 @@ class NotThereError(NoRendererError):
     """Raised if there is no plan to draw."""
 
 
-def _row_json(row: Row, trace: Trace) -> dict[str, Any]:
+def _row_json(row: StudyRow, trace: Trace) -> dict[str, Any]:
     return {
         "n": row.n,
         "successes": row.successes,
@@ -126,7 +126,7 @@ def _push(traces: Mapping[str, Trace]) -> tuple[Picture, Mapping[str, Any]]:
 
 
 def _frames(
-    title: str, trace: Trace, row: Row, view: View, robot: RobotDescription
+    title: str, trace: Trace, row: StudyRow, view: View, robot: RobotDescription
 ) -> tuple[Picture, Mapping[str, Any]]:
     """The figure of a run as frames."""
     names = ("base_position", "base_orientation", "joint_position")

@@ -8,10 +8,10 @@ from aloft.benchmarks.agreement import (
     CONES,
     DAQP,
     OWN,
-    Found,
+    Agreement,
     Methods,
     Proposal,
-    State,
+    SolvedState,
     proved_minimum,
     random_states,
     recorded_states,
@@ -24,12 +24,12 @@ pytestmark = pytest.mark.filterwarnings("ignore:Converted matrix")
 
 
 @pytest.fixture(scope="module")
-def recorded() -> tuple[Methods, list[State]]:
+def recorded() -> tuple[Methods, list[SolvedState]]:
     block, states = recorded_states({"robot.seed": 7001, "wbc.friction": 0.1}, 0.9, every=15)
     return Methods(block), states
 
 
-def agreed(found: Found) -> None:
+def agreed(found: Agreement) -> None:
     assert not found.unsolved.keys() & {OWN, DAQP, CONES}
     for name in (OWN, DAQP, CONES):
         assert max(found.errors[name]) < 1e-6, name
@@ -37,14 +37,14 @@ def agreed(found: Found) -> None:
     assert not found.unproved
 
 
-def test_they_agree_on_recorded_states(recorded: tuple[Methods, list[State]]) -> None:
+def test_they_agree_on_recorded_states(recorded: tuple[Methods, list[SolvedState]]) -> None:
     methods, states = recorded
     assert len(states) > 20
     agreed(methods.compare(states))
 
 
 def test_they_agree_on_random_programs_and_say_which_have_no_solution(
-    recorded: tuple[Methods, list[State]],
+    recorded: tuple[Methods, list[SolvedState]],
 ) -> None:
     methods, states = recorded
     found = methods.compare(random_states(states, 150, 3))
@@ -57,13 +57,13 @@ def test_they_agree_on_random_programs_and_say_which_have_no_solution(
 
 
 def test_round_cones_are_stateless_and_plain_python_has_the_same_bytes(
-    recorded: tuple[Methods, list[State]],
+    recorded: tuple[Methods, list[SolvedState]],
 ) -> None:
     methods, states = recorded
     chosen = list(random_states(states, 12, 5))
     block, call = methods._block, methods._cones
 
-    def solve(state: State) -> bytes:
+    def solve(state: SolvedState) -> bytes:
         show_state(block, state)
         call.run()
         code = methods._solution.code.tobytes()
@@ -89,7 +89,7 @@ def test_round_cones_are_stateless_and_plain_python_has_the_same_bytes(
 
 
 def test_forces_lie_in_their_cones_and_reach_further_than_the_pyramid_inside(
-    recorded: tuple[Methods, list[State]],
+    recorded: tuple[Methods, list[SolvedState]],
 ) -> None:
     methods, states = recorded
     edges = 0
@@ -106,7 +106,7 @@ def test_forces_lie_in_their_cones_and_reach_further_than_the_pyramid_inside(
     assert edges > 20
 
 
-def test_a_wrong_proposal_is_not_proved(recorded: tuple[Methods, list[State]]) -> None:
+def test_a_wrong_proposal_is_not_proved(recorded: tuple[Methods, list[SolvedState]]) -> None:
     methods, states = recorded
     block = methods._block
     for state in random_states(states, 40, 11):

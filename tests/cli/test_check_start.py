@@ -22,7 +22,7 @@ except SystemExit as left:
     print(json.dumps({"code": left.code, "modules": sorted(sys.modules), "collections": len(found)}))
 """
 NOT_FOR_A_CHECK = (
-    "mujoco", "pinocchio", "numba", "llvmlite", "scipy", "qpsolvers", "daqp", "clarabel", "rerun", "pyarrow",
+    "mujoco", "pinocchio", "llvmlite", "scipy", "qpsolvers", "daqp", "clarabel", "rerun", "pyarrow",
     "matplotlib", "PIL", "zenoh", "rich", "multiprocessing", "asyncio", "numpy.random", "numpy.ma",
     "numpy.polynomial", "numpy.fft", "numpy.testing", "aloft.logs", "aloft.studies", "aloft.cli.run",
     "aloft.planner.solving", "aloft.planner.problem", "aloft.runtime.running", "aloft.runtime.links",

@@ -13,7 +13,7 @@ import pytest
 
 from aloft.planner.library import nearest_feasible
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.nearest_feasible import Axis
+from aloft.planner.library.nearest_feasible import SearchedParameter
 from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
@@ -79,7 +79,9 @@ def test_where_there_is_no_plan_the_nearest_task_is_found_and_kept(
         return replace(kept, task=task.resolved(find_robot("bruce")))
 
     monkeypatch.setattr(solve, "solve_jump", stand_in)
-    monkeypatch.setattr(nearest_feasible, "AXES", {"rise": Axis(0.15, 0.05, 100.0, "cm")})
+    monkeypatch.setattr(
+        nearest_feasible, "AXES", {"rise": SearchedParameter(0.15, 0.05, 100.0, "cm")}
+    )
     monkeypatch.setattr(library, "solve_task", stand_in)
     (folder / "high.yaml").write_text("rise: 40 cm\nfriction: 0.55\n")
     arguments = ("plan", "high.yaml", "--keep", "library", "--no-pictures")

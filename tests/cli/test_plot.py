@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.cli.plot import in_terminal
-from aloft.plotting import Line, Panel
+from aloft.plotting import Curve, Panel
 
 Call = Callable[..., Any]
 GRAPH = """
@@ -66,6 +66,6 @@ def test_mistakes(recording: Path, call: Call, arguments: list[str], message: st
 
 def test_constants_and_gaps_are_drawn() -> None:
     x = np.linspace(0.0, 1.0, 50)
-    text = in_terminal(Panel("flat", [Line("", x, np.where(x < 0.5, 3.0, np.nan))]))
+    text = in_terminal(Panel("flat", [Curve("", x, np.where(x < 0.5, 3.0, np.nan))]))
     assert text.splitlines()[1].split()[0] == "3.5"
     assert any(character > "\u2800" for character in text)

@@ -79,16 +79,18 @@ def test_scan(file: tuple[str, TwinServer]) -> None:
 
 def test_wrong_files(tmp_path: Path) -> None:
     done = run_here("robot", "status", str(tmp_path / "no.yaml"), code=2)
-    assert "the file cannot be read: No such file" in done.stdout + done.stderr
+    text = done.stdout + done.stderr
+    assert "no.yaml: No such file" in text and "1 problem" in text
     bad = tmp_path / "bad.yaml"
     bad.write_text(
         "robot: bruce\nbus: {port: x, speed: 3}\nboard: {port: y}\nmotors: {a: {id: 300}}\n"
     )
     done = run_here("robot", "status", str(bad), code=2)
     text = done.stdout + done.stderr
-    assert "bad.yaml:2:23: there is no setting 'bus.speed'" in text
-    assert "bad.yaml:4:18: motors.a.id cannot be 300: expected less than or equal to 252" in text
-    assert "2 faults in the hardware's file" in text
+    assert "bad.yaml:2:16: unknown-key: 'speed' is not a key of bus" in text
+    assert "expected   port, baudrate, period" in text
+    assert "bad.yaml:4:18: bad-value: motors.a.id cannot be 300" in text
+    assert "expected   at most 252" in text and "2 problems" in text
 
 
 def test_the_schema_is_one() -> None:

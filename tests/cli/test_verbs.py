@@ -20,7 +20,7 @@ Start = Callable[..., subprocess.Popen[str]]
 ROOT = Path(__file__).parent.parent.parent
 HEAVY = {
     "PIL", "asyncio", "casadi", "clarabel", "daqp", "llvmlite", "matplotlib", "multiprocessing", "mujoco",
-    "numba", "pinocchio", "pyarrow", "qpsolvers", "rerun", "rich", "scipy", "serial", "zenoh",
+    "pinocchio", "pyarrow", "qpsolvers", "rerun", "rich", "scipy", "serial", "zenoh",
 }  # fmt: skip
 """Libraries and parts of Python that no check needs; each takes 10 ms and more to import."""
 

@@ -26,7 +26,7 @@ def run_for(processor: str, folder: Path | None) -> str:
     """The hash of a jump whose kernels are for a processor, compiled into a folder."""
     changed = {}
     if folder is not None:
-        changed = {"XDG_CACHE_HOME": str(folder), "NUMBA_CPU_NAME": processor}
+        changed = {"XDG_CACHE_HOME": str(folder), "ALOFT_CPU_NAME": processor}
     name, run_hash = run_with(changed, "jump.yaml")
     assert (name == processor) == (folder is not None)
     return run_hash
@@ -34,7 +34,7 @@ def run_for(processor: str, folder: Path | None) -> str:
 
 def run_with(changed: dict[str, str], graph: str) -> list[str]:
     """The processor of the kernels and the hash of a run, with those variables set."""
-    ours = ("NUMBA", "OPENBLAS_CORETYPE")
+    ours = ("ALOFT_CPU", "OPENBLAS_CORETYPE")
     environment = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
     command = [sys.executable, "-c", RUN, str(ROOT / "graphs" / graph)]
     found = subprocess.run(

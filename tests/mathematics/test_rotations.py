@@ -133,11 +133,9 @@ def test_integrate_turns_on_the_right(q, rate, duration):
 
 
 @given(vectors, vectors)
-def test_cross_and_skew_agree_with_numpy(a, b):
-    out, k = np.empty(3), np.empty((3, 3))
-    rotations.cross(a, b, out)
+def test_skew_agrees_with_the_cross_product_of_numpy(a, b):
+    k = np.empty((3, 3))
     rotations.skew(a, k)
-    assert np.allclose(out, np.cross(a, b), atol=1e-15, rtol=0)
     assert np.allclose(k @ b, np.cross(a, b), atol=1e-15, rtol=0)
 
 

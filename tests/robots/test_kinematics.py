@@ -13,6 +13,7 @@ from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.robots.kinematics import (
     ball_feet,
+    foot_sides,
     from_base_outwards,
     link_poses,
     link_poses_in_base,
@@ -150,3 +151,8 @@ def test_the_pattern_of_the_feet_turns_with_the_robot():
     pattern = seen._pattern
     ahead = pattern[0] @ seen.points + np.cross([0, 0, -1.0], pattern[1] @ seen.points)
     assert np.arctan2(ahead[1], ahead[0]) == pytest.approx(angle, abs=1e-6)
+
+
+def test_feet_are_on_the_left_on_the_right_or_in_the_middle() -> None:
+    feet = np.array([[0.1, 0.2, 0.0], [0.0, -0.002, 0.0], [0.3, 0.0005, 0.0], [0.0, 0.002, -1.0]])
+    assert foot_sides(feet) == (1.0, -1.0, 0.0, 1.0)

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.logs.exporting.cdr import imu, joint_state, transforms
 from aloft.ros2.codec import Codec, MessageType, WrongMessageError, type_store
 from aloft.runtime.language.errors import BlockError
+
+from .cdr_writer import imu, joint_state, transforms
 
 pytest.importorskip("rosbags")
 NAMES = ["hip", "knee", "ankle"]

@@ -81,18 +81,15 @@ class Posture(FeedbackTask):
         params, joints = self.params, self.robot.joints
         weights, held = params.posture_weight, self.robot.held
         patterns = weights if isinstance(weights, dict) else {"*": weights}
-        self.gains.weight[:] = 0.0
-        self.gains.stiffness[:], self.gains.damping[:] = (
-            params.posture_stiffness,
-            params.posture_damping,
-        )
+        self.weight[:] = 0.0
+        self.stiffness[:], self.damping[:] = params.posture_stiffness, params.posture_damping
         for row, joint in enumerate(chosen_joints(self.robot, params)):
             name = joints[joint].name
             self.chosen.joint[row] = joint
             self.chosen.held[row], self.chosen.angle[row] = name in held, held.get(name, 0.0)
             for pattern, weight in patterns.items():
                 if fnmatchcase(name, pattern):
-                    self.gains.weight[row] = weight
+                    self.weight[row] = weight
 
     @kernel
     @staticmethod

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
+from ....files.validation import describe, path_text
 from ....mathematics.arrays import Array1D, Array2D
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.kernel import kernel
@@ -199,37 +200,38 @@ class FeedbackTask(Task):
         n = len(rows.desired)
         self.e = TaskError(np.zeros(n), np.zeros(n), np.zeros(n))
         self.j = TaskJacobian(rows.jacobian, np.zeros(n))
-        self.gains = RowGains(np.zeros(n), np.zeros(n), np.zeros(n))
+        self.weight, self.stiffness, self.damping = np.zeros((3, n))
         super().__init__(params, rows, ports, model, context)
 
     def prepare(self) -> None:
-        for name, values in self.gains._asdict().items():
-            values[:] = getattr(self.params, f"{self.gains_prefix}{name}")
+        for name in FeedbackGains.model_fields:
+            getattr(self, name)[:] = getattr(self.params, f"{self.gains_prefix}{name}")
 
     def calls(self) -> Sequence[KernelCall | PythonCall]:
-        feedback = KernelCall(feedback_rows, self.e, self.j.drift, self.gains, self.rows)
+        feedback = KernelCall(
+            feedback_rows,
+            self.e,
+            self.j.drift,
+            self.weight,
+            self.stiffness,
+            self.damping,
+            self.rows,
+        )
         return [*super().calls(), feedback]
 
 
-class RowGains(NamedTuple):
-    """Weight and gains by row, (n,) each."""
-
-    weight: Array1D
-    stiffness: Array1D
-    damping: Array1D
-
-
 @kernel
-def feedback_rows(e: TaskError, drift: Array1D, gains: RowGains, rows: TaskRows) -> None:
-    """The desired values and weights of a ``FeedbackTask``."""
-    for row in range(rows.desired.shape[0]):
-        rows.desired[row] = (
-            e.feedforward[row]
-            + gains.stiffness[row] * e.value[row]
-            + gains.damping[row] * e.rate[row]
-            - drift[row]
-        )
-        rows.weights[row] = gains.weight[row]
+def feedback_rows(
+    e: TaskError,
+    drift: Array1D,
+    weight: Array1D,
+    stiffness: Array1D,
+    damping: Array1D,
+    rows: TaskRows,
+) -> None:
+    """The desired values and weights of a ``FeedbackTask``; the gains are (n,) each."""
+    rows.desired[:] = e.feedforward + stiffness * e.value + damping * e.rate - drift
+    rows.weights[:] = weight
 
 
 # The list of tasks in a graph
@@ -281,11 +283,11 @@ class ChosenTask:
         try:
             return self.kind.Params.model_validate({**values, **self.entry.gains, **own})
         except ValidationError as error:
-            first = error.errors()[0]
-            gain = ".".join(map(str, first["loc"]))
+            first = error.errors(include_url=False)[0]
+            gain, reason = path_text(first["loc"]), describe(first, self.kind.Params)
             known = ", ".join(self.kind.Params.model_fields) or "none"
             raise TaskChoiceError(
-                f"task {self.entry.task}: gain {gain!r}: {first['msg']}; its gains are {known}"
+                f"task {self.entry.task}: gain {gain!r}: {reason}; its gains are {known}"
             ) from error
 
 

@@ -46,7 +46,7 @@ def resolve_composite_wires(
             port = draft.inputs.get(name)
             if not wire.parts or port is None:
                 continue
-            composer = _Composer(draft, name, wire, drafts, check, names, problems)
+            composer = _WireComposer(draft, name, wire, drafts, check, names, problems)
             made = composer.compose()
             if isinstance(made, BlockDraft):
                 found[made.flat.path] = made
@@ -65,7 +65,7 @@ def resolve_composite_wires(
 
 
 @dataclass
-class _Composer:
+class _WireComposer:
     reader: BlockDraft
     name: str
     wire: FlatWire

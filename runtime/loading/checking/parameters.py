@@ -21,7 +21,7 @@ from ....files.nodes import (
     text_of,
 )
 from ....files.problems import Code, LoadError, Position, Problems, listing, nearest
-from ....files.validation import find_mistakes, path_text, unit_of
+from ....files.validation import find_mistakes, path_text, unit_of, with_unit
 from ....robots.description import RobotDescription
 from ...language.block import Block
 from ...language.parameter_change import Adjustment
@@ -164,9 +164,7 @@ def _by_name(node: Node, robot: RobotDescription | None) -> str:
 def _with_text(expected: str, model: type[Parameters], name: str) -> str:
     """What is expected, with the parameter's unit and its line of text."""
     info = model.model_fields.get(name)
-    unit = unit_of(info) if info else ""
-    if unit and unit not in expected:
-        expected = f"{expected} in {unit}"
+    expected = with_unit(expected, unit_of(info))
     return f"{expected} ({info.description})" if info and info.description else expected
 
 

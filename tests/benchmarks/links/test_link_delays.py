@@ -42,7 +42,7 @@ def test_a_jump_with_jitter_and_loss() -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["links", "--jitter", "1 ms"], "--jitter and --loss are for link_delays, not for links"),
+        (["links", "--jitter", "1 ms"], "--jitter is for link_delays, not for links"),
         (["link_delays", "--jitter", "1 m"], "--jitter cannot be '1 m'; expected '1 ms', up to a"),
         (["link_delays", "--loss", "1.5"], "--loss cannot be '1.5'; expected '5 %', less than all"),
         (["link_delays", "--jitter", "-1 ms"], "--jitter cannot be '-1 ms'"),

@@ -54,7 +54,7 @@ def test_an_inline_task_finds_the_plan_of_the_same_task() -> None:
             "tasks/none.yaml",
             "there is no task 'tasks/none.yaml' beside the graph or among the shipped ones",
         ),
-        ({"rise": -1}, "rise: Input should be greater than 0, found -1"),
+        ({"rise": -1}, "rise: expected more than 0 m, found -1"),
         ({"rise": 0.1, "robot": "atlas"}, "is for atlas, but the graph's robot is bruce"),
     ],
 )

@@ -294,6 +294,20 @@ def test_a_command_may_be_as_old_as_the_stricter_limit(limit: float, age: float)
     assert BearRobot.oldest_command.fget(robot) == age  # type: ignore[attr-defined]
 
 
+def test_closing_ends_whatever_has_been_opened_and_the_drives_last() -> None:
+    ended: list[str] = []
+    parts = {
+        "_thread": SimpleNamespace(stop=lambda: ended.append("thread")),
+        "_watchdog": SimpleNamespace(close=lambda: ended.append("watchdog")),
+        "_switch": SimpleNamespace(close=lambda: ended.append("switch")),
+        "driver": SimpleNamespace(close=lambda: ended.append("driver")),
+    }
+    BearRobot.close(block(**parts))  # type: ignore[arg-type]
+    assert ended == ["thread", "watchdog", "switch", "driver"]
+    BearRobot.close(block(_switch=parts["_switch"]))  # type: ignore[arg-type]
+    assert ended[4:] == ["switch"]
+
+
 @pytest.mark.parametrize("phase", [DrivePhase.OFF, DrivePhase.DRIVING])
 def test_damping_waits_for_two_cycles_and_leaves_drives_that_are_off(phase: DrivePhase) -> None:
     waited: list[int] = []

@@ -121,10 +121,13 @@ def test_packets_carry_float32_and_the_twin_reads_them() -> None:
         ({"kind": "math:pi"}, "sensor foot_imu: math:pi is no MountedSensor"),
         ({"link": "right_fot"}, "bruce has no link 'right_fot'; did you mean right_foot?"),
         ({"noise": {"rate": {}}}, "noise of 'rate'; imu has the fields angular_velocity, "),
-        ({"noise": {"specific_force": {"noise": -1}}}, "noise.specific_force.noise: Input should"),
+        (
+            {"noise": {"specific_force": {"noise": -1}}},
+            "noise.specific_force.noise: expected at least 0",
+        ),
         (
             {"nose": {}},
-            "sensor foot_imu: nose: Extra inputs .*; imu has kind, link, position, noise",
+            "sensor foot_imu: nose: is not known; the nearest is noise; imu has kind, link, position, noise",
         ),
     ],
 )

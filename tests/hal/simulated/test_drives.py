@@ -98,7 +98,7 @@ def test_joint_feedback_is_the_papers_law() -> None:
 def test_a_step_of_the_motors_is_recorded_and_what_is_not_a_number_is_not_hidden() -> None:
     square = np.eye(3)
     motors = DriveTrain(square, square, square, np.full(3, 2.0), np.ones(3), np.full(3, 10.0))
-    scratch = MotorScratch(*np.zeros((5, 3)))
+    scratch = MotorScratch.allocate({"n_joints": 3})
     record = TickRecord.allocate({"n_joints": 3, "n_contacts": 1})
     record.torque_high[:] = record.speed_high[:] = -np.inf
     record.torque_low[:] = record.speed_low[:] = np.inf

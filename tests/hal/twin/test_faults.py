@@ -170,7 +170,7 @@ def test_a_fault_in_one_line() -> None:
         kind="dead", start=0.5, target="left_knee_motor"
     )
     assert read_fault("lost 1 * share=0.1") == InjectedFault(kind="lost", start=1.0, share=0.1)
-    with pytest.raises(AloftError, match="fault 'slow 1': kind: Input should be 'lost', 'trunc"):
+    with pytest.raises(AloftError, match="fault 'slow 1': kind: expected 'lost', 'trunc"):
         read_fault("slow 1")
     with pytest.raises(AloftError, match="'more' is one word too many"):
         read_fault("lost 1 * more")

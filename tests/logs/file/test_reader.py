@@ -142,6 +142,6 @@ def test_another_format_is_refused(
 
     header = replace(header_of(bound), format=number)
     RecordingWriter(tmp_path / "a.rrd", header).close()
-    match = f"has format {number}, this version of aloft reads 4; {what}"
+    match = f"has format {number}, this version of aloft reads 5; {what}"
     with pytest.raises(RecordingError, match=match):
         read(tmp_path / "a.rrd")

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.logs.recording.motion_recording import RecordedMotion, write_motion
+from aloft.logs.recording.motion_recording import MotionRecording, write_motion
 from aloft.robots.description import find_robot
 
 
-def motion(count: int = 5) -> RecordedMotion:
+def motion(count: int = 5) -> MotionRecording:
     robot = find_robot("bruce")
     height = np.linspace(0.3, 0.4, count)
-    return RecordedMotion(
+    return MotionRecording(
         robot,
         np.arange(count) * 0.01,
         np.column_stack([0 * height, 0 * height, height]),

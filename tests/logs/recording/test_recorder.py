@@ -16,7 +16,7 @@ import pytest
 
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.recorder_process import RecorderProcess, Task
+from aloft.logs.recording.recorder_process import RecorderProcess, RecorderTask
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec
@@ -131,10 +131,13 @@ def test_no_tick_allocates(tmp_path: Path) -> None:
 
 
 def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
+    recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, keyframe_period=0.1)
     result = run(graph(20_000), sinks=[recorder])
     assert recorder.dropped == 0 and result.warnings == ()
-    assert_whole(read(tmp_path / "a.rrd"), result)
+    recorded = read(tmp_path / "a.rrd")
+    assert_whole(recorded, result)
+    assert recorded.keyframes == tuple(range(50, 20_001, 50))
+    assert len(recorded.notes) == 4
 
 
 def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
@@ -345,7 +348,7 @@ def test_what_a_killed_recorder_left_is_kept(tmp_path: Path) -> None:
 def test_a_slow_simulation_writes_larger_batches(filled: int, waited: float, due: bool) -> None:
     # half a second of the graph's time at 500 Hz is 250 ticks
     recorder = object.__new__(RecorderProcess)
-    recorder._task = Task(0, 0, "", 0, 0, flush_period=0.5, sync_period=5.0)
+    recorder._task = RecorderTask(0, 0, "", 0, 0, flush_period=0.5, sync_period=5.0)
     recorder._header = SimpleNamespace(base_rate=500.0)  # type: ignore[assignment]
     recorder._filled = filled
     assert recorder._flush_is_due(waited) is due

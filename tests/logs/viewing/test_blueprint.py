@@ -48,11 +48,14 @@ def test_a_users_tabs_come_first(header: Header, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("tabs: [{name: A, plots: [robot.truth.con]}]", "1:26: tabs.0.plots.0: no signal"),
-        ("tabs:\n  - name: A\n", "2:5: tabs.0.plots: Field required"),
-        ("tab: []\n", "1:6: tab: Extra inputs are not permitted"),
-        ("follow: [\n", "this is no YAML"),
-        ("follow: true\nfollow: false\n", "2:1: key 'follow' stands twice"),
+        (
+            "tabs: [{name: A, plots: [robot.truth.con]}]",
+            "1:26: unknown-source: no signal 'robot.truth.con'",
+        ),
+        ("tabs:\n  - name: A\n", "2:5: missing-key: tabs[0].plots is missing"),
+        ("tab: []\n", "1:1: unknown-key: 'tab' is not a key of a layout"),
+        ("follow: [\n", "close the bracket or quote"),
+        ("follow: true\nfollow: false\n", "2:1: duplicate-key: key 'follow' is there twice"),
         ("tabs: [{name: A, plots: [dynamics.terms.mass_matrix]}]", "too many elements"),
         (
             "tabs: [{name: A, plots: [{signals: [robot.truth.com, robot.joints.torque]}]}]",

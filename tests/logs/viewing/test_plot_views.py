@@ -11,7 +11,7 @@ from aloft import load
 from aloft.logs.file.format import Header, RecordedField
 from aloft.logs.file.header import header_of
 from aloft.logs.viewing.contacts import force_arrows
-from aloft.logs.viewing.plot_views import MOST_IN_TAB, Shown, block_tabs, legend, main_plots
+from aloft.logs.viewing.plot_views import MOST_IN_TAB, ShownRun, block_tabs, legend, main_plots
 from aloft.logs.viewing.scene_ports import scene_ports
 from aloft.logs.viewing.signal_names import element_names, unit_of
 from aloft.logs.viewing.state_lanes import all_lanes
@@ -77,18 +77,20 @@ def names_of(views: list[Any]) -> list[str]:
 
 
 def test_the_first_plots_are_few_and_say_what_is_what(header: Header) -> None:
-    views = main_plots(header, scene_ports(header), (Shown(),))
+    views = main_plots(header, scene_ports(header), (ShownRun(),))
     names = names_of(views)
     assert len(views) <= MOST_IN_TAB
     assert "centre of mass [m], world · dark: planned" in names
     assert "vertical force on each foot [N]" in names
     assert not any("contact_force" in name for name in names)
-    two = main_plots(header, scene_ports(header), (Shown("first/", "a"), Shown("second/", "b")))
+    two = main_plots(
+        header, scene_ports(header), (ShownRun("first/", "a"), ShownRun("second/", "b"))
+    )
     assert all("bold a, thin b" in name for name in names_of(two))
 
 
 def test_a_block_with_many_signals_has_pages(header: Header) -> None:
-    tabs = {tab.name: tab for tab in block_tabs(header, (Shown(),))}
+    tabs = {tab.name: tab for tab in block_tabs(header, (ShownRun(),))}
     pages = tabs["dynamics"].contents
     assert len(pages) > 1
     for tab in tabs.values():

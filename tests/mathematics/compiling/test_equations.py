@@ -76,6 +76,12 @@ def turn(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 
 @kernel
+def turned_sum(R: Array2D, a: Array1D, b: Array1D, out: Array1D) -> None:
+    """A cross product within a product with a matrix, and the other way round."""
+    out[:] = R.T @ (a + cross(b, R @ a)) - cross(a, b) @ R
+
+
+@kernel
 def fields(body: Body, kind: int, out: Array1D) -> float:
     """Scalar fields, elements, members of an enumeration, and a dot product."""
     body.mass = 2.0 * body.mass + body.v @ out
@@ -146,6 +152,13 @@ def test_a_cross_product_may_write_its_operand() -> None:
     make = arrays((3,), (3,), (3,))
     a, b, out = make()
     np.testing.assert_allclose(both(turn, make), a + np.cross(b, out), rtol=1e-14)
+
+
+def test_a_matrix_may_turn_a_cross_product() -> None:
+    make = arrays((3, 3), (3,), (3,), (3,))
+    R, a, b, _ = make()
+    expected = R.T @ (a + np.cross(b, R @ a)) - np.cross(a, b) @ R
+    np.testing.assert_allclose(both(turned_sum, make), expected, rtol=1e-13, atol=1e-13)
 
 
 def test_scalar_fields_read_and_are_assigned_like_numbers() -> None:

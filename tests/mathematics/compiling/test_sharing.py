@@ -29,7 +29,7 @@ def jobs():
         (linear_algebra.solve_upper, (MATRIX, FLOATS)),
         (landing_law.keep_within, (FLOATS,) * 3),
     )
-    return [sharing.Job(f"{k:032d}", *job) for k, job in enumerate(found)]
+    return [sharing.CompileJob(f"{k:032d}", *job) for k, job in enumerate(found)]
 
 
 def test_few_kernels_are_not_worth_another_process():

@@ -16,7 +16,7 @@ from aloft.planner.drawing.picture import phases_of, plan_panels, write_picture
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
-from aloft.plotting import Line, Panel
+from aloft.plotting import Curve, Panel
 from aloft.robots.description import find_robot
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -53,7 +53,7 @@ def panel(e: Evidence, title: str) -> Panel:
     return next(panel for panel in plan_panels(e) if panel.title.startswith(title))
 
 
-def limits(of: Panel) -> list[Line]:
+def limits(of: Panel) -> list[Curve]:
     return [line for line in of.lines if line.limit]
 
 

@@ -33,7 +33,7 @@ def message(tmp_path: Path, text: str, read: Any = read_task) -> str:
         ("rise: 0.1\nhigth: 3\n", "odd.yaml:2:1: higth: is no parameter of a task; the nearest is weights"),
         ("rise: 0.1\nknots: {squat: 8, fligt: 9}",
          "odd.yaml:2:19: knots.fligt: is no parameter of a task; the nearest is flight"),
-        ("rise: 0.1\nfriction: -1", "odd.yaml:2:11: friction: Input should be greater than 0, found -1"),
+        ("rise: 0.1\nfriction: -1", "odd.yaml:2:11: friction: expected more than 0, found -1"),
         ("take_off_speed: 1\nrise: 0.1",
          "odd.yaml:2:1: give rise or take_off_speed, not both: one follows from the other"),
         ("name: x\n", "odd.yaml:1:1: say how high the jump is: rise, take_off_speed or flight_time"),

@@ -83,8 +83,8 @@ def test_a_sequence_of_contacts() -> None:
     ("values", "words"),
     [
         ({"jumps": [{"rise": 0.1}, {}]}, "jump 2: say how high the jump is"),
-        ({"rise": 0.1, "jumps": []}, "jumps: Tuple should have at least 1 item"),
-        ({"rise": 0.1, "repeat": 0}, "repeat: Input should be greater than or equal to 1"),
+        ({"rise": 0.1, "jumps": []}, "jumps: expected at least 1 value"),
+        ({"rise": 0.1, "repeat": 0}, "repeat: expected at least 1"),
         (
             {"rise": 0.05, "jumps": [{"landing_height": 0.3}]},
             "jump 1: a rise of 0.05 m cannot reach ground that is 0.3 m higher",

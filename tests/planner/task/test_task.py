@@ -31,10 +31,10 @@ def test_about_sixty_intervals() -> None:
             "a rise of 0.05 m cannot reach ground that is 0.3 m higher; ask for",
         ),
         ({"rise": "3 kg"}, "rise: expected a number in m, found '3 kg'"),
-        ({"rise": -0.1}, "rise: Input should be greater than 0, found -0.1"),
+        ({"rise": -0.1}, "rise: expected more than 0 m, found -0.1"),
         ({"rise": 0.1, "hight": 2}, "hight: is no parameter of a task; the nearest is "),
-        ({"rise": 0.1, "knots": {"flight": 1}}, "knots.flight: Input should be greater than"),
-        ({"rise": 0.1, "formulation": "fast"}, "formulation: Input should be 'full', 'paper'"),
+        ({"rise": 0.1, "knots": {"flight": 1}}, "knots.flight: expected at least"),
+        ({"rise": 0.1, "formulation": "fast"}, "formulation: expected 'full', 'paper'"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_key(values: dict[str, object], words: str) -> None:

@@ -165,7 +165,11 @@ YAMLS = [
         "    expected   'floating', 'planar' or 'fixed'",
         "    found      'hanging'",
     ]),
-    ("- elbow", ["x.yaml:1:1: this adds nothing to a robot", "    expected   a mapping"]),
+    ("- elbow", [
+        "x.yaml:1:1: a robot's description is a mapping",
+        "    expected   keys such as name, base, links, joints",
+        "    found      a list",
+    ]),
 ]  # fmt: skip
 
 

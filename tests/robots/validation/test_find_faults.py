@@ -57,15 +57,15 @@ def test_joints_are_listed_branch_by_branch(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("data", [None, 3, [1, 2], "robot"])
 def test_a_file_that_holds_no_mapping(data: object, tmp_path: Path) -> None:
-    assert "this describes no robot" in str(report(data, tmp_path))
+    assert "a robot's description is a mapping" in str(report(data, tmp_path))
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"name: a\nname: b\n", "hopper.yaml:2:1: key 'name' stands twice"),
-        (b"name: [a\n", "hopper.yaml:2:1: this is no YAML: "),
-        (b"name: gr\xf6sse\n", "hopper.yaml: this is no text in UTF-8"),
+        (b"name: a\nname: b\n", "hopper.yaml:2:1: key 'name' is there twice"),
+        (b"name: [a\n", "hopper.yaml:1:9: this is no YAML: "),
+        (b"name: gr\xf6sse\n", "hopper.yaml is not UTF-8 text"),
     ],
 )
 def test_a_file_that_is_no_yaml(content: bytes, message: str, tmp_path: Path) -> None:

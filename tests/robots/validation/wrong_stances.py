@@ -189,7 +189,7 @@ WRONG_STANCES: list[tuple[list[Change], list[str]]] = [
         [(("sensors",), {"imu": "maybe"})],
         [
             "hopper.yaml:90:8: sensors: imu cannot be 'maybe'",
-            "    expected   true or false, unable to interpret input",
+            "    expected   true or false",
             "    found      'maybe'",
         ],
     ),

@@ -3,8 +3,8 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, diagram
-from aloft.runtime.drawing.layout import Drawing, draw
+from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, diagram
+from aloft.runtime.drawing.layout import Drawing, draw, size_of
 from aloft.runtime.loading import load
 
 from .test_layers import NAMES, diagram_of
@@ -68,3 +68,14 @@ def test_the_jump_fits_on_one_screen() -> None:
 
 def test_a_graph_of_another_robot_is_drawn() -> None:
     drawn(diagram(load("aloft:robots/go2_jump")))
+
+
+def test_a_block_is_as_wide_as_its_longest_names_and_as_high_as_its_ports() -> None:
+    long = "a_port_with_quite_a_long_name_of_its_own"
+    narrow = size_of(DiagramNode("b", "b", inputs=["u"], outputs=["y"]))
+    for ports in (["y", long], [long, "y"]):
+        left = size_of(DiagramNode("b", "b", inputs=ports, outputs=["y"]))
+        right = size_of(DiagramNode("b", "b", inputs=["u"], outputs=ports))
+        assert left == right and left[0] > narrow[0] + 100.0 and left[1] > narrow[1]
+    both = size_of(DiagramNode("b", "b", inputs=["u", long], outputs=[long]))
+    assert both[0] > 1.8 * (left[0] - 20.0)

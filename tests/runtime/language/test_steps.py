@@ -9,9 +9,11 @@ import pytest
 from aloft.mathematics.kernel import kernel
 from aloft.runtime.language.block import Block, Clock, Input, Output, State
 from aloft.runtime.language.errors import BlockError, DeclarationError
+from aloft.runtime.language.kernel_block import KernelBlock
 from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.signals import Field, Signal
+from aloft.runtime.language.steps import call_of
 from aloft.runtime.running.chain import can_be_chained
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.testing.bench import BlockBench
@@ -113,6 +115,45 @@ def test_a_live_change_prepares_again() -> None:
         bench.step(2)
     assert changed.get("y").value.tobytes() == fresh.get("y").value.tobytes()
     assert changed.block.events == fresh.block.events == [2]
+
+
+class OffsetAndScaleParams(Parameters):
+    """The parameters of ``OffsetAndScale``."""
+
+    offset: float = live_parameter(1.0, text="is added")
+    scale: float = live_parameter(2.0, text="is multiplied by")
+
+
+@kernel
+def write_offset(y: Count, params: OffsetAndScaleParams) -> None:
+    """The first of two calls of a block."""
+    y.runs = int(params.offset)
+
+
+@kernel
+def multiply_by_scale(y: Count, params: OffsetAndScaleParams) -> None:
+    """The second one, with a parameter of its own."""
+    y.runs = y.runs * int(params.scale)
+
+
+class OffsetAndScale(KernelBlock):
+    """Two kernels in turn, each with its own parameters."""
+
+    Params = OffsetAndScaleParams
+    y = Output(Count, text="offset times scale")
+
+    def setup(self) -> None:
+        self.kernel_calls = (call_of(self, write_offset), call_of(self, multiply_by_scale))
+
+
+def test_a_live_change_reaches_all_calls_of_a_block() -> None:
+    bench = BlockBench(OffsetAndScale)
+    bench.step()
+    assert bench.get("y").runs == 2
+    new = bench.block.params.model_copy(update={"offset": 5.0, "scale": 3.0})
+    LiveParameters({"block": bench.block}).apply(Adjustment({"block": new}, ()), 1)
+    bench.step()
+    assert bench.get("y").runs == 15
 
 
 def test_steps_in_plain_python_have_the_same_signature() -> None:

@@ -10,7 +10,7 @@ from aloft.runtime.language.stages import WATCHDOG, CheckedGraph, LinkPolicy, Li
 from aloft.runtime.links.command_watch import CommandWatch
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import LoadError, load
-from aloft.runtime.placement.placed import Link, command_sources, place, silence_limit
+from aloft.runtime.placement.placed import MachineLink, command_sources, place, silence_limit
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
 
@@ -34,7 +34,7 @@ def watched(
 
 @dataclass
 class Box:
-    link: Link
+    link: MachineLink
     received_at: int = 0
 
 

@@ -15,7 +15,7 @@ from aloft.runtime.links.message import (
     spans_of,
 )
 from aloft.runtime.loading import load
-from aloft.runtime.placement.placed import Link, PlacedGraph, place
+from aloft.runtime.placement.placed import MachineLink, PlacedGraph, place
 from aloft.runtime.running.memory import Memory
 
 RUN = b"12345678"
@@ -31,7 +31,9 @@ def layout(placed: PlacedGraph) -> Layout:
     return Memory(placed.graph.blocks, placed.graph.robot).bus.layout
 
 
-def ends(link: Link, layout: Layout) -> tuple[MessageWriter, MessageReader, np.ndarray, np.ndarray]:
+def ends(
+    link: MachineLink, layout: Layout
+) -> tuple[MessageWriter, MessageReader, np.ndarray, np.ndarray]:
     here = np.random.default_rng(1).integers(0, 256, layout.size).astype(np.uint8)
     there = np.zeros(layout.size, np.uint8)
     reader = MessageReader(link, layout, there.data)

@@ -18,7 +18,7 @@ from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import EndpointError
 from aloft.runtime.live.part_feed import packed
 from aloft.runtime.live.spread_run import SpreadRun
-from aloft.runtime.live.window import Shape
+from aloft.runtime.live.window import WindowLayout
 from aloft.runtime.loading import load
 from aloft.runtime.placement.placed import PlacedGraph, place
 
@@ -141,7 +141,7 @@ def test_a_run_that_is_started_anew_at_other_endpoints_is_followed(graph: Path) 
 
 
 def test_a_part_of_another_graph_or_version_is_not_guessed_at(run: SpreadRun) -> None:
-    shape = Shape((), (), (), 8)
+    shape = WindowLayout((), (), (), 8)
     about = {"digest": "another", "ended": None, "shape": asdict(shape)}
     run._parts["near"].take(packed(about, bytes(shape.size)))
     run._parts["far"].take(b"noise")

@@ -7,7 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from aloft.runtime.live.window import ENDED, RATE, RUNNING, SEQUENCE, Shape, Window, WindowReader
+from aloft.runtime.live.window import (
+    ENDED,
+    RATE,
+    RUNNING,
+    SEQUENCE,
+    Window,
+    WindowLayout,
+    WindowReader,
+)
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph, nameless_memory
@@ -62,7 +70,7 @@ def test_before_a_round_of_stamps_is_full_only_those_there_are_read(graph_file: 
 
 
 def test_a_writer_that_stopped_within_a_tick_is_noticed() -> None:
-    shape = Shape(("a",), (), (), 64)
+    shape = WindowLayout(("a",), (), (), 64)
     descriptor = nameless_memory(shape.size, "half")
     os.pwrite(descriptor, (7).to_bytes(8, "little"), 8 * SEQUENCE)
     reader = WindowReader(descriptor, shape)

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from aloft.plotting import DPI, Line, Panel
+from aloft.plotting import DPI, Curve, Panel
 from aloft.studies.figures.curves import COLUMN_WIDTH, Column, draw_columns
 
 X = np.linspace(0.0, 1.0, 101)
 
 
 def picture(*columns: str, colour: str = "#ff0000") -> np.ndarray:
-    panel = Panel("height [cm]", [Line("a", X, X**2, colour)])
+    panel = Panel("height [cm]", [Curve("a", X, X**2, colour)])
     found = [Column(header, [panel, panel]) for header in columns]
     return np.asarray(draw_columns("title", ["a note"], found))
 

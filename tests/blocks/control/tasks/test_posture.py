@@ -13,7 +13,7 @@ from aloft.blocks.control.tasks.posture import (
     PostureParameters,
     chosen_joints,
 )
-from aloft.blocks.control.tasks.task import RowGains, TaskError, TaskJacobian, feedback_rows
+from aloft.blocks.control.tasks.task import TaskError, TaskJacobian, feedback_rows
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.mathematics.whole_body_qp import TaskRows
 from aloft.robots.description import find_robot
@@ -34,11 +34,11 @@ def test_a_joint_accelerates_by_feedforward_and_feedback_and_a_held_one_stands_s
     terms, joints = SimpleNamespace(velocity=velocity), SimpleNamespace(position=position)
     chosen = PostureJoints(index, np.array([False, False, True]), np.array([7.0, 8.0, 0.4]))
     rows = TaskRows(np.ones((3, 11)), np.zeros(3), np.zeros(3))
-    gains = RowGains(np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
+    gains = (np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
     e, j = TaskError(*np.zeros((3, 3))), TaskJacobian(rows.jacobian, np.zeros(3))
     Posture.error(terms, joints, target, chosen, e)
     Posture.jacobian(joints, chosen, j)
-    feedback_rows(e, j.drift, gains, rows)
+    feedback_rows(e, j.drift, *gains, rows)
     assert (rows.jacobian == np.eye(11)[[7, 10, 8]]).all()
     angle, rate, feedforward = reference[:, index]
     angle[2], rate[2], feedforward[2] = 0.4, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Writes messages in CDR (OMG's Common Data Representation), the encoding of ROS 2's messages.
+"""A second writer of ROS 2's messages in CDR (OMG's Common Data Representation), to compare with.
 
 Little endian, version 1 of the standard (``PLAIN_CDR``): four bytes that say so, then the values one
 after another, each at a multiple of its own size counted from after these four bytes.
@@ -103,60 +103,3 @@ def transforms(
     for child, translation, quaternion in listed:
         message.header(instant, parent).text(child).float64s(translation).float64s(quaternion)
     return message.bytes()
-
-
-def wrench(instant: int, frame: str, force: Sequence[float], torque: Sequence[float]) -> bytes:
-    """A ``geometry_msgs/WrenchStamped`` [N, N m]."""
-    return CdrWriter().header(instant, frame).float64s(force).float64s(torque).bytes()
-
-
-_TIME = "int32 sec\nuint32 nanosec\n"
-_HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_VECTOR = "float64 x\nfloat64 y\nfloat64 z\n"
-_QUATERNION = "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"
-_PARTS = {
-    "std_msgs/Header": _HEADER,
-    "builtin_interfaces/Time": _TIME,
-    "geometry_msgs/Vector3": _VECTOR,
-    "geometry_msgs/Quaternion": _QUATERNION,
-    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
-    "geometry_msgs/Transform": (
-        "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
-    ),
-    "geometry_msgs/TransformStamped": (
-        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
-    ),
-}
-
-
-def _definition(text: str, *parts: str) -> str:
-    """A definition with those that it uses, in the form that MCAP asks for (``ros2msg``)."""
-    line = "=" * 80
-    return "".join([text, *(f"{line}\nMSG: {part}\n{_PARTS[part]}" for part in parts)])
-
-
-_STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
-DEFINITIONS = {
-    "sensor_msgs/msg/JointState": _definition(
-        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
-        "float64[] effort\n",
-        *_STAMPED,
-    ),
-    "sensor_msgs/msg/Imu": _definition(
-        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n"
-        "float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n"
-        "float64[9] angular_velocity_covariance\ngeometry_msgs/Vector3 linear_acceleration\n"
-        "float64[9] linear_acceleration_covariance\n",
-        *_STAMPED, "geometry_msgs/Quaternion", "geometry_msgs/Vector3",
-    ),
-    "tf2_msgs/msg/TFMessage": _definition(
-        "geometry_msgs/TransformStamped[] transforms\n",
-        "geometry_msgs/TransformStamped", *_STAMPED, "geometry_msgs/Transform",
-        "geometry_msgs/Vector3", "geometry_msgs/Quaternion",
-    ),
-    "geometry_msgs/msg/WrenchStamped": _definition(
-        "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n",
-        *_STAMPED, "geometry_msgs/Wrench", "geometry_msgs/Vector3",
-    ),
-}  # fmt: skip
-"""The messages' definitions, as they stand in ROS 2, by the names of their types."""
