@@ -186,7 +186,7 @@ def follow_foot(
         angles,
     )
     target.reachable[number] = inside
-    velocity[:] = min(max(feet.velocity[number], -_FASTEST), _FASTEST)  # type: ignore[assignment]  # of each element
+    velocity[:] = min(max(feet.velocity[number], -_FASTEST), _FASTEST)  # of each element
     if settings.slides and not inside:
         slid, slid_share = slide(
             leg.hip, leg.plane, leg.signs, leg.limits, position, rotation, softness, yaw,
