@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
@@ -26,6 +25,7 @@ from ...robots.kinematics import (
     link_poses,
 )
 from ...robots.welding import welded
+from ..models.euler_angles import euler_angles
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
 from ..task.sequence import edge_of
@@ -306,10 +306,9 @@ class Evidence:
 
         The angles are those of R = Ry Rx Rz, followed through full turns.
         """
-        matrix = matrices_of_quaternions(self.replay.samples.position[:, 3:7])
-        pitch = np.unwrap(np.arctan2(matrix[:, 0, 2], matrix[:, 2, 2]))
-        yaw = np.unwrap(np.arctan2(matrix[:, 1, 0], matrix[:, 1, 1]))
-        return float(pitch[-1] - pitch[0]), float(yaw[-1] - yaw[0])
+        angles = euler_angles(self.replay.samples.position[:, 3:7])
+        _, pitch, yaw = angles[-1] - angles[0]
+        return float(pitch), float(yaw)
 
     def moment(self, sample: int) -> str:
         """The time of a sample as text."""

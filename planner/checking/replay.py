@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ..models.euler_angles import coordinates_of, pose_of, twist_of
 from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
-from ..models.midpoint import midpoint_residuals
 from ..task.plan import PlannedJump
 
 Row = tuple[float, int, Array, Array]
@@ -52,7 +52,7 @@ class Replay:
         samples: knots, middles of stance intervals and every step of the flight.
         defect: per interval how far exact dynamics from one knot misses the next: base position
             [m], rotation [rad], linear [m/s] and angular velocity [rad/s] of the base, (N-1, 4).
-        gap, wrench: what is left over of the planner's own equations, see ``midpoint``, (N-1,).
+        gap, wrench: what is left over of the planner's own equations, see ``midpoint_residuals``, (N-1,).
         flight_errors: base position [m] and rotation [rad] missed at every touchdown.
         com, com_velocity, angular_momentum: at the knots, by Pinocchio.
         soles, heading: sole centres [m] (N, n_feet, 3) and unwrapped headings [rad] (N, n_feet).
@@ -210,3 +210,30 @@ def _sample(plan: PlannedJump, dynamics: ExactDynamics, between: list[Row]) -> R
         np.array(points),
         np.array(velocities),
     )
+
+
+def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
+    """What is left over of the planner's own equations in every interval, zero at impacts.
+
+    The ``full`` formulation holds accelerations of its coordinates constant over an interval and
+    fulfils the equations of motion in its middle. Pinocchio evaluates these anew.
+
+    Returns the gap, how far the coordinates miss those of a constant acceleration [m or rad],
+    (N-1,), and the base's six equations of motion in the middle [N or N m], (N-1,).
+    """
+    places, rates = coordinates_of(plan.position, plan.velocity)
+    count = len(plan.time) - 1
+    gap, wrench = np.zeros(count), np.zeros(count)
+    for k in range(count):
+        h = float(plan.time[k + 1] - plan.time[k])
+        if h <= 0.0:
+            continue
+        bend = (rates[k + 1] - rates[k]) / h
+        gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max()
+        middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend
+        velocity, acceleration = twist_of(middle, rates[k] + 0.5 * h * bend, bend)
+        left = dynamics.base_residual(
+            pose_of(middle), velocity, acceleration, plan.contact_force[k]
+        )
+        wrench[k] = np.abs(left).max()
+    return gap, wrench

@@ -24,8 +24,8 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
+from ..models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
 from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion
-from ..models.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 

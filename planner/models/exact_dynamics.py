@@ -352,6 +352,22 @@ class ExactDynamics:
         self.pin.framesForwardKinematics(self.model, self.data, q)
         return self.sole_places(), self.foot_angles()[0]
 
+    def footholds(self) -> Array:
+        """What stays in place while the contact points stand on the ground, in the state that was
+        evaluated last, (n_contacts, 3); see ``SymbolicModel.footholds``."""
+        places = self._contact_places()
+        for ball in self.balls:
+            turn = self.data.oMf[self.contact_frames[ball.point]].rotation
+            about_y, about_x = math.atan2(turn[0, 2], turn[2, 2]), math.asin(-turn[1, 2])
+            places[ball.point] -= ball.radius * np.array([about_y, -about_x, 0.0])
+        return places
+
+    def joint_places(self, q: Array) -> Array:
+        """Where the joints are in the world [m], (n_joints, 3)."""
+        self.pin.forwardKinematics(self.model, self.data, q)
+        places = [self.data.oMi[joint].translation for joint in range(2, self.model.njoints)]
+        return np.array(places).reshape(-1, 3)
+
     def sole_places(self) -> Array:
         """The sole centres in the state that was evaluated last."""
         places, points = self._places(self.sole_frames), self._contact_places()
@@ -394,11 +410,19 @@ class ExactDynamics:
     def _places(self, frames: tuple[int, ...]) -> Array:
         return np.array([self.data.oMf[frame].translation for frame in frames]).reshape(-1, 3)
 
+    def com(self, q: Array) -> Array:
+        """The centre of mass [m], (3,)."""
+        return np.array(self.pin.centerOfMass(self.model, self.data, q))
+
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
         """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
         momentum = self.pin.computeCentroidalMomentum(self.model, self.data, q, v)
         com = np.array(self.data.com[0])
         return com, np.array(momentum.linear) / self.mass, np.array(momentum.angular)
+
+    def joint_side(self, position: Array, velocity: Array) -> JointSide:
+        """What joint angles and velocities, both (n, n_joints), say; see ``JointSide``."""
+        return joint_side(self.pin, self.model, self.data, position, velocity)
 
     def mass_matrix(self, q: Array) -> Array:
         """The joint-space inertia with all rotors."""
@@ -487,7 +511,7 @@ class ExactDynamics:
         if force.any():
             bases, twists = self._push(q[:7], v[:6], moved, force, h)
         else:
-            side = joint_side(self.pin, self.model, self.data, moved[0], moved[1])
+            side = self.joint_side(moved[0], moved[1])
             bases, twists = coast(q[:7], v[:6], side, h)
         places = np.hstack([bases, moved[0][2::2]])
         speeds = np.hstack([twists, moved[1][2::2]])

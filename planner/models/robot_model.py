@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet
 from ...robots.welding import HeldLoad, welded
 from ..task.files import PlanError
 from ..task.task import JumpTask
+from .euler_angles import ORDER, angles_of, pose_of, rotation
+from .exact_dynamics import ExactDynamics
 from .symbolic_model import SymbolicModel
 from .symmetry import Pair, mirrored_pairs, symmetrised, symmetrised_angles
 
@@ -53,7 +53,7 @@ def _model(text: str, symmetric: bool) -> tuple[SymbolicModel, StanceFinder]:
     robot, loads = part.robot, [load for load in part.loads if _matters(load)]
     pairs = mirrored_pairs(robot) if symmetric else None
     model = SymbolicModel(symmetrised(robot, pairs) if pairs else robot, loads)
-    return model, StanceFinder(model, pairs or ())
+    return model, StanceFinder(model.robot, pairs or ())
 
 
 def _matters(load: HeldLoad) -> bool:
@@ -85,30 +85,10 @@ UNEVEN = 5e-4
 class StanceFinder:
     """Places a robot on the ground for given joint angles, with all contact points on it."""
 
-    def __init__(self, model: SymbolicModel, pairs: Sequence[Pair] = ()) -> None:
+    def __init__(self, robot: RobotDescription, pairs: Sequence[Pair] = ()) -> None:
         """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
-        import casadi as ca
-
-        self.model, self.pairs = model, tuple(pairs)
-        q = ca.SX.sym("q", model.size)
-        frames = model.frames(q)
-        robot = model.robot
-        soles = [model.point(frames, foot.link, foot.sole) for foot in robot.feet]
-        for ball in ball_feet(robot):
-            soles[ball.foot] = model.contact_points(q)[ball.point]
-        self._points: Any = ca.Function(
-            "stance",
-            [q],
-            [
-                ca.horzcat(*model.contact_points(q)),
-                model.com(q),
-                sum(soles) / len(soles),
-                ca.horzcat(*model.footholds(q)),
-            ],
-        )
-
-    def _evaluate(self, q: Array) -> list[Array]:
-        return [np.array(value) for value in self._points.call([q])]
+        self.robot, self.pairs = robot, tuple(pairs)
+        self._body = ExactDynamics(robot)
 
     def place(
         self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
@@ -121,40 +101,38 @@ class StanceFinder:
             PlanError: the contact points do not lie in one plane with these joint angles, or there
                 are none.
         """
-        q = np.zeros(self.model.size)
-        q[6:] = symmetrised_angles(self.pairs, joints)
-        points = self._evaluate(q)[0]
-        if not points.size:
-            raise PlanError(
-                f"{self.model.robot.name} has no contact points to stand on", family="stance"
-            )
+        q = np.concatenate([np.zeros(6), symmetrised_angles(self.pairs, joints)])
+        if not self.robot.contacts:
+            raise PlanError(f"{self.robot.name} has no contact points to stand on", family="stance")
         for _ in range(LEANS):
             # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
-            turn = _rotation(q[3:5])
-            q[3:5] = _lean(turn.T @ _normal(self._evaluate(q)[0].T))
+            points = self._body.points(pose_of(q))
+            q[3:5] = _lean(_base_rotation(q).T @ _normal(points))
         if heading:  # turn the leaning pose as a whole: R = Rz(heading) R(lean)
-            q[3:6] = _turned(q[3:5], heading)
-        points, _, soles, _ = self._evaluate(q)
-        q[:2] = np.array(at[:2]) - soles.ravel()[:2]
-        q[2] = at[2] - points[2].mean()
-        points, com, _, footholds = self._evaluate(q)
-        heights = points[2] - at[2]
+            q[3:6] = _turned(q, heading)
+        points = self._body.points(pose_of(q))
+        q[:2] = at[:2] - self._body.sole_places().mean(axis=0)[:2]
+        q[2] = at[2] - points[:, 2].mean()
+        points = self._body.points(pose_of(q))
+        footholds = self._body.footholds()
+        com = self._body.com(pose_of(q))
+        heights = points[:, 2] - at[2]
         if np.abs(heights).max() > UNEVEN:
-            names = [contact.name for contact in self.model.robot.contacts]
+            names = [contact.name for contact in self.robot.contacts]
             found = ", ".join(f"{n} {1e3 * h:+.1f} mm" for n, h in zip(names, heights, strict=True))
             raise PlanError(
                 "with these joint angles the contact points do not lie in one plane: they are off "
                 f"the best one by {found}; choose angles that put all feet on the ground",
                 family="stance",
             )
-        return Stance(q, points.T.copy(), com.ravel(), heading, footholds.T.copy())
+        return Stance(q, points, com, heading, footholds)
 
 
 def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
                ) -> tuple[Stance, ...]:  # fmt: skip
     """The task's stances: at the start, between jumps, with the same joint angles, and at the end.
     The pitch includes the body's turns so far."""
-    names = [joint.name for joint in finder.model.robot.joints]
+    names = [joint.name for joint in finder.robot.joints]
     first, last = task.start_joints(robot), task.end_joints(robot)
     places = task.places()
     found = []
@@ -186,23 +164,13 @@ def _lean(normal: Array) -> Array:
     return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
 
 
-def _rotation(lean: Array) -> Array:
-    """From body to world of a base with that pitch and roll."""
-    (cp, cr), (sp, sr) = np.cos(lean), np.sin(lean)
-    pitch = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
-    roll = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    return np.asarray(pitch @ roll)
+def _base_rotation(q: Array) -> Array:
+    """From body to world of a base with the pitch, roll and yaw of the coordinates ``q``."""
+    return rotation(q[3:6][ORDER])
 
 
-def _turned(lean: Array, heading: float) -> Array:
-    """Pitch, roll, yaw of a base with that pitch and roll that is then turned by ``heading``."""
-    ch, sh = np.cos(heading), np.sin(heading)
-    turn = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
-    rotation = turn @ _rotation(lean)
-    return np.array(
-        [
-            np.arctan2(rotation[0, 2], rotation[2, 2]),
-            np.arcsin(-rotation[1, 2]),
-            np.arctan2(rotation[1, 0], rotation[1, 1]),
-        ]
-    )
+def _turned(q: Array, heading: float) -> Array:
+    """Pitch, roll, yaw of a base that leans as in the coordinates ``q`` and is then turned by
+    ``heading``."""
+    turn = rotation(np.array([0.0, 0.0, heading]))
+    return angles_of(turn @ _base_rotation(q))[ORDER]

@@ -16,8 +16,12 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...robots.description import RobotDescription
+from .euler_angles import pose_of
+from .exact_dynamics import ExactDynamics
 from .robot_model import Stance
-from .symbolic_model import SymbolicModel
+from .symbolic_model import SymbolicModel, centroidal_momentum
+from .symmetry import limbs_of
 
 STRAIGHT = 0.985
 """The longest leg by the length of a straight one, where the knee is singular."""
@@ -53,23 +57,15 @@ class RigidBody:
         return min(self.standing, self.longest - SPARE - 0.5 * BLEND * abs(speed))
 
 
-def composite_inertia(model: SymbolicModel, start: Stance) -> RigidBody:
+def composite_inertia(robot: RobotDescription, start: Stance) -> RigidBody:
     """The body of a robot in its stance."""
-    import casadi as ca
-
-    robot = model.robot
-    q, v = ca.SX.sym("q", model.size), ca.SX.sym("v", model.size)
-    _, angular = model.momentum(q, v)
-    upright = start.coordinates.copy()
-    upright[:6] = 0.0
-    matrix = ca.Function("A", [q], [ca.jacobian(angular, v), model.com(q)], {"cse": True})
-    columns, com = (np.array(x) for x in matrix(upright))
-    # Rates of pitch, roll and yaw of the upright torso turn it about y, x and z.
-    inertia = columns[:, [4, 3, 5]]
+    joints = start.coordinates[6:]
+    side = ExactDynamics(robot).joint_side(joints[None], np.zeros((1, len(joints))))
+    com, inertia = side.com[0], side.inertia[0]
     hips, straight, lengths, knees = [], [], [], []
-    for leg in model.limbs:
+    for leg in limbs_of(robot)[0]:
         origins = [np.array(robot.joints[index].origin) for index in leg]
-        hips.append(origins[0] - com.ravel())
+        hips.append(origins[0] - com)
         bones = [float(np.linalg.norm(o)) for o in origins[1:] if np.any(o)]
         straight.append(sum(bones))
         bent = next(index for index in leg[1:] if np.any(robot.joints[index].origin))
@@ -85,15 +81,10 @@ def composite_inertia(model: SymbolicModel, start: Stance) -> RigidBody:
     )  # fmt: skip
 
 
-def ankles(model: SymbolicModel, stance: Stance) -> Array:
+def ankles(robot: RobotDescription, stance: Stance) -> Array:
     """Where the ankles are in a stance, in the order of the limbs (n_legs, 3)."""
-    import casadi as ca
-
-    q = ca.SX.sym("q", model.size)
-    frames = model.frames(q)
-    last = [model.robot.joints[leg[-1]].child for leg in model.limbs]
-    places = ca.Function("ankles", [q], [ca.horzcat(*(frames[link][1] for link in last))])
-    return np.array(places(stance.coordinates)).T
+    places = ExactDynamics(robot).joint_places(pose_of(stance.coordinates))
+    return places[[leg[-1] for leg in limbs_of(robot)[0]]]
 
 
 QUATERNION = slice(3, 7)
@@ -163,5 +154,5 @@ def angular_momentum(model: SymbolicModel, q: Any, v: Any) -> Any:
     # momentum about the centre of mass does not depend on the base's linear velocity.
     spin = v[3:6]
     rates = ca.vertcat(ca.DM.zeros(3), spin[1], spin[0], spin[2], v[6:])
-    _, angular = model.momentum(_at_rest_base(model, q), rates)
-    return ca.mtimes(quaternion_rotation(q[QUATERNION]), angular)
+    seen = centroidal_momentum(model, _at_rest_base(model, q), rates)
+    return ca.mtimes(quaternion_rotation(q[QUATERNION]), seen.angular)

@@ -137,7 +137,7 @@ class SymbolicModel:
         import casadi as ca
 
         frames = {self.robot.base: (base_rotation(q[3:6]), q[0:3])}
-        for index in self._joints(limbs):
+        for index in self.joints_of(limbs):
             joint = self.robot.joints[index]
             rotation, origin = frames[joint.parent]
             turn = joint_rotation(joint, q[6 + index])
@@ -199,48 +199,6 @@ class SymbolicModel:
             total = total + link.mass * self.point(frames, link.name, link.com)
         return total / self.robot.total_mass
 
-    def momentum(self, q: Expression, v: Expression) -> tuple[Expression, Expression]:
-        """Linear momentum and angular momentum about the centre of mass, in the world.
-
-        The rotors' own spin is left out, as in the centroidal momentum matrix.
-        """
-        import casadi as ca
-
-        spins, speeds = self._velocities(q, v)
-        frames = self.frames(q)
-        com = self.com(q)
-        linear: Any = ca.SX.zeros(3)
-        angular: Any = ca.SX.zeros(3)
-        for link in self.robot.links:
-            rotation, _ = frames[link.name]
-            spin, speed = spins[link.name], speeds[link.name]
-            centre = ca.DM(list(link.com))
-            motion = link.mass * ca.mtimes(rotation, speed + ca.cross(spin, centre))
-            linear = linear + motion
-            lever = self.point(frames, link.name, link.com) - com
-            turn = ca.mtimes(rotation, ca.mtimes(ca.DM(inertia_tensor(link)), spin))
-            angular = angular + turn + ca.cross(lever, motion)
-        return linear, angular
-
-    def _velocities(self, q: Expression, v: Expression) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Angular velocity and velocity of the origin of every link, in its own frame."""
-        import casadi as ca
-
-        base = self.robot.base
-        rotation = base_rotation(q[3:6])
-        spins = {base: base_angular_velocity(q[3:6], v[3:6])}
-        speeds = {base: ca.mtimes(rotation.T, v[0:3])}
-        for index, joint in enumerate(self.robot.joints):
-            back = joint_rotation(joint, q[6 + index]).T
-            origin = joint_origin(joint, q[6 + index])
-            carried = speeds[joint.parent] + ca.cross(spins[joint.parent], origin)
-            rate = ca.DM(list(joint.axis)) * v[6 + index]
-            slides = joint.kind == "slide"
-            speeds[joint.child] = ca.mtimes(back, carried + rate if slides else carried)
-            spin = ca.mtimes(back, spins[joint.parent])
-            spins[joint.child] = spin if slides else spin + rate
-        return spins, speeds
-
     # Dynamics
 
     def inverse_dynamics(
@@ -268,7 +226,7 @@ class SymbolicModel:
         needed = {base: self._body_wrench(robot.link(base), spins[base], turns[base], pulls[base])}
         link_of = {foot.name: foot.link for foot in robot.feet}
         backs: dict[str, Any] = {}
-        joints = self._joints(limbs)
+        joints = self.joints_of(limbs)
         for index in joints:
             joint = robot.joints[index]
             parent, child = joint.parent, joint.child
@@ -351,7 +309,7 @@ class SymbolicModel:
         turns = {base: base_angular_acceleration(q[3:6], v[3:6], a[3:6])}
         lifted = ca.vertcat(a[0], a[1], a[2] + GRAVITY)
         pulls = {base: ca.mtimes(base_rotation(q[3:6]).T, lifted)}
-        for index in self._joints(limbs):
+        for index in self.joints_of(limbs):
             joint = self.robot.joints[index]
             parent, child = joint.parent, joint.child
             back = joint_rotation(joint, q[6 + index]).T
@@ -397,7 +355,7 @@ class SymbolicModel:
             outer = self.robot.joints[self._joint_of[outer]].parent
         return False
 
-    def _joints(self, limbs: Sequence[int] | None) -> list[int]:
+    def joints_of(self, limbs: Sequence[int] | None) -> list[int]:
         """Joint indices of those limbs, or of all of them, parents first."""
         chosen = range(len(self.limbs)) if limbs is None else limbs
         return sorted(index for limb in chosen for index in self.limbs[limb])
@@ -422,9 +380,13 @@ class _SubtreeMomentum(NamedTuple):
 
 
 def centroidal_momentum(
-    model: SymbolicModel, q: Expression, v: Expression, limbs: Sequence[int], share: int = 1
+    model: SymbolicModel,
+    q: Expression,
+    v: Expression,
+    limbs: Sequence[int] | None = None,
+    share: int = 1,
 ) -> Centroidal:
-    """The momentum of the base and ``share`` times those limbs.
+    """The momentum of the base and ``share`` times those limbs, or all.
 
     Of a mirrored motion, with half of the limbs and a share of two, only what is not zero by
     symmetry means anything: x and z of the centre and of the linear momentum, y of the angular.
@@ -436,7 +398,7 @@ def centroidal_momentum(
     rotation = base_rotation(q[3:6])
     spins = {base: base_angular_velocity(q[3:6], v[3:6])}
     speeds = {base: ca.mtimes(rotation.T, v[0:3])}
-    chosen = sorted(index for limb in limbs for index in model.limbs[limb])
+    chosen = model.joints_of(limbs)
     for index in chosen:
         joint = robot.joints[index]
         back = joint_rotation(joint, q[6 + index]).T

@@ -39,7 +39,7 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models import simple_models as centroidal
-from ..models.midpoint import pose_of
+from ..models.euler_angles import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.task import JumpTask

@@ -146,7 +146,7 @@ class RigidBodyProblemBuilder:
         self.flight = self.grid.flight
         self.last = len(self.grid.phases)
         self.forces = 3 * len(model.robot.contacts)
-        self.ankles = {id(stance): ankles(model, stance) for stance in (start, end)}
+        self.ankles = {id(stance): ankles(model.robot, stance) for stance in (start, end)}
 
     def build(self) -> SimpleProblem:
         """The problem with its bounds, parameters and guess."""

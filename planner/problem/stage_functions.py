@@ -293,10 +293,9 @@ def piece_expressions(
         errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
         rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
     elif name == "take_off":
-        whole, speeds = coordinates.expand(q), coordinates.expand(v)
-        linear, angular = model.momentum(whole, speeds)
-        rise = linear[2] / model.robot.total_mass
-        rows = [model.com(whole)[2] + rise * rise / (2.0 * GRAVITY), rise, angular]
+        whole = centroidal_momentum(model, coordinates.expand(q), coordinates.expand(v))
+        rise = whole.linear[2] / model.robot.total_mass
+        rows = [whole.com[2] + rise * rise / (2.0 * GRAVITY), rise, whole.angular]
     elif name == "air":
         z, rows = [q], _air_rows(model, coordinates, q)
     else:

@@ -11,15 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..models.midpoint import (
-    angular_motion,
-    cross,
-    euler_angles,
-    euler_rates,
-    pose_of,
-    rotation,
-)
-from ..models.symbolic_model import SymbolicModel
+from ..models.euler_angles import coordinates_of, pose_of, twist_of
+from ..models.symbolic_model import SymbolicModel, centroidal_momentum
 from ..task.plan import PlannedJump
 from .problem import FullProblem
 
@@ -77,10 +70,6 @@ def means_over(instants: Array, time: Array, values: Array) -> Array:
     return np.asarray(np.diff(sums, axis=0) / np.diff(instants)[:, None])
 
 
-ORDER = [1, 0, 2]
-"""The planner's pitch, roll, yaw from angles about x, y, z, and back."""
-
-
 def knot_times(problem: FullProblem, values: Array) -> Array:
     """The time of every knot [s]."""
     n, assembly = problem.coordinates.size, problem.assembly
@@ -123,8 +112,8 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
     torque[impacts] = 0.0
-    generalised = [twist(*row) for row in zip(q, v, bend, strict=True)]
-    halfway = [twist(*row) for row in zip(middle, moving, bend, strict=True)]
+    generalised = [twist_of(*row) for row in zip(q, v, bend, strict=True)]
+    halfway = [twist_of(*row) for row in zip(middle, moving, bend, strict=True)]
     flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
     return {
         "time": times,
@@ -188,13 +177,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
     """
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
-    angles = euler_angles(plan.position[:, 3:7])
-    q = np.hstack([plan.position[:, :3], angles[:, ORDER], plan.position[:, 7:]])
-    v = np.zeros_like(q)
-    for k, row in enumerate(plan.velocity):
-        v[k, :3] = rotation(angles[k]) @ row[:3]
-        v[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
-        v[k, 6:] = row[6:]
+    q, v = coordinates_of(plan.position, plan.velocity)
     steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
     instants = plan.time
     if not _same_grid(problem, plan):
@@ -232,16 +215,6 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
     return values
 
 
-def twist(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
-    """Generalised velocity and its derivative with the base's part in the body frame."""
-    angles = q[3:6][ORDER]
-    spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])
-    back = rotation(angles).T
-    speed = back @ v[:3]
-    pull = back @ bend[:3] - cross(spin, speed)
-    return np.concatenate([speed, spin, v[6:]]), np.concatenate([pull, turn, bend[6:]])
-
-
 _evaluators: dict[int, tuple[SymbolicModel, Any, Any]] = {}
 
 
@@ -256,10 +229,10 @@ def _evaluate(
     if id(model) not in _evaluators:
         place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
         pushes = ca.SX.sym("F", force.shape[1])
-        linear, angular = model.momentum(place, rate)
+        whole = centroidal_momentum(model, place, rate)
         named = {c.name: pushes[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
         torque = model.inverse_dynamics(place, rate, bend_of, named)[2]
-        of_state = ca.vertcat(model.com(place), linear / model.robot.total_mass, angular)
+        of_state = ca.vertcat(whole.com, whole.linear / model.robot.total_mass, whole.angular)
         _evaluators[id(model)] = (
             model,
             ca.Function("states", [place, rate], [of_state], {"cse": True}),

@@ -19,14 +19,13 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ..models.midpoint import pose_of
+from ..models.euler_angles import pose_of, twist_of
 from ..models.robot_model import Stance, model_of, stances_of
 from ..models.simple_models import BLEND, RigidBody, composite_inertia
 from ..models.symbolic_model import SymbolicModel
 from ..problem import rigid_body_problem as stages
 from ..problem.program import SimpleProblem
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
-from ..problem.unpacking import twist
 from ..task.files import PlanError
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
@@ -198,7 +197,7 @@ def rigid_body_problem(
     )
     pieces = load_functions(functions, model, compiled=compiled, progress=progress)
     stances = stances_of(task, robot, finder)
-    body = composite_inertia(model, stances[0])
+    body = composite_inertia(model.robot, stances[0])
     builder = RigidBodyProblemBuilder(task, model, pieces, body, stances[0], stances[-1])
     return builder.build(), body
 
@@ -249,7 +248,7 @@ def unpack(
             force[k] = problem.control(values, k)[6 : 6 + force.shape[1]]
     force[-1] = force[-2]
     position = np.array([pose_of(row) for row in q])
-    velocity = np.array([twist(*row)[0] for row in zip(q, v, np.zeros_like(v), strict=True)])
+    velocity = np.array([twist_of(*row)[0] for row in zip(q, v, np.zeros_like(v), strict=True)])
     turn = matrices_of_quaternions(position[:, 3:7])
     momentum = np.array([
         r @ body.inertia @ w for r, w in zip(turn, velocity[:, 3:6], strict=True)

@@ -9,8 +9,8 @@ from tests.robots.limbed_robots import CORNERS, HUMANOID, STANDING, TWO, legged_
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.models.coordinates import full_coordinates
+from aloft.planner.models.euler_angles import pose_of
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.midpoint import pose_of
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.problem.structure import ContactRows
 from aloft.planner.solving.solve import solve_jump

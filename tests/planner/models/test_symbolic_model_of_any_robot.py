@@ -14,10 +14,10 @@ from tests.planner.models.test_symbolic_model import evaluate, to_pinocchio
 from tests.robots.example_robots import INSTALLED
 from tests.robots.limbed_robots import LIGHT_QUADRUPED, humanoid, quadruped, slider
 
+from aloft.planner.models.euler_angles import rotation
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.midpoint import rotation
 from aloft.planner.models.robot_model import model_of
-from aloft.planner.models.symbolic_model import SymbolicModel
+from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.robots.welding import welded
 
@@ -50,7 +50,7 @@ def test_dynamics_agree(name: str) -> None:
     symbols = [ca.SX.sym(x, model.size) for x in "qva"] + [ca.SX.sym("f", 3 * contacts)]
     named = {c.name: symbols[3][3 * i : 3 * i + 3] for i, c in enumerate(robot.contacts)}
     base, limbs, torque = model.inverse_dynamics(*symbols[:3], named)
-    linear, angular = model.momentum(*symbols[:2])
+    _, linear, angular = centroidal_momentum(model, *symbols[:2])
     found = evaluate(
         [ca.vertcat(base + sum(limbs.values()), torque), linear, angular, model.com(symbols[0])],
         symbols, [q, v, a, forces.ravel()],

@@ -1,6 +1,6 @@
 """Evaluates the equations of ``paper`` and ``srbm`` with Pinocchio from a plan's arrays.
 
-Like ``midpoint`` for ``full``, this module uses nothing of the planner's own model or solver. A plan may
+Like ``midpoint_residuals`` for ``full``, this module uses nothing of the planner's own model or solver. A plan may
 fulfil all of these equations although the robot would move differently, which the other tests find.
 """
 
@@ -12,8 +12,8 @@ from aloft.blocks.signals import Phase
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.rotations import matrices_of_quaternions, multiply
+from aloft.planner.models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.midpoint import angular_motion, euler_angles, euler_rates, rotation
 from aloft.planner.task.plan import PlannedJump
 from aloft.robots.description import RobotDescription
 
@@ -119,7 +119,7 @@ def unmodelled_momentum(plan: PlannedJump, dynamics: ExactDynamics) -> Array:
 
 
 def own_residuals(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]:
-    """The residuals of the plan's formulation; none for ``full``, whose residuals ``midpoint`` computes."""
+    """The residuals of the plan's formulation; none for ``full``, which ``midpoint_residuals`` has."""
     evaluate = RESIDUALS.get(plan.task.formulation)
     return evaluate(plan, ExactDynamics(plan.task.equipped(robot))) if evaluate else {}
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from aloft.planner.checking.validity import check_plan
+from aloft.planner.models.euler_angles import pose_of, twist_of
 from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.midpoint import pose_of
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
 from aloft.planner.problem.stage_functions import (
@@ -19,7 +19,6 @@ from aloft.planner.problem.stage_functions import (
     flight_interval,
     make_coordinates,
 )
-from aloft.planner.problem.unpacking import twist
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
@@ -78,7 +77,7 @@ def test_the_momentum_is_pinocchios() -> None:
     for seed in range(3):
         place, rate = state(seed)
         com, linear, angular = (np.array(x).ravel() for x in function(place, rate))
-        exact = dynamics.centroidal(pose_of(place), twist(place, rate, np.zeros(16))[0])
+        exact = dynamics.centroidal(pose_of(place), twist_of(place, rate, np.zeros(16))[0])
         np.testing.assert_allclose(com, exact[0], atol=1e-12)
         np.testing.assert_allclose(linear, ROBOT.total_mass * exact[1], atol=1e-11)
         np.testing.assert_allclose(angular, exact[2], atol=1e-11)
@@ -119,7 +118,7 @@ def error(seed: int, intervals: int, duration: float = 0.1) -> tuple[float, floa
         ends.append(now)
     dynamics = ExactDynamics(ROBOT)
     first, last = (
-        dynamics.centroidal(pose_of(x[:16]), twist(x[:16], x[16:], np.zeros(16))[0])
+        dynamics.centroidal(pose_of(x[:16]), twist_of(x[:16], x[16:], np.zeros(16))[0])
         for x in (np.concatenate([place, rate]), ends[0])
     )
     fallen = first[0] + duration * first[1] - 0.5 * 9.81 * duration**2 * np.array([0.0, 0.0, 1.0])

@@ -21,7 +21,7 @@ def coordinates(name: str) -> Coordinates:
 
 
 def rows_of(name: str) -> ContactRows:
-    stance = StanceFinder(SymbolicModel(ROBOT)).place(ROBOT.standing_position)
+    stance = StanceFinder(ROBOT).place(ROBOT.standing_position)
     return ContactRows(ROBOT, coordinates(name), stance.points)
 
 

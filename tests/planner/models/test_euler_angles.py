@@ -1,20 +1,13 @@
-"""The planner's discretisation evaluated anew: Euler angles, and a motion that fulfils it."""
-
-from dataclasses import replace
+"""The Euler angles by which plans are solved: their rates, and back from the robot's motion."""
 
 import numpy as np
-import pytest
 
-from aloft.planner.models.exact_dynamics import ExactDynamics
-from aloft.planner.models.midpoint import (
+from aloft.planner.models.euler_angles import (
     angular_motion,
     euler_angles,
     euler_rates,
-    midpoint_residuals,
     rotation,
 )
-from aloft.planner.task.plan import PlannedJump
-from aloft.robots.description import find_robot
 
 
 def test_angles_rates_and_accelerations_against_differences_of_the_rotation() -> None:
@@ -42,16 +35,3 @@ def test_angles_follow_a_somersault() -> None:
     found = euler_angles(quaternions)
     np.testing.assert_allclose(found[:, 1], pitch, atol=1e-12)
     np.testing.assert_allclose(found[:, [0, 2]], 0.0, atol=1e-12)
-
-
-def test_the_residual_is_what_a_force_is_wrong_by(by_hand: PlannedJump) -> None:
-    dynamics = ExactDynamics(find_robot("bruce"))
-    gap, wrench = midpoint_residuals(by_hand, dynamics)
-    # Made with small steps of another method: fulfilled to second order only.
-    assert gap.max() < 1e-2
-    assert np.median(wrench) < 1.0
-    pushed = by_hand.contact_force.copy()
-    pushed[20, 0] += [0.0, 7.0, 0.0]
-    _, changed = midpoint_residuals(replace(by_hand, contact_force=pushed), dynamics)
-    assert changed[20] - wrench[20] == pytest.approx(7.0, abs=0.5)
-    np.testing.assert_array_equal(np.delete(changed, 20), np.delete(wrench, 20))
