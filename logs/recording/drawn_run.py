@@ -9,8 +9,6 @@ runs begin at the same time.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,7 @@ from typing import Any
 from ..file.format import DIAGRAM
 from ..file.reader import RecordedRun
 from ..viewing.blueprint import recording_blueprint
-from ..viewing.drawing import OTHER_RUN, Colors
+from ..viewing.drawing import OTHER_RUN, Colors, opened_stream
 from ..viewing.plot_views import ShownRun
 from .run_stream import RunStream
 
@@ -51,23 +49,6 @@ def write_view(
             write_picture(stream, diagram)
         draw(RunStream(stream, run.header), run)
     return path
-
-
-@contextmanager
-def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
-    """A Rerun stream into a file, which is there at the end. Raises ``OSError``."""
-    import rerun as rr
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
-    stream = rr.RecordingStream("aloft", recording_id=name, send_properties=False)
-    rr.set_log_time_enabled(False, recording=stream)
-    stream.save(path, default_blueprint=layout)
-    try:
-        yield stream
-    finally:
-        stream.flush(timeout_sec=30)
-        stream.disconnect()
 
 
 def write_picture(stream: Any, diagram: bytes) -> None:

@@ -52,7 +52,7 @@ class LiveFeed:
         self.left_out = 0
         self._source, self._header = source, header
         self._work: Queue[Callable[[RunStream], None] | None] = Queue(WAITING)
-        self._stirred = self._progressed = time.monotonic()
+        self._awake = self._progressed = time.monotonic()
         self._started = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -72,8 +72,8 @@ class LiveFeed:
         self._put(None)
         begun = time.monotonic()
         while self._thread.is_alive() and time.monotonic() < begun + LONGEST_WAIT:
-            patience = LAST_WAIT if self._started.is_set() else STARTING
-            if time.monotonic() - max(self._progressed, begun) > patience:
+            timeout = LAST_WAIT if self._started.is_set() else STARTING
+            if time.monotonic() - max(self._progressed, begun) > timeout:
                 break
             self._thread.join(0.05)
         if self._thread.is_alive() and not self.problem:
@@ -86,7 +86,7 @@ class LiveFeed:
             self._work.put_nowait(work)
         except Full:
             self.left_out += 1
-            if time.monotonic() - self._stirred > TIMEOUT:
+            if time.monotonic() - self._awake > TIMEOUT:
                 self.problem = f"the viewer has taken nothing for {TIMEOUT:g} s"
 
     def _run(self) -> None:
@@ -103,7 +103,7 @@ class LiveFeed:
             self._progressed = time.monotonic()
             self._started.set()
             while not self.problem:
-                self._stirred = time.monotonic()
+                self._awake = time.monotonic()
                 try:
                     work = self._work.get(timeout=1.0)
                 except Empty:

@@ -17,7 +17,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ..viewing.contacts import ARROW_RADIUS, force_arrows
-from ..viewing.drawing import Colors
+from ..viewing.drawing import Colors, opened_stream
 from ..viewing.robot_shapes import drawn_link, eye_controls, read_meshes, scale_of
 
 COLORS = Colors()
@@ -62,12 +62,7 @@ def write_motion(path: str | Path, motion: MotionRecording, name: str) -> Path:
     import rerun as rr
 
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
-    stream = rr.RecordingStream("aloft", recording_id=name, send_properties=False)
-    rr.set_log_time_enabled(False, recording=stream)
-    stream.save(path, default_blueprint=motion_blueprint(motion))
-    try:
+    with opened_stream(path, name, motion_blueprint(motion)) as stream:
         stream.send_property("aloft", rr.AnyValues(**motion.properties))
         _write_world(stream, motion)
         for title, (values, names) in motion.series.items():
@@ -80,9 +75,6 @@ def write_motion(path: str | Path, motion: MotionRecording, name: str) -> Path:
             times, texts = zip(*motion.events, strict=True)
             columns = rr.TextLog.columns(text=list(texts), level=["INFO"] * len(texts))
             stream.send_columns("events", _times(np.array(times)), columns)
-    finally:
-        stream.flush(timeout_sec=30)
-        stream.disconnect()
     return path
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..file.format import Header, RecordedField, entity_of, time_columns
 from ..file.header import make_header
+from ..viewing.drawing import opened_stream
 from ..viewing.signal_names import element_names
 from .replay import Replayable, Replayed, ReplayError
 
@@ -35,15 +36,10 @@ def write_replay(path: str | PathLike[str], recorded: Replayable, replayed: Repl
     if not len(replayed.ticks):
         raise ReplayError("the replay kept no tick; replay with keep=True")
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
     memory, graph = replayed.bound.memory, recorded.graph
     header = make_header(replayed.bound.graph, memory.bus.layout, bytes(memory.bus.layout.size))
     fields = _fields(header, replayed)
-    stream = rr.RecordingStream("aloft", recording_id=f"{graph.name}-replay", send_properties=False)
-    rr.set_log_time_enabled(False, recording=stream)
-    stream.save(path, default_blueprint=_blueprint(replayed, fields))
-    try:
+    with opened_stream(path, f"{graph.name}-replay", _blueprint(replayed, fields)) as stream:
         about = {"name": graph.name, "ran": ", ".join(replayed.ran), "first": str(replayed.first)}
         stream.send_property("aloft", rr.AnyValues(**about))
         first, last = int(replayed.ticks[0]), int(replayed.ticks[-1]) + 1
@@ -66,9 +62,6 @@ def write_replay(path: str | PathLike[str], recorded: Replayable, replayed: Repl
                 stream.send_columns(
                     entity, time_columns(header, at), rr.Scalars.columns(scalars=flat)
                 )
-    finally:
-        stream.flush(timeout_sec=30)
-        stream.disconnect()
     return path
 
 

@@ -10,8 +10,11 @@ flight is drawn as the zero that it is.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -264,3 +267,20 @@ class ScenePart:
     def send(self, name: str, moments: Moments, columns: Any) -> None:
         """Write columns with one row for each instant to an entity below ``world``."""
         self.stream.send_columns(f"{self.world}/{name}", moments.times, columns)
+
+
+@contextmanager
+def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
+    """A Rerun stream into a file, which is there at the end. Raises ``OSError``."""
+    import rerun as rr
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.open("wb").close()  # Rerun would only warn, so find out here whether it can be written
+    stream = rr.RecordingStream("aloft", recording_id=name, send_properties=False)
+    rr.set_log_time_enabled(False, recording=stream)
+    stream.save(path, default_blueprint=layout)
+    try:
+        yield stream
+    finally:
+        stream.flush(timeout_sec=30)
+        stream.disconnect()

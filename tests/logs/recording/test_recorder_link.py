@@ -15,6 +15,7 @@ import pytest
 from aloft.logs import read
 from aloft.logs.recording import recorder as recorder_module
 from aloft.logs.recording.recorder import GIVE_UP_TIME, STALL_TIME, Recorder, RecorderLink
+from aloft.logs.recording.recorder_process import ROW
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import run
 
@@ -38,7 +39,7 @@ class SlowProcess:
         self.told: list[str] = []
         self.recorder: Any = Recorder(None, on_warning=self.told.append)
         self.recorder.link, self.recorder._waits = self.link, True
-        self.recorder._write, self.recorder._bus = self.write, b""
+        self.recorder._write = self.write
         self.waited: list[bool] = []
 
     def sleep(self, seconds: float) -> None:
@@ -63,7 +64,7 @@ def test_a_process_that_reads_a_little_now_and_then_is_waited_for(
         slow.link.ring.read_back += 64
 
     monkeypatch.setattr(slow, "go_on", read)
-    assert slow.recorder._wait_for_room(7)
+    assert slow.recorder._wait_for_room(ROW, 7, b"")
     assert slow.told == [] and slow.now == 3600.0
     assert all(slow.waited) and not slow.recorder.waits_for_others
 
@@ -75,13 +76,13 @@ def test_a_process_that_reads_and_writes_files_goes_on_too(monkeypatch: pytest.M
         slow.moved += 4096
 
     monkeypatch.setattr(slow, "go_on", write)
-    assert slow.recorder._wait_for_room(7)
+    assert slow.recorder._wait_for_room(ROW, 7, b"")
     assert slow.told == []
 
 
 def test_a_process_that_does_nothing_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowProcess(monkeypatch)
-    assert not slow.recorder._wait_for_room(7)
+    assert not slow.recorder._wait_for_room(ROW, 7, b"")
     assert slow.now == GIVE_UP_TIME + 10.0
     (told,) = slow.told
     assert told == (
