@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared.option_groups import expand_option_groups
 from .shared.options import CompletedOverrides
 from .shared.output import console, errors_reported, print_json, say, table
 from .shared.running_graphs import As, Keys, Local
@@ -20,38 +22,54 @@ if TYPE_CHECKING:
     from ..runtime.language.stages import CheckedGraph
 
 
+@dataclass(frozen=True)
+class FormOptions:
+    """The form in which a graph is printed or drawn."""
+
+    as_table: Annotated[bool, typer.Option("--table", help="As a table (the default).")] = False
+    mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False
+    flat: Annotated[
+        bool, typer.Option("--flat", help="As one YAML file: all expanded, overrides applied.")
+    ] = False
+    as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False
+    svg: Annotated[
+        Path | None, typer.Option("--svg", help="As a block diagram, into this SVG file.")
+    ] = None
+    png: Annotated[
+        Path | None, typer.Option("--png", help="As a block diagram, into this PNG file.")
+    ] = None
+    dark: Annotated[bool, typer.Option("--dark", help="A dark PNG file.")] = False
+    web: Annotated[
+        bool, typer.Option("--web", help="As a block diagram in the browser, to click on.")
+    ] = False
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """Which running graph is shown."""
+
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="As --web, of a graph that is running: its values and times."),
+    ] = False
+    running: Annotated[
+        str, typer.Option("--run", help="With --live: the name of the run, if there are several.")
+    ] = ""
+    keys: Keys = None
+    name: As = "viewer"
+    local: Local = 0
+
+
+@expand_option_groups
 def graph(
     graph: Annotated[
         Path | None,
         typer.Argument(help="The graph file, or a recording: its graph. With --live not needed."),
     ] = None,
     overrides: CompletedOverrides = None,
-    as_table: Annotated[bool, typer.Option("--table", help="As a table (the default).")] = False,
-    mermaid: Annotated[bool, typer.Option("--mermaid", help="As a Mermaid diagram.")] = False,
-    flat: Annotated[
-        bool, typer.Option("--flat", help="As one YAML file: all expanded, overrides applied.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False,
-    svg: Annotated[
-        Path | None, typer.Option("--svg", help="As a block diagram, into this SVG file.")
-    ] = None,
-    png: Annotated[
-        Path | None, typer.Option("--png", help="As a block diagram, into this PNG file.")
-    ] = None,
-    dark: Annotated[bool, typer.Option("--dark", help="A dark PNG file.")] = False,
-    web: Annotated[
-        bool, typer.Option("--web", help="As a block diagram in the browser, to click on.")
-    ] = False,
-    live: Annotated[
-        bool,
-        typer.Option("--live", help="As --web, of a graph that is running: its values and times."),
-    ] = False,
-    running: Annotated[
-        str, typer.Option("--run", help="With --live: the name of the run, if there are several.")
-    ] = "",
-    keys: Keys = None,
-    name: As = "viewer",
-    local: Local = 0,
+    *,
+    form: FormOptions,
+    showing: LiveOptions,
     closed: Annotated[
         list[str] | None,
         typer.Option("--closed", help="A sub-graph whose box the diagram keeps closed, or 'all'."),
@@ -67,13 +85,16 @@ def graph(
     from ..runtime.loading import load, picture
     from ..runtime.placement.placed import place, placement_json
 
-    with errors_reported(as_json):
-        if as_table + mermaid + flat + as_json + (web or live) > 1:
+    shown = form.web or showing.live
+    with errors_reported(form.as_json):
+        if form.as_table + form.mermaid + form.flat + form.as_json + shown > 1:
             raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
-        if live:
-            serve_running(graph, running, overrides or [], keys, name, local)
+        if showing.live:
+            serve_running(
+                graph, showing.running, overrides or [], showing.keys, showing.name, showing.local
+            )
             return
-        if graph is None or running:
+        if graph is None or showing.running:
             raise AloftError(
                 "--run NAME is for --live"
                 if graph
@@ -88,18 +109,18 @@ def graph(
             values = TickValues(opened.file)
         else:
             checked = load(graph, overrides or [])
-        if svg or png:
-            draw_files(checked, closed or (), svg, png, dark=dark)
-    if as_json:
+        if form.svg or form.png:
+            draw_files(checked, closed or (), form.svg, form.png, dark=form.dark)
+    if form.as_json:
         placement = placement_json(place(checked)) if checked.machines else {}
         print_json({**picture.table_json(checked), **placement})
-    elif mermaid:
+    elif form.mermaid:
         typer.echo(picture.mermaid(checked), nl=False)
-    elif flat:
+    elif form.flat:
         typer.echo(checked.text, nl=False)
-    elif web:
+    elif form.web:
         serve(checked, values)
-    elif as_table or not (svg or png):
+    elif form.as_table or not (form.svg or form.png):
         print_table(console(), checked)
 
 

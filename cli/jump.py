@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
+from .shared.option_groups import expand_option_groups
 from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, graph_of, rehearsal
-from .shared.run_graph import run_many, run_once
+from .shared.run_graph import OneRunOptions, run_many, run_once
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,73 +42,103 @@ FIELDS = {
 """The lengths of the command line as parameters of a task, and their sign there."""
 
 
-def jump(
-    rise: Annotated[str, typer.Option(help=HELP["rise"])] = "",
-    forward: Annotated[str, typer.Option(help=HELP["forward"])] = "",
-    back: Annotated[str, typer.Option(help=HELP["back"])] = "",
-    left: Annotated[str, typer.Option(help=HELP["left"])] = "",
-    right: Annotated[str, typer.Option(help=HELP["right"])] = "",
-    up: Annotated[str, typer.Option(help=HELP["up"])] = "",
-    down: Annotated[str, typer.Option(help=HELP["down"])] = "",
-    turn: Annotated[str, typer.Option(help=HELP["turn"])] = "",
-    robot: Annotated[str, typer.Option(help="Which robot jumps.")] = "bruce",
+@dataclass(frozen=True)
+class JumpOptions:
+    """The jump that is asked for."""
+
+    rise: Annotated[str, typer.Option(help=HELP["rise"])] = ""
+    forward: Annotated[str, typer.Option(help=HELP["forward"])] = ""
+    back: Annotated[str, typer.Option(help=HELP["back"])] = ""
+    left: Annotated[str, typer.Option(help=HELP["left"])] = ""
+    right: Annotated[str, typer.Option(help=HELP["right"])] = ""
+    up: Annotated[str, typer.Option(help=HELP["up"])] = ""
+    down: Annotated[str, typer.Option(help=HELP["down"])] = ""
+    turn: Annotated[str, typer.Option(help=HELP["turn"])] = ""
+
+
+@dataclass(frozen=True)
+class TrialOptions:
+    """Which graph runs, in which trial."""
+
+    robot: Annotated[str, typer.Option(help="Which robot jumps.")] = "bruce"
     graph: Annotated[
         Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
-    ] = None,
+    ] = None
     trial: Annotated[
         str, typer.Option(help="nominal, standard or robust; by default as the graph says.")
-    ] = "",
-    seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0,
+    ] = ""
+    seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0
     seeds: Annotated[
         str, typer.Option(help="Run once a seed instead: 0:20 or 1,5,7; nothing is recorded.")
-    ] = "",
-    overrides: Overrides = None,
+    ] = ""
+    overrides: Overrides = None
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """Whether the run is recorded, and where."""
+
     record: Annotated[
         Path | None, typer.Option(help="Where the recording goes; by default recordings/jump.rrd.")
-    ] = None,
-    no_record: NoRecord = False,
+    ] = None
+    no_record: NoRecord = False
+
+
+@dataclass(frozen=True)
+class PlanningOptions:
+    """What is done beside planning the jump."""
+
     nearest: Annotated[
         bool,
         typer.Option(help="Where there is no plan, search the nearest jump that has; about 6 s."),
-    ] = True,
-    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
+    ] = True
+    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False
+
+
+@expand_option_groups
+def jump(
+    asked: JumpOptions,
+    running: TrialOptions,
+    recording: RecordOptions,
+    planning: PlanningOptions,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
     from ..studies.batch.seeds import parse_seeds
 
+    seeds, seed = running.seeds, running.seed
     out = console(to_stderr=as_json, quiet=quiet)
-    lengths = {"forward": forward, "back": back, "left": left, "right": right, "up": up,
-               "down": down}  # fmt: skip
     with errors_reported(as_json):
-        if seeds and (record is not None or seed):
+        if seeds and (recording.record is not None or seed):
             raise AloftError(
                 "--seeds runs many seeds and records nothing: leave out --seed, --record"
             )
-        path = graph or graph_of(robot)
-        asked = task_changes(lengths, rise, turn, path)
-        settings = [*settings_for(asked, trial), *(overrides or [])]
+        path = running.graph or graph_of(running.robot)
+        lengths = {name: getattr(asked, name) for name in FIELDS}
+        changes = task_changes(lengths, asked.rise, asked.turn, path)
+        settings = [*settings_for(changes, running.trial), *(running.overrides or [])]
         many = parse_seeds(seeds) if seeds else []
         loaded = load_jump(path, settings, None if seeds else seed)
         task = task_of(loaded)
         say(out, f"{task.robot} jumps: {task.name}")
-        planned = plan_of(task, loaded, nearest, out)
+        planned = plan_of(task, loaded, planning.nearest, out)
         if not planned["success"]:
             if as_json:
                 why = {"success": False, "reason": planned["reason"], "recording": None}
-                print_json({"asked": asked, "plan": planned, **why})
+                print_json({"asked": changes, "plan": planned, **why})
             raise typer.Exit(ExitCode.NOT_SUCCESSFUL)
         library = library_of(loaded)
-        planned |= rehearsal(path, settings, task, library, rehearse, out)
-        if rehearse:  # what was learnt is part of the graph
+        planned |= rehearsal(path, settings, task, library, planning.rehearse, out)
+        if planning.rehearse:  # what was learnt is part of the graph
             loaded = load_jump(path, settings, None if seeds else seed)
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            place = None if no_record else record or Path("recordings") / "jump.rrd"
-            also = {"asked": asked, "plan": planned}
-            code = run_once(loaded, place, out, as_json, also=also, times=False)
+            default = Path("recordings") / "jump.rrd"
+            place = None if recording.no_record else recording.record or default
+            options = OneRunOptions(record=place, as_json=as_json, times=False)
+            code = run_once(loaded, options, out, also={"asked": changes, "plan": planned})
     raise typer.Exit(code)
 
 

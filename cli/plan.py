@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..runtime.language.errors import ExitCode
+from .shared.option_groups import expand_option_groups
 from .shared.options import JsonBesideTables
 from .shared.output import console, errors_reported, print_error, print_json, say
 from .shared.planning import (
@@ -33,82 +35,98 @@ if TYPE_CHECKING:
     from ..robots.description import RobotDescription
 
 
-def plan(
-    tasks: Annotated[list[Path] | None, typer.Argument(help="Task files.")] = None,
-    grid: Annotated[
-        Path | None, typer.Option("--library", help="Plan every task of this grid file, resumably.")
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for pictures and recordings.")] = Path("plans"),
+@dataclass(frozen=True)
+class LibraryOptions:
+    """The library of plans, and what becomes of the plans in it."""
+
     keep: Annotated[
         Path | None, typer.Option(help="Library folder plans are kept in; default: your cache.")
-    ] = None,
+    ] = None
     anew: Annotated[
         bool,
         typer.Option(
             "--anew",
             help="Solve also what is kept, from nothing; in a grid: try again what failed before.",
         ),
-    ] = False,
-    listed: Annotated[bool, typer.Option("--list", help="List the plans that are kept.")] = False,
+    ] = False
+    listed: Annotated[bool, typer.Option("--list", help="List the plans that are kept.")] = False
     prune: Annotated[
         bool,
         typer.Option("--prune", help="Remove from --keep the plans of all tasks but these."),
-    ] = False,
-    workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0,
+    ] = False
+
+
+@dataclass(frozen=True)
+class PoolOptions:
+    """Where a grid is planned."""
+
+    workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0
     cluster: Annotated[
         str, typer.Option(help="Plan a grid on the Dask scheduler at this address.")
-    ] = "",
-    no_pictures: Annotated[
-        bool, typer.Option("--no-pictures", help="Write no picture and no recording.")
-    ] = False,
+    ] = ""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What is done beside planning a task."""
+
     nearest: Annotated[
         bool,
         typer.Option(
             help="Where a task has no plan, search the nearest one that has; up to 6 s of CPU."
         ),
-    ] = True,
-    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False,
-    rehearse_landing: Annotated[
-        bool, typer.Option("--rehearse-landing", help=LANDING_HELP)
+    ] = True
+    rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False
+    rehearse_landing: Annotated[bool, typer.Option("--rehearse-landing", help=LANDING_HELP)] = False
+
+
+@expand_option_groups
+def plan(
+    tasks: Annotated[list[Path] | None, typer.Argument(help="Task files.")] = None,
+    grid: Annotated[
+        Path | None, typer.Option("--library", help="Plan every task of this grid file, resumably.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for pictures and recordings.")] = Path("plans"),
+    *,
+    library: LibraryOptions,
+    pool: PoolOptions,
+    no_pictures: Annotated[
+        bool, typer.Option("--no-pictures", help="Write no picture and no recording.")
     ] = False,
+    search: SearchOptions,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Plan jumps, check each with exact dynamics, and keep the valid ones in the plan library."""
-    if bool(tasks) + (grid is not None) + listed != 1:
+    if bool(tasks) + (grid is not None) + library.listed != 1:
         raise typer.BadParameter("give task files, or --library with a grid file, or --list")
-    if prune and (keep is None or not tasks):
+    if library.prune and (library.keep is None or not tasks):
         raise typer.BadParameter("--prune goes with task files and --keep")
-    if rehearse and rehearse_landing:
+    if search.rehearse and search.rehearse_landing:
         raise typer.BadParameter("give --rehearse or --rehearse-landing")
-    if (rehearse or rehearse_landing) and not tasks:
-        named = "--rehearse" if rehearse else "--rehearse-landing"
+    if (search.rehearse or search.rehearse_landing) and not tasks:
+        named = "--rehearse" if search.rehearse else "--rehearse-landing"
         raise typer.BadParameter(f"{named} goes with task files")
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if listed:
-            code = list_plans(keep, screen, as_json)
+        if library.listed:
+            code = list_plans(library.keep, screen, as_json)
         elif grid is not None:
-            code = plan_grid(grid, keep, anew, workers, cluster, screen, as_json)
+            code = plan_grid(
+                grid, library.keep, library.anew, pool.workers, pool.cluster, screen, as_json
+            )
         else:
             folder = None if no_pictures else out
-            code = plan_tasks(
-                tasks or [], keep, anew, folder, nearest, prune, rehearse, screen, as_json,
-                rehearse_landing,
-            )  # fmt: skip
+            code = plan_tasks(tasks or [], library, folder, search, screen, as_json)
     raise typer.Exit(code)
 
 
 def plan_tasks(
     paths: list[Path],
-    keep: Path | None,
-    anew: bool,
+    kept: LibraryOptions,
     out: Path | None,
-    nearest: bool,
-    prune: bool,
-    rehearse: bool,
+    search: SearchOptions,
     screen: Console,
     as_json: bool,
-    landing: bool = False,
 ) -> ExitCode:
     """Plan each task file, also after one has failed. All files are read before anything is planned.
 
@@ -130,17 +148,18 @@ def plan_tasks(
         raise JumpTaskError("\n".join(wrong))
     rows: list[dict[str, Any]] = []
     for path, task in zip(paths, tasks, strict=True):
-        library = PlanLibrary(find_robot(task.robot, path.parent), keep)
-        row = plan_task(task, library, anew, out, nearest, screen)
+        library = PlanLibrary(find_robot(task.robot, path.parent), kept.keep)
+        row = plan_task(task, library, kept.anew, out, search.nearest, screen)
         if row["success"]:
-            wanted = rehearse or landing
-            row |= rehearsal_of_file(path, task, library, keep, wanted, screen, landing)
+            landing = search.rehearse_landing
+            wanted = search.rehearse or landing
+            row |= rehearsal_of_file(path, task, library, kept.keep, wanted, screen, landing)
         rows.append(row)
     failed = [row["task"] for row in rows if not row["success"]]
-    if prune and not failed:
+    if kept.prune and not failed:
         for name in dict.fromkeys(task.robot for task in tasks):
             own = [task for task in tasks if task.robot == name]
-            for path in PlanLibrary(find_robot(name), keep).prune(own):
+            for path in PlanLibrary(find_robot(name), kept.keep).prune(own):
                 say(screen, f"removed: {path}")
     reason = f"not planned: {', '.join(failed)}" if failed else f"{len(rows)} planned and valid"
     if len(rows) > 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared.option_groups import expand_option_groups
 from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from .shared.output import (
     console,
     errors_reported,
     print_warning,
 )
-from .shared.run_graph import RunnableGraph, run_many, run_once
+from .shared.run_graph import OneRunOptions, RunnableGraph, run_many, run_once
 
 if TYPE_CHECKING:
     from ..logs.viewing.viewer import Viewer
@@ -31,130 +33,183 @@ class Live(StrEnum):
     WEB = "web"
 
 
-def run(
-    graph: Annotated[Path, typer.Argument(help="The graph file.")],
-    overrides: CompletedOverrides = None,
+@dataclass(frozen=True)
+class GraphOptions:
+    """What is changed in the graph, and how often and how long it runs."""
+
+    overrides: CompletedOverrides = None
     seeds: Annotated[
         str, typer.Option(help="Run once a seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")
-    ] = "",
+    ] = ""
     duration: Annotated[
         str, typer.Option(help="How long [s of the graph's time]; the same as --set duration=.")
-    ] = "",
+    ] = ""
+
+
+@dataclass(frozen=True)
+class ObservationOptions:
+    """How the run is recorded, shown and reached."""
+
     record: Annotated[
         Path | None,
         typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
-    ] = None,
+    ] = None
     rerun: Annotated[
         Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
-    ] = Live.NONE,
+    ] = Live.NONE
     keep: Annotated[
         int, typer.Option(min=0, help="How many earlier recordings of that name are kept.")
-    ] = 0,
+    ] = 0
     split: Annotated[
         str,
         typer.Option(help="Go on in a new recording after this time of the graph, e.g. '10 min'."),
-    ] = "",
-    no_record: NoRecord = False,
+    ] = ""
+    no_record: NoRecord = False
     params: Annotated[
         str,
         typer.Option(
             help="Let `aloft params` reach this run by that name; a run in real time is reached "
             "by its graph's name anyway. 'none': not at all."
         ),
-    ] = "",
-    as_json: JsonBesideTables = False,
-    quiet: Quiet = False,
+    ] = ""
+
+
+@dataclass(frozen=True)
+class PrintingOptions:
+    """What is printed."""
+
+    as_json: JsonBesideTables = False
+    quiet: Quiet = False
     traceback: Annotated[
         bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
-    ] = False,
+    ] = False
+
+
+@dataclass(frozen=True)
+class PartOptions:
+    """Which parts of a graph on several machines run here."""
+
     machine: Annotated[
         str, typer.Option(help="Run only the part of this machine, together with the others.")
-    ] = "",
+    ] = ""
     local: Annotated[
         bool, typer.Option("--local", help="Run the parts of all machines as processes here.")
-    ] = False,
+    ] = False
     keys: Annotated[
         Path | None,
         typer.Option(help="The folder of `aloft keys`, or this machine's own: links over TLS."),
-    ] = None,
+    ] = None
+
+
+@dataclass(frozen=True)
+class CompilingOptions:
+    """What is compiled."""
+
     plain: Annotated[
         bool,
         typer.Option("--plain", help="Compile nothing: slower, with the same bytes."),
-    ] = False,
+    ] = False
     check_bounds: Annotated[
         bool,
         typer.Option(
             "--check-bounds",
             help="Check every index of a kernel: compile nothing, so that one beyond its array fails.",
         ),
-    ] = False,
+    ] = False
     fuse: Annotated[
         bool, typer.Option(help="Run blocks of kernels that follow each other as one call.")
-    ] = True,
+    ] = True
+
+
+@dataclass(frozen=True)
+class ThreadOptions:
+    """What the control thread asks of the operating system."""
+
     cpu: Annotated[
         int | None, typer.Option(min=0, help="Pin the control thread to this processor.")
-    ] = None,
+    ] = None
     priority: Annotated[
         int | None,
         typer.Option(help="Run the control thread with SCHED_FIFO at this priority, 1 to 99."),
-    ] = None,
+    ] = None
     lock_memory: Annotated[
         bool, typer.Option("--lock-memory", help="Keep all memory in the machine's (mlockall).")
-    ] = False,
+    ] = False
+
+
+@expand_option_groups
+def run(
+    graph: Annotated[Path, typer.Argument(help="The graph file.")],
+    changes: GraphOptions,
+    observation: ObservationOptions,
+    printing: PrintingOptions,
+    parts: PartOptions,
+    compiling: CompilingOptions,
+    thread: ThreadOptions,
 ) -> None:
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
     from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
     from ..studies.batch.seeds import parse_seeds
 
-    plain = plain or check_bounds
-    settings = [*(overrides or []), *([f"duration={duration}"] if duration else [])]
-    out = console(to_stderr=as_json, quiet=quiet)
+    as_json, traceback = printing.as_json, printing.traceback
+    plain = compiling.plain or compiling.check_bounds
+    duration = [f"duration={changes.duration}"] if changes.duration else []
+    settings = [*(changes.overrides or []), *duration]
+    out = console(to_stderr=as_json, quiet=printing.quiet)
     with errors_reported(as_json, traceback=traceback):
-        if seeds and record is not None:
-            raise AloftError("--record is for one run; with --seeds nothing is recorded")
-        if seeds and rerun is not Live.NONE:
-            raise AloftError("--rerun is for one run; with --seeds nothing is shown")
-        if (machine or local) and (seeds or (machine and local)):
-            raise AloftError("choose one of --machine, --local and --seeds")
-        if keys is not None and not (machine or local):
-            raise AloftError("--keys is for links between machines: --machine NAME, or --local")
-        thread_options = RealTimeOptions(cpu, priority, lock_memory)
-        if thread_options != NO_REAL_TIME and (seeds or local):
-            raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
-        if local:
+        thread_options = RealTimeOptions(thread.cpu, thread.priority, thread.lock_memory)
+        check_combination(changes.seeds, observation, parts, thread_options != NO_REAL_TIME)
+        if parts.local:
             from .shared.run_machines import RunOptions, run_local
 
-            place = None if no_record else record
+            recorded = not observation.no_record
             options = RunOptions(
-                settings, place, not no_record, params, as_json, traceback, plain, keys, fuse
-            )
+                settings, observation.record if recorded else None, recorded, observation.params,
+                as_json, traceback, plain, parts.keys, compiling.fuse,
+            )  # fmt: skip
             code = run_local(graph, options, out)
-        elif seeds:
-            code = run_many(
-                graph, settings, parse_seeds(seeds), out, as_json, plain=plain, fuse=fuse
-            )
+        elif changes.seeds:
+            seeds = parse_seeds(changes.seeds)
+            code = run_many(graph, settings, seeds, out, as_json, plain=plain, fuse=compiling.fuse)
         else:
             loaded: RunnableGraph = load(graph, settings)
             name = loaded.checked.name
-            if machine:
+            if parts.machine:
                 from .shared.run_machines import MachineRun
 
-                loaded, name = MachineRun(loaded.checked, machine, keys), f"{name}-{machine}"
-            default = Path("recordings") / f"{name}.rrd"
-            endpoint = open_endpoint(loaded, params, name)
-            sinks = [endpoint] if endpoint is not None else []
-            place = None if no_record else record or default
+                loaded = MachineRun(loaded.checked, parts.machine, parts.keys)
+                name = f"{name}-{parts.machine}"
+            endpoint = open_endpoint(loaded, observation.params, name)
             messages: list[str] = []
-            viewer = open_viewer(rerun, messages)
-            code = run_once(
-                loaded, place, out, as_json, sinks, viewer,
-                keep=keep, split=split_time(split), messages=messages, traceback=traceback, plain=plain,
-                fuse=fuse, real_time=thread_options,
+            viewer = open_viewer(observation.rerun, messages)
+            default = Path("recordings") / f"{name}.rrd"
+            one_run = OneRunOptions(
+                record=None if observation.no_record else observation.record or default,
+                keep=observation.keep, split=split_time(observation.split), as_json=as_json,
+                traceback=traceback, plain=plain, fuse=compiling.fuse, real_time=thread_options,
             )  # fmt: skip
+            sinks = [endpoint] if endpoint is not None else []
+            code = run_once(loaded, one_run, out, sinks=sinks, viewer=viewer, messages=messages)
             if viewer is not None:
                 leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
+
+
+def check_combination(
+    seeds: str, observation: ObservationOptions, parts: PartOptions, real_time: bool
+) -> None:
+    """Raise ``AloftError`` where options do not go together."""
+    if seeds and observation.record is not None:
+        raise AloftError("--record is for one run; with --seeds nothing is recorded")
+    if seeds and observation.rerun is not Live.NONE:
+        raise AloftError("--rerun is for one run; with --seeds nothing is shown")
+    if (parts.machine or parts.local) and (seeds or (parts.machine and parts.local)):
+        raise AloftError("choose one of --machine, --local and --seeds")
+    if parts.keys is not None and not (parts.machine or parts.local):
+        raise AloftError("--keys is for links between machines: --machine NAME, or --local")
+    if real_time and (seeds or parts.local):
+        raise AloftError("--cpu, --priority and --lock-memory are for one run, in one process")
 
 
 def split_time(text: str) -> float:

@@ -19,43 +19,25 @@ to the squared error, the last steps are those of Newton's method and converge q
 Vectors are in the base's frame, in m and rad. The kernels allocate nothing, take a bounded number
 of steps and return finite numbers for all finite arguments. They share one scratch array
 ``work``, see ``limb_scratch``.
-
-At the end of the file stands one tick of a limb that follows a target, as ``five_joint_track`` has it for legs
-that are solved in closed form.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from ..mathematics.arrays import (
     Array,
-    Array0D,
     Array1D,
     Array2D,
-    Flags0D,
-    Indices1D,
-    Matrix3,
-    Rows3,
-    Vector3,
 )
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import solve_positive
-from .description import RobotDescription
-from .five_joint_leg import pitched_line
-from .five_joint_track import FootMotion, LegSettings, LegTargets
-from .kinematics import ball_feet
 from .limb import (
-    FootKind,
-    aim,
     foot_error,
     limb_jacobian,
     place_limb,
-    read_limb,
-    turning,
     weigh_rows,
 )
 
@@ -284,163 +266,3 @@ def _stuck(limits: Array2D, joint: int, angle: float, direction: float) -> bool:
     """Whether a joint stands at a limit and ``direction`` points beyond it."""
     lower, upper = limits[joint, 0], limits[joint, 1]
     return (angle <= lower and direction <= 0.0) or (angle >= upper and direction >= 0.0)
-
-
-_FASTEST = 100.0
-"""Foot velocities [m/s] and measured joints [rad or m] are limited to this, so that no square overflows."""
-_JUMP = 0.1
-"""A target that rotates by more than this [rad] in a tick is a new target, not a motion."""
-_STEPS = 24
-"""The largest number of least-squares steps from each starting point."""
-_LOOSE = 0.1
-"""Weight of those errors that matter less for a target out of reach; the others have weight 1."""
-_POINT = int(FootKind.POINT)
-
-
-class LimbGeometry(NamedTuple):
-    """A ``Limb`` as arrays.
-
-    Attributes:
-        joints: their indices among the robot's, (n,).
-        links, tip, limits: of the ``Limb``; the foot of a ball is the ball's centre.
-        standing: the joints' standing angles [rad or m], (n,).
-        radius: of the ball that the foot is [m], or zero.
-    """
-
-    joints: Indices1D
-    links: Array2D
-    tip: Array1D
-    limits: Array2D
-    standing: Array1D
-    radius: float
-
-
-class LimbScratch(NamedTuple):
-    """Memory for intermediate results; ``target`` and ``twist`` lead from one kernel to the other."""
-
-    target: Rows3
-    twist: Array1D
-    rotation: Matrix3
-    line: Vector3
-    place: Vector3
-    weights: Vector3
-    starts: Array2D
-    work: Array2D
-    angles: Array1D
-    speeds: Array1D
-
-
-def limb_geometry(robot: RobotDescription, foot: int, margin: float) -> LimbGeometry:
-    """The limb that ends in foot number ``foot``; its joints stay ``margin`` inside their limits.
-
-    Raises:
-        ValueError: no chain of joints leads from the base to the foot.
-    """
-    limb, radius = read_limb(robot, foot, margin), 0.0
-    for ball in ball_feet(robot):
-        if ball.foot == foot:
-            radius = float(ball.radius)
-            limb.tip[:3] = ball.centre
-    return LimbGeometry(
-        np.array(limb.joints, dtype=np.int64), limb.links, limb.tip, limb.limits,
-        robot.standing_position[list(limb.joints)], radius,
-    )  # fmt: skip
-
-
-def limb_memory(joints: int) -> LimbScratch:
-    """Zero memory for a limb with that many joints."""
-    n = joints
-    return LimbScratch(
-        np.zeros((4, 3)), np.zeros(6), np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.ones(3),
-        np.zeros((3, n + 1)), limb_scratch(n), np.zeros(n), np.zeros(n),
-    )  # fmt: skip
-
-
-@kernel
-def watch_foot(
-    limb: LimbGeometry,
-    foot: FootMotion,
-    pitched: bool,
-    pitch: Array0D,
-    period: float,
-    known: Flags0D,
-    last: Rows3,
-    scratch: LimbScratch,
-) -> None:
-    """The target of the limb, and how fast it turns.
-
-    Args:
-        pitched: whether the foot's x axis is turned by ``pitch`` [rad], of shape (), about its y axis.
-        period: between two ticks [s].
-        known: whether ``last`` (4, 3) is the target of the last tick, of shape (); it is updated.
-    """
-    rotation, twist = scratch.rotation, scratch.twist
-    for i in range(3):
-        rotation[i, :] = foot.rotation[i]
-    if pitched:
-        pitched_line(rotation, pitch[()], scratch.line)
-        rotation[:, 0] = scratch.line
-    # A ball's centre is its radius above the ground, whichever way the leg comes.
-    scratch.place[:] = foot.rotation[:, 2] * limb.radius + foot.position
-    aim(scratch.place, rotation, scratch.target)
-    for k in range(3, 6):
-        twist[k] = 0.0
-    if known[()]:
-        turning(limb.tip, last, scratch.target, period, _JUMP, twist[3:])
-    for i in range(4):
-        last[i, :] = scratch.target[i]
-
-
-@kernel
-def follow_limb(
-    limb: LimbGeometry,
-    number: int,
-    foot: FootMotion,
-    measured: Array1D,
-    known: Flags0D,
-    found: Array1D,
-    settings: LegSettings,
-    scratch: LimbScratch,
-    target: LegTargets,
-) -> None:
-    """The positions and velocities of a limb's joints for its foot's target, by least squares.
-
-    Args:
-        number: the foot's.
-        measured: positions of all joints [rad or m], (n_joints,).
-        known: whether ``found``, (n_joints,), is the solution of the last tick, of shape ().
-        scratch: with the target and its rotation from ``watch_foot``.
-        target: out; only the limb's joints are written.
-    """
-    weights, starts, angles, twist = scratch.weights, scratch.starts, scratch.angles, scratch.twist
-    n, slides = limb.joints.shape[0], settings.slides
-    for i in range(n):
-        joint = limb.joints[i]
-        felt = min(max(measured[joint], -_FASTEST), _FASTEST)
-        starts[0, i] = found[joint] if known[()] else felt
-        starts[1, i] = felt
-        starts[2, i] = limb.standing[i]
-    weights[0], weights[1], weights[2] = 1.0, 1.0, settings.turn_length
-    square = reach(
-        limb.links, limb.tip, limb.limits, scratch.target, weights, starts, 3, _STEPS,
-        scratch.work, angles,
-    )  # fmt: skip
-    target.reachable[number] = square <= REACHED
-    if square > REACHED and (slides or int(limb.tip[6]) != _POINT):
-        loose = 0 if slides else 2
-        weights[loose] = weights[loose] * _LOOSE
-        approach(
-            limb.links, limb.tip, limb.limits, scratch.target, weights, _STEPS, scratch.work,
-            angles,
-        )  # fmt: skip
-    for k in range(3):
-        twist[k] = min(max(foot.velocity[k], -_FASTEST), _FASTEST)
-    limb_velocity(
-        limb.links, limb.tip, limb.limits, scratch.target, weights, angles, twist,
-        settings.damping, scratch.work, scratch.speeds,
-    )  # fmt: skip
-    limit = settings.speed_limit
-    for i in range(n):
-        joint, speed = limb.joints[i], scratch.speeds[i]
-        target.position[joint] = angles[i]
-        target.velocity[joint] = min(max(speed, -limit), limit)

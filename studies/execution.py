@@ -88,9 +88,7 @@ def make_runs(
     lost: dict[str, Outcome] = {}
     if order:
         jobs = (job(run.cell, run.seed) for run in order)
-        with closing(
-            job_results(run_job, jobs, workers=_workers(workers, len(order)), cluster=cluster)
-        ) as results:
+        with closing(job_results(run_job, jobs, workers=workers, cluster=cluster)) as results:
             for result in results:
                 key = order[result.index].key
                 if result.error:
@@ -102,9 +100,3 @@ def make_runs(
                 on_run(outcome)
     found = journal.outcomes | lost
     return [Run(run.cell, run.seed, found[run.key]) for run in runs]
-
-
-def _workers(wanted: int, jobs: int) -> int:
-    from .batch.jobs import processors
-
-    return min(wanted or processors(), jobs)

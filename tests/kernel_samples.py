@@ -3,6 +3,7 @@
 import numpy as np
 
 from aloft.blocks.control import frames
+from aloft.blocks.control.leg_tracking import LegSettings, limb_geometry, limb_memory
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
 from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
@@ -15,10 +16,9 @@ from aloft.mathematics.landing_law import LandingCost, flight_map
 from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
-from aloft.robots.five_joint_track import FootMotion, LegSettings, LegTargets
 from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
-from aloft.robots.limb_inverse import limb_geometry, limb_memory, limb_scratch
+from aloft.robots.limb_inverse import limb_scratch
 from aloft.runtime.language.steps import as_record
 
 from .robots.limbed_robots import quadruped
@@ -94,14 +94,23 @@ PLACE = records(
     {"place_gain": 0.3, "place_limit": 0.3, "place_time": 0.3},
 )
 LIMB_GEOMETRY = limb_geometry(find_robot("bruce"), 0, 0.05)
-FOOT = FootMotion(np.array([0.03, -0.07, -0.28]), np.array([0.5, -0.2, 0.9]), np.eye(3))
-FOLLOWING = (
-    LegSettings(
-        *(np.array(value) for value in (0.005, 0.3, 3e-4, 0.3, 30.0)), np.array(False)
-    ),
-    limb_memory(5)._replace(target=TARGET.copy(), twist=0.1 * NORMAL(6)),
-    LegTargets(np.zeros(10), np.zeros(10), np.zeros(2, np.bool_)),
+LIMB_TICK = records(
+    {
+        "position": np.tile([0.03, -0.07, -0.28], (2, 1)), "velocity": np.tile([0.5, -0.2, 0.9], (2, 1)),
+        "rotation": np.tile(np.eye(3), (2, 1, 1)),
+    },
+    {"foot_pitch": np.array([0.1, 0.1])},
+    {"position": np.tile(MIDDLE, 2)},
+    {
+        "known": np.array(True), "target": np.tile(TARGET, (2, 1, 1)),
+        "position": np.tile(MIDDLE + 0.1, 2),
+    },
+    {"position": np.zeros(10), "velocity": np.zeros(10), "reachable": np.zeros(2, np.bool_)},
 )  # fmt: skip
+LEG_SETTINGS = LegSettings(
+    *(np.array(value) for value in (0.005, 0.3, 3e-4, 0.3, 30.0)), np.array(False)
+)
+LIMB_SCRATCH = limb_memory(5)._replace(target=TARGET.copy(), twist=0.1 * NORMAL(6))
 DRAW = np.random.default_rng(4).standard_normal
 BASE = as_record(RobotTruth.allocate(find_robot("bruce").dimensions))
 ROW = tuple(as_record(each.allocate({"n_feet": 2})) for each in (JumpRecord, JumpSeries))
@@ -274,11 +283,11 @@ UNUSED = {
     "aloft.robots.limb_inverse.limb_velocity": (
         *CHAIN, MIDDLE, np.ones(6), 3e-4, limb_scratch(5), np.zeros(5),
     ),
-    "aloft.robots.limb_inverse.watch_foot": (
-        LIMB_GEOMETRY, FOOT, True, np.array(0.1), 0.002, np.array(True), TARGET, limb_memory(5),
+    "aloft.blocks.control.leg_tracking.watch_foot": (
+        LIMB_GEOMETRY, 1, *LIMB_TICK[:2], True, 0.002, LIMB_TICK[3], limb_memory(5),
     ),
-    "aloft.robots.limb_inverse.follow_limb": (
-        LIMB_GEOMETRY, 0, FOOT, np.tile(MIDDLE, 2), np.array(True), np.tile(MIDDLE + 0.1, 2), *FOLLOWING,
+    "aloft.blocks.control.leg_tracking.follow_limb": (
+        LIMB_GEOMETRY, 0, LIMB_TICK[0], *LIMB_TICK[2:4], LEG_SETTINGS, LIMB_SCRATCH, LIMB_TICK[4],
     ),
     "aloft.robots.limb.turning": (LIMB.tip, POSE, TARGET, 0.002, 10.0, np.zeros(3)),
     "aloft.robots.limb_inverse._stuck": (LIMB.limits, 1, 0.3, 1.0),

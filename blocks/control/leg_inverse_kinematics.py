@@ -13,22 +13,25 @@ from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle
 from ...robots.five_joint_leg import Leg, find_leg
-from ...robots.five_joint_track import (
-    FootMotion,
-    LegSettings,
-    follow_foot,
-    leg_geometry,
-    leg_scratch,
-    watch_line,
-)
 from ...robots.limb import chain_to
-from ...robots.limb_inverse import follow_limb, limb_geometry, limb_memory, watch_foot
 from ...runtime.language.block import Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.steps import call_of, parameter_record, signal_call
 from ..signals import FootTarget, JointState, JointTarget, JumpReference, Phase
+from .leg_tracking import (
+    LegMemory,
+    LegSettings,
+    follow_foot,
+    follow_limb,
+    leg_geometry,
+    leg_scratch,
+    limb_geometry,
+    limb_memory,
+    watch_foot,
+    watch_line,
+)
 
 LATERAL = 0.9
 """Component along the base's y axis from which on a joint's axis is taken for lateral."""
@@ -84,20 +87,6 @@ class LegParams(Parameters):
     beyond: Literal["turn", "slide"] = live_parameter(
         "turn", text="where errors are allowed first for a target out of reach"
     )
-
-
-class LegMemory(Signal):
-    """The feet's targets and the joints' solution of the last tick."""
-
-    direction = Field(("n_feet", 3), unit="", frame="body", text="heel to toe, of unit length")
-    known = Field(dtype="bool", text="whether there was a last tick")
-    target = Field(("n_feet", 4, 3), frame="body", text="place [m] and rows of the rotation matrix")
-    position = Field("n_joints", unit="rad", text="joint positions found")
-    flew = Field(dtype="bool", text="whether the plan has flown and was followed")
-    flown_time = Field(unit="s", text="the plan's time in the last tick of its flight")
-    flown_position = Field("n_joints", unit="rad", text="the joints' targets then")
-    flown_velocity = Field("n_joints", unit="rad/s", text="their velocities")
-    flown_acceleration = Field("n_joints", unit="rad/s^2", text="their planned accelerations")
 
 
 class LegConstants(Signal):
@@ -242,38 +231,29 @@ class LegInverseKinematics(KernelBlock):
 
     def _closed_form(self, foot: int, leg: Leg) -> tuple[KernelCall, KernelCall]:
         """The calls for a five-joint leg."""
-        motion, scratch = self._motion(foot), leg_scratch()
-        watch = KernelCall(
-            watch_line, motion.rotation, self.params.follow == "pitch",
-            self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, self.memory.known,
-            self.memory.direction[foot], scratch,
-        )  # fmt: skip
+        scratch, pitched = leg_scratch(), self.params.follow == "pitch"
+        watch = signal_call(
+            watch_line, foot, self.feet, self.reference, pitched, self.period, self.memory, scratch
+        )
         follow = signal_call(
-            follow_foot, leg_geometry(leg, self.params.margin), foot, motion,
-            self.reference.joint_position, self.reference.joint_velocity, self._settings, scratch,
-            self.target,
+            follow_foot, leg_geometry(leg, self.params.margin), foot, self.feet, self.reference,
+            self._settings, scratch, self.target,
         )  # fmt: skip
         return watch, follow
 
     def _least_squares(self, foot: int) -> tuple[KernelCall, KernelCall]:
         """The calls for a leg of any number of joints."""
-        limb, motion = limb_geometry(self.robot, foot, self.params.margin), self._motion(foot)
-        scratch, memory = limb_memory(len(limb.joints)), self.memory
-        watch = KernelCall(
-            watch_foot, limb, motion, self.params.follow == "pitch",
-            self.reference.foot_pitch[foot : foot + 1].reshape(()), self.period, memory.known,
-            memory.target[foot], scratch,
+        limb = limb_geometry(self.robot, foot, self.params.margin)
+        scratch, pitched = limb_memory(len(limb.joints)), self.params.follow == "pitch"
+        watch = signal_call(
+            watch_foot, limb, foot, self.feet, self.reference, pitched, self.period, self.memory,
+            scratch,
         )  # fmt: skip
         follow = signal_call(
-            follow_limb, limb, foot, motion, self.joints.position, memory.known, memory.position,
-            self._settings, scratch, self.target,
+            follow_limb, limb, foot, self.feet, self.joints, self.memory, self._settings, scratch,
+            self.target,
         )  # fmt: skip
         return watch, follow
-
-    def _motion(self, foot: int) -> FootMotion:
-        """The target of one foot."""
-        feet = self.feet
-        return FootMotion(feet.position[foot], feet.velocity[foot], feet.rotation[foot])
 
 
 # Before and after the legs

@@ -255,7 +255,7 @@ class JumpPlan(Block):
         if turning is not None:
             constants.gain, constants.aim = turning.gain, turning.aim
             constants.early, constants.late = turning.early, turning.late
-        return rotation or FlightRotation(*(np.zeros(1) for _ in FlightRotation._fields))
+        return rotation or FlightRotation(*(np.zeros(size) for size in (1, 1, 1, 4)))
 
     @kernel
     @staticmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -55,38 +56,58 @@ class RunnableGraph(Protocol):
         """What the JSON object says beside the result of the run."""
 
 
+@dataclass(frozen=True)
+class OneRunOptions:
+    """How one run is recorded, printed and computed.
+
+    Attributes:
+        record: where the recording goes; none: nowhere.
+        keep: how many earlier recordings of that name are kept.
+        split: the time of the graph after which a new recording begins [s]; zero: never.
+        as_json: whether one JSON object is printed.
+        times: whether the times of blocks are printed.
+        traceback: whether the whole traceback of a block that fails is printed.
+        plain: whether nothing is compiled.
+        fuse: whether blocks of kernels that follow each other are one call.
+        real_time: what the control thread asks of the operating system.
+    """
+
+    record: Path | None = None
+    keep: int = 0
+    split: float = 0.0
+    as_json: bool = False
+    times: bool = True
+    traceback: bool = False
+    plain: bool = False
+    fuse: bool = True
+    real_time: RealTimeOptions | None = None
+
+
 def run_once(
     graph: RunnableGraph,
-    record: Path | None,
+    options: OneRunOptions,
     out: Console,
-    as_json: bool,
+    *,
     sinks: Sequence[Sink] = (),
     viewer: Viewer | None = None,
-    *,
-    keep: int = 0,
-    split: float = 0.0,
     messages: Sequence[str] = (),
     also: Mapping[str, Any] | None = None,
-    times: bool = True,
-    traceback: bool = False,
-    plain: bool = False,
-    fuse: bool = True,
-    real_time: RealTimeOptions | None = None,
 ) -> ExitCode:
     """Run the graph, record and show it, and print the result; ``messages`` are warnings so far,
-    ``also`` is what else the JSON object has, and ``times`` says whether those of blocks are
-    printed."""
+    and ``also`` is what else the JSON object has."""
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
     from ...runtime.running.real_time import NO_REAL_TIME
     from .output import TickCounter, compiling_shown, progress_bar
     from .viewing import how_to_view
 
-    name = graph.checked.name
+    name, record, as_json = graph.checked.name, options.record, options.as_json
     recorder = None
     if record is not None or viewer is not None:
         live = viewer.source if viewer is not None else ""
-        recorder = Recorder(record, keep=keep, split=split, live=live, on_warning=print_warning)
+        recorder = Recorder(
+            record, keep=options.keep, split=options.split, live=live, on_warning=print_warning
+        )
     with (
         progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task),
         compiling_shown(progress),
@@ -96,13 +117,14 @@ def run_once(
         last_words = CrashReporter(name, as_json)
         with FreezeGuard(graph.checked, as_json=as_json) as guard:
             result = graph.run(
-                sinks=[*recorders, counter, last_words, *sinks, guard], log=False, plain=plain,
-                fuse=fuse, real_time=real_time or NO_REAL_TIME,
+                sinks=[*recorders, counter, last_words, *sinks, guard], log=False,
+                plain=options.plain, fuse=options.fuse,
+                real_time=options.real_time or NO_REAL_TIME,
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     problem = recorder.problem if recorder is not None and record is not None else ""
     code = code_with_recording(result.exit_code, problem)
-    print_result(out, name, result, times=times)
+    print_result(out, name, result, times=options.times)
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
         say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
@@ -126,7 +148,7 @@ def run_once(
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=traceback)
+            print_place(result.error, traceback=options.traceback)
     if problem:
         print_error(problem)
     return code

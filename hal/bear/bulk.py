@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...blocks.signals.robot import HEALTHY
-from .bus import BearBus, BusError, register_of
+from .bus import BearBus, BusError, is_answer, register_of
 from .protocol import BROADCAST, HEADER, LONGEST, Instruction, Register, checksum
 
 _LONGEST_LIST = 15
@@ -102,7 +102,7 @@ class BulkExchange:
         received = self._receive(bus.reply_time if reply_time is None else reply_time)
         answered = self._unpack(received)
         if answered < len(self.devices) and received:
-            bus.overhear(memoryview(self._answer)[:received], bytes(self._frame[5:-1]))
+            bus.overhear(memoryview(self._answer)[:received])
         return answered
 
     def _pack(self) -> None:
@@ -164,6 +164,7 @@ class BulkExchange:
                 and answer[start + 1] == 0xFF
                 and answer[start + 2] == device
                 and answer[start + 3] == self._length
+                and is_answer(answer[start + 4])
             ):
                 if checksum(answer[start + 2 : start + size - 1]) == answer[start + size - 1]:
                     return start
@@ -172,8 +173,6 @@ class BulkExchange:
 
     def _is_plausible(self, row: int) -> bool:
         """Whether the answer can be one of this actuator."""
-        if not self._reply[4] & HEALTHY:
-            return False
         numbers, whole, last = self._numbers, self._whole_numbers, self.values[row]
         waited = self.ages.item(row)  # this exchange is counted already
         for column in range(len(self.read)):

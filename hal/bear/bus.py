@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ...blocks.signals.robot import describe_conditions, is_critical
+from ...blocks.signals.robot import HEALTHY, describe_conditions, is_critical
 from ...runtime.language.errors import AloftError
 from .protocol import (
     BROADCAST,
@@ -132,28 +132,26 @@ class BearBus:
         self.now: Callable[[], float] = getattr(port, "now", time.monotonic)
         """The time [s] by which answers are awaited; a port in virtual time has its own."""
         self._reader = FrameReader()
-        self._listener = FrameReader()
 
     def close(self) -> None:
         """Give the port back."""
         self.port.close()
 
-    def overhear(self, received: bytes | bytearray | memoryview, own: bytes | None = None) -> None:
-        """Look for instructions among bytes that are no answers to a question of ours.
-
-        An answer's fifth byte has its highest bit set, an instruction's never. ``own`` is the data
-        of an instruction of ours, if one was sent: some adapters send it back.
-        """
-        for frame in self._listener.feed(received):
-            if _is_instruction(frame) and frame.data != own:
+    def overhear(self, received: bytes | bytearray | memoryview) -> None:
+        """Count the instructions among bytes that are no answers to a question of ours."""
+        reader = FrameReader()
+        for frame in (*reader.feed(received), *reader.finish()):
+            if _is_instruction(frame):
                 self.counts.foreign += 1
 
     def listen(self, seconds: float) -> int:
         """Stay silent and count the instructions that somebody else sends meanwhile."""
         before, end = self.counts.foreign, self.now() + seconds
+        received = bytearray()
         while (left := end - self.now()) > 0.0:
             self.port.timeout = left
-            self.overhear(self.port.read(256))
+            received += self.port.read(256)
+        self.overhear(received)
         return self.counts.foreign - before
 
     def ping(self, device: int) -> Reply:
@@ -248,7 +246,11 @@ class BearBus:
         )
 
     def _try(self, question: bytes, device: int, length: int) -> Reply | None:
-        """The answer with ``length`` bytes of data, or none in time."""
+        """The answer with ``length`` bytes of data, or none in time.
+
+        Raises:
+            BusError: the question itself comes back.
+        """
         self.port.reset_input_buffer()
         self._reader.clear()
         self.port.write(question)
@@ -261,15 +263,29 @@ class BearBus:
                 return None
             self.port.timeout = left
             for frame in self._read_frames(missing):
-                if frame.device == device and len(frame.data) == length:
+                if _is_instruction(frame):
+                    if frame_bytes(frame.device, frame.code, frame.data) == question:
+                        raise BusError(
+                            f"what is sent to actuator {device} comes back: switch off the echo of "
+                            "the adapter, or stop the other program that sends the same"
+                        )
+                    self.counts.foreign += 1
+                elif is_answer(frame.code) and (frame.device, len(frame.data)) == (device, length):
                     return Reply(device, frame.code, frame.data)
-                self.counts.stray += 1
+                else:
+                    self.counts.stray += 1
 
     def _read_frames(self, size: int) -> list[BusFrame]:
         before = self._reader.damaged
         frames = self._reader.feed(self.port.read(size))
         self.counts.damaged += self._reader.damaged - before
         return frames
+
+
+def is_answer(code: int) -> bool:
+    """Whether the fifth byte of a frame is the error byte of an answer and no instruction: the
+    highest bit of an error byte is always set, that of an instruction never."""
+    return bool(code & HEALTHY)
 
 
 def _is_instruction(frame: BusFrame) -> bool:

@@ -18,7 +18,7 @@ from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import TransmissionMap, motor_gains
 from ..drive_control import DriveGoals
-from .bus import BearBus, BusError, Reply, SerialPort
+from .bus import BearBus, BusError, NoReplyError, Reply, SerialPort
 from .configuration import Hardware
 from .motor_loop import MotorLoop
 from .protocol import Mode, Torque
@@ -77,7 +77,7 @@ def find_drives(bus: BearBus, hardware: Hardware) -> dict[str, Reply]:
     for name, motor in hardware.motors.items():
         try:
             found[name] = bus.ping(motor.id)
-        except BusError:
+        except NoReplyError:
             missing.append(f"{name} (address {motor.id})")
     if missing:
         raise BusError(

@@ -77,7 +77,8 @@ class FrameReader:
     """Finds whole frames in a stream of bytes, whatever else is in it.
 
     Bytes that belong to no frame are skipped one by one, so the first good frame behind any amount
-    of garbage is found. At most one frame's bytes are kept between two calls.
+    of garbage is found. At most one frame's bytes are kept between two calls; behind a damaged
+    length these may be other frames, which ``finish`` finds.
 
     Attributes:
         skipped: how many bytes belonged to no frame.
@@ -118,6 +119,15 @@ class FrameReader:
             frames.append(BusFrame(device, pending[start + 4], bytes(pending[start + 5 : end - 1])))
             start = end
         del pending[:start]
+        return frames
+
+    def finish(self) -> list[BusFrame]:
+        """The whole frames inside one that has begun and that no more bytes will complete."""
+        frames = []
+        while self._pending:
+            del self._pending[0]
+            self.skipped += 1
+            frames += self.feed(b"")
         return frames
 
 

@@ -17,6 +17,8 @@ import numpy as np
 from .arguments import ArgumentType, ArrayType, NumberType, RecordType
 
 BOOL, INT, FLOAT = NumberType("bool"), NumberType("int"), NumberType("float")
+_LARGEST_POWER = 8
+"""Greater powers of whole numbers mostly do not fit into 64 bits."""
 _RANK = {"bool": 0, "int": 1, "float": 2}
 _NUMBER = {"bool": "i1", "int": "i64", "float": "double"}
 
@@ -336,11 +338,17 @@ class FunctionCode:
         return r(f"sub i64 {quotient}, {one}")
 
     def _power(self, a: Value, b: Value) -> Value:
+        if a.constant is not None and b.constant is not None:
+            return number(a.constant**b.constant)
+        if b.constant == 1:
+            return self.convert(a, join(INT, a.type))
         if b.constant == 2:
             return self.operation("Mult", a, a)
         if a.kind != "float" and b.kind != "float":
+            if b.constant is not None and 0 < b.constant <= _LARGEST_POWER:
+                return self.operation("Mult", self._power(a, number(b.constant - 1)), a)
             if a.constant != 2 or not (b.counts or b.type == INT):
-                raise Refused("of powers of whole numbers there are x ** 2 and 2 ** n")
+                raise Refused("of powers of whole numbers there are x ** 3 and 2 ** n")
             return Value(INT, (self.result(f"shl i64 1, {b.parts[0]}"),), counts=True)
         x, y = self.convert(a, FLOAT).parts[0], self.convert(b, FLOAT).parts[0]
         return Value(FLOAT, (self.call("pow", "double", f"double {x}", f"double {y}"),))

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.arrays import Indices
+from ...mathematics.arrays import Array, Indices
 from .stage_functions import StageFunction
 
 
@@ -332,3 +332,29 @@ def _positions(pattern: Any, rows: Indices, columns: Indices) -> Indices:
     height = pattern.size1()
     own_rows, own_columns = (np.array(x, dtype=np.int64) for x in pattern.get_triplet())
     return np.asarray(np.searchsorted(own_columns * height + own_rows, columns * height + rows))
+
+
+@dataclass(frozen=True)
+class NonlinearProgram:
+    """What is solved, of every formulation.
+
+    Attributes:
+        assembly: the structure and functions.
+        lower, upper: bounds of the variables.
+        row_lower, row_upper: bounds of the constraint rows.
+        parameters: their values.
+        families: of every constraint row the name of what it asks for.
+    """
+
+    assembly: Assembly
+    lower: Array
+    upper: Array
+    row_lower: Array
+    row_upper: Array
+    parameters: Array
+    families: list[str]
+
+    @property
+    def knots(self) -> int:
+        """The number of knots, one more than intervals."""
+        return len(self.assembly.knots)

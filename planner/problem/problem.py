@@ -21,7 +21,7 @@ from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
 from ..task.task import JumpTask
-from .assembly import Assembly
+from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
 from .obstacles import step_parameters
 from .stage_functions import StageFunction, body_points, parameter_sizes
@@ -39,16 +39,11 @@ def rows_of_each(family: str, low: Array, high: Array) -> list[Rows]:
 
 
 @dataclass(frozen=True)
-class FullProblem:
+class FullProblem(NonlinearProgram):
     """A problem ready to be solved.
 
     Attributes:
-        assembly: the problem's structure and functions.
         stances: where the robot stands at the start, between jumps and at the end.
-        lower, upper: bounds of the variables.
-        row_lower, row_upper: bounds of the constraint rows.
-        parameters: their values.
-        families: of every constraint row the name of what it asks for.
         stretches: the phases with their intervals.
         steps: the interval lengths [s]; by their mean where that is a variable.
         exact: the model of the robot as it is; ``model`` is the same left and right in mirrored
@@ -58,22 +53,10 @@ class FullProblem:
     task: JumpTask
     model: SymbolicModel
     coordinates: Coordinates
-    assembly: Assembly
     stances: tuple[Stance, ...]
-    lower: Array
-    upper: Array
-    row_lower: Array
-    row_upper: Array
-    parameters: Array
-    families: list[str]
     stretches: tuple[ProblemPhase, ...]
     steps: Array
     exact: SymbolicModel
-
-    @property
-    def knots(self) -> int:
-        """The number of knots, one more than intervals."""
-        return len(self.assembly.knots)
 
     @property
     def start(self) -> Stance:
@@ -149,9 +132,9 @@ class ProblemBuilder:
         self.families = ["integration"] * rows
         self.parameters = np.zeros(self.assembly.parameters)
         self.problem = FullProblem(
-            self.task, self.model, self.coordinates, self.assembly, self.stances,
-            self.lower, self.upper, self.row_lower, self.row_upper, self.parameters,
-            self.families, self.stretches, self.steps, self.exact,
+            self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
+            self.parameters, self.families, self.task, self.model, self.coordinates,
+            self.stances, self.stretches, self.steps, self.exact,
         )  # fmt: skip
         fill: Mapping[str, Callable[[int], None]] = {
             "stance": self._fill_stance,

@@ -17,7 +17,7 @@ from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.files import PlanError
 from ..task.task import JumpTask
-from .assembly import Assembly, Knot
+from .assembly import Assembly, Knot, NonlinearProgram
 from .stage_functions import StageFunction
 
 
@@ -121,15 +121,10 @@ def joint_torques(
 
 
 @dataclass(frozen=True)
-class SimpleProblem:
-    """A problem ready to be solved: what ``solver.solve`` reads, on a fixed grid.
+class SimpleProblem(NonlinearProgram):
+    """A problem on a fixed grid, ready to be solved.
 
     Attributes:
-        assembly: the problem's structure and functions.
-        lower, upper: bounds of the variables.
-        row_lower, row_upper: bounds of the constraint rows.
-        parameters: their values.
-        families: of every constraint row the name of what it asks for.
         guess: where the solver begins.
         grid: phases and times of the intervals; in flight by their mean where that is a variable.
         start, end: the stances.
@@ -137,22 +132,10 @@ class SimpleProblem:
 
     task: JumpTask
     model: SymbolicModel
-    assembly: Assembly
-    lower: Array
-    upper: Array
-    row_lower: Array
-    row_upper: Array
-    parameters: Array
-    families: list[str]
     guess: Array
     grid: Grid
     start: Stance
     end: Stance
-
-    @property
-    def knots(self) -> int:
-        """The number of knots, one more than intervals."""
-        return len(self.assembly.knots)
 
     def state(self, values: Array, k: int) -> Array:
         """The states of a knot."""
@@ -211,7 +194,7 @@ class BoundsBuilder:
              ) -> SimpleProblem:  # fmt: skip
         """The program."""
         return SimpleProblem(
-            task, model, self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
-            self.parameters, self.families, np.clip(self.guess, self.lower, self.upper), grid,
-            start, end,
+            self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
+            self.parameters, self.families, task, model,
+            np.clip(self.guess, self.lower, self.upper), grid, start, end,
         )  # fmt: skip

@@ -6,12 +6,12 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..problem.assembly import Assembly
+from ..problem.assembly import Assembly, NonlinearProgram
 from .solver_process import call_bounded, call_solver, cpu_time, quiet
 
 VIOLATION = 1e-6
@@ -30,45 +30,6 @@ PUSH = 1e-6
 """How far a start near a solution is moved away from bounds."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
-
-
-class NonlinearProgram(Protocol):
-    """What is solved: of every formulation the structure, bounds and parameters."""
-
-    @property
-    def assembly(self) -> Assembly:
-        """Variables, rows and their functions."""
-        ...
-
-    @property
-    def lower(self) -> Array:
-        """Bounds of the variables."""
-        ...
-
-    @property
-    def upper(self) -> Array:
-        """Bounds of the variables."""
-        ...
-
-    @property
-    def row_lower(self) -> Array:
-        """Bounds of the constraint rows."""
-        ...
-
-    @property
-    def row_upper(self) -> Array:
-        """Bounds of the constraint rows."""
-        ...
-
-    @property
-    def parameters(self) -> Array:
-        """Values of the parameters."""
-        ...
-
-    @property
-    def families(self) -> list[str]:
-        """What every constraint row asks for."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,10 @@
 
 Of a COLLADA file nodes, their transforms, and instances of geometries are followed; skins, lights and colours
 are not. As in RViz and other readers of URDF, the file's unit counts and its up axis does not.
+
+This reads all 777 meshes of example-robot-data. Of libraries, pycollada refuses one that lacks a texture, which
+trimesh, 0.8 s to import, takes for empty; Assimp by way of Coal gives 102 other surfaces; fast-simplification leaves
+more triangles than asked for where a part consists of many pieces.
 """
 
 from __future__ import annotations

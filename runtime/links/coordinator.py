@@ -166,6 +166,25 @@ class TickMessage:
     data: Mapping[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class PartLinks:
+    """The ends of all links of a part.
+
+    Attributes:
+        transport: what carries the messages.
+        receivers: the ends that receive.
+        senders: the ends that send, by the link's name.
+        declare: declares all links to the transport; it is called once the transport is open.
+        watch: watches the links that bring commands.
+    """
+
+    transport: Transport
+    receivers: Sequence[LockstepReceiver | LatestReceiver]
+    senders: Mapping[str, LinkOutput]
+    declare: Callable[[], None]
+    watch: CommandWatch
+
+
 class LockstepCoordinator(Block):
     """The block of the runtime that starts first and ends each tick last.
 
@@ -180,38 +199,28 @@ class LockstepCoordinator(Block):
     def connect(
         self,
         peers: PeerStates,
-        transport: Transport,
-        receivers: Sequence[LockstepReceiver | LatestReceiver],
-        senders: Mapping[str, LinkOutput],
+        links: PartLinks,
         parameters: DistributedParameters,
         *,
         clock: PartClock,
-        on_open: Callable[[], None],
         timeout: float,
         connect_timeout: float,
-        watch: CommandWatch,
-        moves: bool = False,
-        elsewhere: Mapping[str, str] | None = None,
+        moves: bool,
+        elsewhere: Mapping[str, str],
     ) -> None:
-        """Take what it needs: the other parts, and the ends of all links, senders by the link's name.
+        """Take what the coordinator needs of its part.
 
         Args:
-            on_open: declares the links; it is called once the transport is open.
             timeout: the seconds to wait for a message.
-            connect_time: the seconds to wait for the other parts to start.
-            watch: watches the links that bring commands.
+            connect_timeout: the seconds to wait for the other parts to start.
             moves: whether this part has actuators.
             elsewhere: which machine runs each block that is not here.
         """
-        self.moves, self.elsewhere = moves, elsewhere or {}
-        self._watch = watch
         self.peers = peers
-        self._transport = transport
-        self._receivers = receivers
-        self._senders = senders
+        self._links = links
         self._parameters = parameters
         self._clock = clock
-        self._on_open = on_open
+        self.moves, self.elsewhere = moves, elsewhere
         self._timeout, self._connect_timeout = timeout, connect_timeout
         self._publishers: dict[str, MessageCallback] = {}
         self._mail: dict[str, Mailbox[TickMessage]] = {}
@@ -225,7 +234,7 @@ class LockstepCoordinator(Block):
         self._opened = True
         self.peers.open()
         self.listen()
-        self._on_open()
+        self._links.declare()
         self.peers.reach_phase(PartPhase.HELLO, self._connect_timeout)
         self.peers.reach_phase(PartPhase.LINKED, self._connect_timeout, before=self._all_links_work)
 
@@ -235,19 +244,25 @@ class LockstepCoordinator(Block):
             box: Mailbox[TickMessage] = Mailbox(lambda: self.peers.check(self._tick))
             self._mail[name] = box
             self.peers.mailboxes.append(box.wake)
-            self._publishers[name] = self._transport.publisher(tick_key(self.peers.machine, name))
-            self._transport.subscribe(tick_key(name, self.peers.machine), self._listener(name, box))
+            self._publishers[name] = self._links.transport.publisher(
+                tick_key(self.peers.machine, name)
+            )
+            self._links.transport.subscribe(
+                tick_key(name, self.peers.machine), self._listener(name, box)
+            )
 
     def _all_links_work(self) -> bool:
         """Send a message through each link that has not been heard; whether all were, both ways."""
         waiting = [
             sender
-            for link, sender in self._senders.items()
+            for link, sender in self._links.senders.items()
             if not any(self.peers.has_checked(name, link) for name in self.peers.names)
         ]
         for sender in waiting:
             sender.probe()
-        return not waiting and all(self.peers.checked(box.link.name) for box in self._receivers)
+        return not waiting and all(
+            self.peers.checked(box.link.name) for box in self._links.receivers
+        )
 
     def reach_phase(self, phase: PartPhase) -> None:
         """Wait until all parts have started those blocks that ``phase`` says."""
@@ -401,7 +416,7 @@ class LockstepCoordinator(Block):
             try:
                 self.peers.wait_for_rest(REST_TIMEOUT, self.context.clock.tick)
             finally:
-                self._transport.close()
+                self._links.transport.close()
 
 
 class FaultReporter:
@@ -489,7 +504,7 @@ class FreeRunningCoordinator(LockstepCoordinator):
             PeerError: another part failed.
         """
         clock = self._clock
-        ended = self.peers.ended() or self._watch.complaint()
+        ended = self.peers.ended() or self._links.watch.complaint()
         if ended:
             clock.stop_reason = ended
         if clock.stop_request is not None:

@@ -32,6 +32,7 @@ from .coordinator import (
     FreeRunningCoordinator,
     LockstepCoordinator,
     PartClock,
+    PartLinks,
     StartBarrier,
 )
 from .free_link import TICK_TIME, LatestReceiver, LinkMonitor, TickTime, health_path
@@ -162,13 +163,20 @@ class BoundPart(BoundGraph):
         self.watch = CommandWatch(placed, machine, self.receivers, clock)
         if self.watch.links:
             own_clock.heard, own_clock.command_limit = self.watch.heard, self.watch.limit
+        senders = {
+            link.name: self._block(sender_path(link), LinkOutput)
+            for link in placed.sent_by(machine)
+        }
         coordinator.connect(
-            self.peers, transport, self.receivers,
-            {link.name: self._block(sender_path(link), LinkOutput) for link in placed.sent_by(machine)},
-            self.parameters, clock=own_clock, on_open=self.open_links, timeout=timeout,
-            connect_timeout=connect_timeout, moves=bool(self._moving()), watch=self.watch,
+            self.peers,
+            PartLinks(transport, self.receivers, senders, self.open_links, self.watch),
+            self.parameters,
+            clock=own_clock,
+            timeout=timeout,
+            connect_timeout=connect_timeout,
+            moves=bool(self._moving()),
             elsewhere={s.path: s.machine for s in placed.graph.blocks if s.machine != machine},
-        )  # fmt: skip
+        )
         self.coordinator = coordinator
         self.blocks = self._in_order_of_start()
 

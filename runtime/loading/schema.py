@@ -13,17 +13,17 @@ from typing import Any
 from ..language.block import Block
 from ..language.registry import all_blocks
 from ..transports.registry import endpoint_pattern
-from .reading.written import CLOCK_KEYS
+from .reading.written import CLOCK_KEYS, SOURCE_KEYS
 
 Schema = dict[str, Any]
 
 _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "a parameter's value"}
-_TOLD: Schema = {
+_EXPORTED: Schema = {
     "type": "object",
     "additionalProperties": False,
     "required": ["from"],
     "properties": {"from": {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_/]*\\.[A-Za-z_]"}},
-    "description": "what another block tells: {from: block.name}",
+    "description": "a value that another block exports: {from: block.name}",
 }
 _RATE: Schema = {
     "anyOf": [
@@ -49,7 +49,7 @@ _LIST: Schema = {
 }
 _FIELDS: Schema = {
     "type": "object",
-    "propertyNames": {"not": {"enum": ["from", "delay", "initial", "allow"]}},
+    "propertyNames": {"not": {"enum": list(SOURCE_KEYS)}},
     "additionalProperties": {"anyOf": [_ITEM, _LIST]},
     "minProperties": 1,
     "description": "a source for every field of the input",
@@ -260,7 +260,7 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
     for key, schema in _relocate(model.get("properties", {}), name).items():
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
-        options = [schema, _REFERENCE, _TOLD]
+        options = [schema, _REFERENCE, _EXPORTED]
         if schema.pop("unit", ""):  # a text with a unit may stand for each number, also in a list
             per_joint = "PerJoint" in json.dumps(schema)
             inside = {"type": "object"} if per_joint else {"type": "array"}

@@ -19,7 +19,14 @@ from ....robots.description import RobotDescription
 from ...language.parameters import Parameters
 from ...language.quantities import quantity_of
 from ...language.signals import Field, Signal
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
+from ..flattening.flat import (
+    FlatBlock,
+    FlatGraph,
+    FlatWire,
+    WireElement,
+    WirePart,
+    plain_part,
+)
 from ..reading.selection import Selection, runs, select
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, part_signal, read_values
@@ -100,10 +107,10 @@ class _WireComposer:
             return None
         return self._draft()
 
-    def _by_field(self) -> dict[str, WirePart] | None:
+    def _by_field(self) -> dict[str, WirePart[WireElement]] | None:
         """The parts by the reader's fields."""
         fields = self.signal.fields
-        found: dict[str, WirePart] = {}
+        found: dict[str, WirePart[WireElement]] = {}
         for part in self.wire.parts:
             name = part.field
             if not name:
@@ -113,8 +120,8 @@ class _WireComposer:
                         f"{self.at} has several fields, and one source is given for it",
                         part.where,
                         expected=f"{{{example}}}, with a source for each of {listing(fields)}",
-                        found=text_of(part.plain()),
-                        fix=f"{self.name}: {{{next(iter(fields))}: {text_of(part.plain())}, ...}}",
+                        found=text_of(plain_part(part)),
+                        fix=f"{self.name}: {{{next(iter(fields))}: {text_of(plain_part(part))}, ...}}",
                     )
                     return None
                 name = next(iter(fields))
@@ -126,7 +133,7 @@ class _WireComposer:
                     expected=listing(fields),
                     found=name,
                     nearest=similar,
-                    fix=f"{similar[0]}: {text_of(part.plain())}" if similar else "",
+                    fix=f"{similar[0]}: {text_of(plain_part(part))}" if similar else "",
                 )
                 return None
             found[name] = part
@@ -142,7 +149,7 @@ class _WireComposer:
             return None
         return found
 
-    def _constant(self, parts: Mapping[str, WirePart]) -> FlatWire | None:
+    def _constant(self, parts: Mapping[str, WirePart[WireElement]]) -> FlatWire | None:
         """The wire of numbers alone."""
         if self.wire.delay:
             self._report(
@@ -155,7 +162,7 @@ class _WireComposer:
         )
         return FlatWire("", self.wire.where, constant=MapNode(entries, self.wire.where))
 
-    def _part(self, name: str, part: WirePart) -> None:
+    def _part(self, name: str, part: WirePart[WireElement]) -> None:
         """Add the pieces of one of the reader's fields."""
         field = self.signal.fields[name]
         shape: tuple[int, ...] = ()

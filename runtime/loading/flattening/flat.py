@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from ....files.nodes import Entry, MapNode, Node, plain, text_of
 from ....files.problems import Position
@@ -14,6 +14,7 @@ from ...language.stages import HasSource
 from ..reading.selection import WHOLE, Selection
 
 _WIDTH = 100
+Item = TypeVar("Item")
 ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
 """The endings by which the name of a robot is taken for a file, relative to the graph."""
 
@@ -36,18 +37,17 @@ class WireElement:
 
 
 @dataclass(frozen=True)
-class WirePart:
-    """What one field of an input is made of; ``field`` is empty for its only one."""
+class WirePart(Generic[Item]):
+    """What one field of an input is made of: one item, or a list of several one behind another.
+
+    ``field`` is empty for the input's only field. Items are wires as they are written, and elements
+    once sub-graphs are expanded.
+    """
 
     field: str
     where: Position
-    items: tuple[WireElement, ...]
+    items: tuple[Item, ...]
     is_list: bool = False
-
-    def plain(self) -> Any:
-        """The part as a graph file says it."""
-        items = [item.plain() for item in self.items]
-        return items if self.is_list else items[0]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class FlatWire(HasSource):
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
-    parts: tuple[WirePart, ...] = ()
+    parts: tuple[WirePart[WireElement], ...] = ()
     shown: str = ""
     """What stands in the graph in place of ``source``, where loading has put a block between."""
 
@@ -84,8 +84,8 @@ class FlatWire(HasSource):
         source: Any = self.source
         if self.parts:
             one = len(self.parts) == 1 and not self.parts[0].field
-            source = {part.field: part.plain() for part in self.parts}
-            source = self.parts[0].plain() if one else source
+            fields = {part.field: plain_part(part) for part in self.parts}
+            source = fields[""] if one else fields
         if not self.delay and not self.truth:
             return source
         data: dict[str, Any] = {"from": source}
@@ -96,6 +96,12 @@ class FlatWire(HasSource):
         if self.truth:
             data["allow"] = "truth"
         return data
+
+
+def plain_part(part: WirePart[WireElement]) -> Any:
+    """The part as a graph file says it."""
+    items = [item.plain() for item in part.items]
+    return items if part.is_list else items[0]
 
 
 @dataclass(frozen=True)

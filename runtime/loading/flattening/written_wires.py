@@ -10,7 +10,8 @@ from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, te
 from ....files.problems import Code, Position, Problems, nearest
 from ...language.units import QUANTITY
 from ..reading.selection import WHOLE, Selection, read_selection
-from ..reading.written import WIRE_KEYS, unknown_key, wrong_kind
+from ..reading.written import SOURCE_KEYS, WIRE_KEYS, unknown_key, wrong_kind
+from .flat import WirePart
 
 _EXAMPLE = "block.port, block.port.field[2], or {from: block.port, delay: 1}"
 _ITEM_EXAMPLE = "block.port, block.port.field[2], or a number"
@@ -33,20 +34,7 @@ class WrittenWire:
     constant: MapNode | None = None
     selection: Selection = WHOLE
     literal: Node | None = None
-    parts: tuple[WrittenWirePart, ...] = ()
-
-
-@dataclass(frozen=True)
-class WrittenWirePart:
-    """What one field of an input is made of: one source, or a list of several one behind another.
-
-    ``field`` is empty for the only field of the input.
-    """
-
-    field: str
-    where: Position
-    items: tuple[WrittenWire, ...]
-    is_list: bool = False
+    parts: tuple[WirePart[WrittenWire], ...] = ()
 
 
 def read_wire(
@@ -96,12 +84,11 @@ def read_wire(
 
 def _is_by_field(keys: Mapping[str, Entry]) -> bool:
     """Whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
-    if not keys or any(key in ("from", "delay", "initial", "allow") for key in keys):
+    if not keys or any(key in SOURCE_KEYS for key in keys):
         return False
     if any(isinstance(entry.value, MapNode) for entry in keys.values()):
         return False
-    keywords = ("from", "delay", "initial", "allow")
-    return not any(get_close_matches(key, keywords, cutoff=0.74) for key in keys)
+    return not any(get_close_matches(key, SOURCE_KEYS, cutoff=0.74) for key in keys)
 
 
 def _read_fields(
@@ -142,12 +129,12 @@ def _read_part(
     instance: str | None,
     at: str,
     problems: Problems,
-) -> WrittenWirePart | None:
+) -> WirePart[WrittenWire] | None:
     if _all_numbers(node):
-        return WrittenWirePart(field, node.where, (WrittenWire(node.where, literal=node),))
+        return WirePart(field, node.where, (WrittenWire(node.where, literal=node),))
     if isinstance(node, ScalarNode):
         link = _read_source(node, prefix, instance, at, problems)
-        return WrittenWirePart(field, node.where, (link,)) if link is not None else None
+        return WirePart(field, node.where, (link,)) if link is not None else None
     items = []
     for item in node.items:
         if not isinstance(item, ScalarNode):
@@ -160,7 +147,7 @@ def _read_part(
         if link is None:
             return None
         items.append(link)
-    return WrittenWirePart(field, node.where, tuple(items), is_list=True)
+    return WirePart(field, node.where, tuple(items), is_list=True)
 
 
 def is_number(node: ScalarNode) -> bool:

@@ -31,7 +31,8 @@ SUBGRAPH_KEYS = ("inputs", "outputs", "parameters")
 COMMON_KEYS = ("include", "blocks", "wires", "set")
 BLOCK_KEYS = ("use", "with", "in", "rate", "offset", "on")
 CLOCK_KEYS = ("kind", "overrun", "stop_after", "hangs_after")
-WIRE_KEYS = ("from", "delay", "initial", "allow", "value")
+SOURCE_KEYS = ("from", "delay", "initial", "allow")
+WIRE_KEYS = (*SOURCE_KEYS, "value")
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*$")
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from aloft.hal.bear.bulk import BulkExchange
-from aloft.hal.bear.bus import BearBus, BusError
-from aloft.hal.bear.protocol import FrameReader, Instruction
-from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus
+from aloft.hal.bear.bus import BearBus, BusError, open_port
+from aloft.hal.bear.protocol import STATUS, FrameReader, Instruction, frame_bytes
+from aloft.hal.twin.devices import EmulatedActuator, EmulatedBus, unchanged
+from aloft.hal.twin.server import PseudoTerminal
 from aloft.runtime.testing.allocations import count_array_allocations
 
 from .virtual_wire import VirtualWire
@@ -95,6 +96,31 @@ def test_damaged_and_shortened_answers_are_left_out() -> None:
         emulated.fault = lambda device, answer: answer
         assert bulk.exchange() == 10
         assert bulk.values[:, 0].tolist() == [0.25 * k for k in range(1, 11)]
+
+
+def test_an_instruction_of_another_master_costs_only_the_answer_that_it_displaces() -> None:
+    """A write of four registers is as long as an answer with five."""
+    emulated = EmulatedBus(EmulatedActuator(device) for device in (1, 2, 3))
+    for actuator in emulated.actuators.values():
+        actuator.status["present_position"] = 0.25 * actuator.device
+    values = {name: (STATUS[name], 1.0) for name in (*WRITE, "goal_id")}
+    data = b"".join(bytes((each.address,)) + each.pack(x) for each, x in values.values())
+    write_four = frame_bytes(1, Instruction.WRITE_STATUS, data)
+    with PseudoTerminal(emulated.receive) as terminal:
+        bus = BearBus(open_port(terminal.path), reply_time=0.5)
+        bulk = BulkExchange(bus, (1, 2, 3), (*READ, "input_voltage", "winding_temperature"), WRITE)
+        assert bulk.exchange() == 3
+        emulated.fault = lambda device, answer: write_four + answer if device == 1 else answer
+        for device, actuator in emulated.actuators.items():
+            actuator.status["present_position"] = 0.5 * device
+        assert bulk.exchange() == 2
+        assert bulk.values[:, 0].tolist() == [0.5, 1.0, 0.75] and bulk.ages.tolist() == [0, 0, 1]
+        assert (bus.counts.foreign, bus.counts.damaged, bus.counts.silent) == (1, 0, 1)
+        emulated.fault = unchanged
+        assert bulk.exchange() == 3
+        assert bulk.values[:, 0].tolist() == [0.5, 1.0, 1.5]
+        assert (bus.counts.foreign, bus.counts.damaged, bus.counts.silent) == (1, 0, 1)
+        bus.close()
 
 
 def test_an_answer_that_cannot_be_is_none() -> None:

@@ -1,6 +1,8 @@
 """Questions and answers on a bus of emulated actuators behind a real pseudo-terminal."""
 
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -137,13 +139,53 @@ def test_only_sensible_instructions_are_somebody_elses(
 ) -> None:
     bus = BearBus(VirtualWire(EmulatedBus([EmulatedActuator(1)])))
     data = bytes(range(size))
-    bus.overhear(frame_bytes(device, code, data))
+    frame = frame_bytes(device, code, data)
+    bus.overhear(frame)
     assert bus.counts.foreign == int(sensible)
-    # some adapters send back what was sent
-    bus.overhear(frame_bytes(device, code, data), own=data)
-    assert bus.counts.foreign == int(sensible)
-    bus.overhear(frame_bytes(device, code, data), own=b"other data")
+    bus.overhear(b"\xff\xff\x01\xfa" + frame + b"noise")  # behind a beginning that has no end
     assert bus.counts.foreign == 2 * int(sensible)
+
+
+READ_FOUR = frame_bytes(1, READ, b"\x01\x02\x03\x04")
+"""An instruction of another master, as long as the answer with the value of one register."""
+
+
+def test_an_instruction_of_another_master_is_no_answer(bus: BearBus, emulated: EmulatedBus) -> None:
+    emulated.actuators[1].config["limit_i_max"] = 30.0
+    emulated.fault = lambda device, answer: READ_FOUR + answer
+    assert bus.read(1, "limit_i_max") == {"limit_i_max": 30.0}
+    assert (bus.counts.foreign, bus.counts.stray, bus.counts.damaged) == (1, 0, 0)
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 100])
+@pytest.mark.parametrize("before", [b"", b"noise", b"\xff\xff\x01\xfa", b"\xff\xff"])
+def test_listening_hears_what_comes_in_pieces_and_behind_noise(before: bytes, size: int) -> None:
+    sent = before + 3 * READ_FOUR
+    with PseudoTerminal(lambda data: b"") as terminal:
+        bus = BearBus(open_port(terminal.path))
+        pieces = [sent[start : start + size] for start in range(0, len(sent), size)]
+
+        def send() -> None:
+            for piece in pieces:
+                terminal.send(piece)
+                time.sleep(1e-3)
+
+        with ThreadPoolExecutor(1) as pool:
+            sending = pool.submit(send)
+            heard = bus.listen(0.5)
+            sending.result()
+        assert heard == 3
+        assert bus.listen(0.01) == 0
+        bus.close()
+
+
+def test_an_adapter_that_sends_back_what_is_sent_is_refused(emulated: EmulatedBus) -> None:
+    with PseudoTerminal(lambda data: data + emulated.receive(data)) as terminal:
+        bus = BearBus(open_port(terminal.path), reply_time=0.5)
+        with pytest.raises(BusError, match="what is sent to actuator 2 comes back: switch off the"):
+            bus.ping(2)
+        assert bus.counts.foreign == 0
+        bus.close()
 
 
 def test_answers_of_others_are_stray() -> None:

@@ -7,6 +7,7 @@ pseudo-terminals is in this one. All policies are to hold, so only the watchdog 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -76,7 +77,8 @@ def test_a_controller_that_is_killed_or_stands_still(
     bench.wait_for(3)
     found = result(parts["onboard"])
     # On a loaded machine the drives' own watchdog may be seen before the part gives up waiting.
-    assert "900 ms" in found["reason"] or "watchdog ran out" in found["reason"], found
+    late = re.search(r"\b9\d\d ms", found["reason"])
+    assert late or "watchdog ran out" in found["reason"], found
     assert found["metrics"]["drives_at_end"] == "damped"
 
 

@@ -67,6 +67,7 @@ def whole_numbers(a: int, b: int, out: Array) -> None:
     out[5] = -a
     out[6] = 2 ** abs(b) + b**2
     out[7] = int(a / b)
+    out[8] = a**3 - b**5 + 10**13
 
 
 @kernel
@@ -100,7 +101,7 @@ _compiled: dict[Any, MachineCode] = {}
 
 def compare(function: Callable[..., None], *numbers: float) -> None:
     """Compile once, and compare for many numbers."""
-    out, expected = np.zeros(8), np.zeros(8)
+    out, expected = np.zeros(9), np.zeros(9)
     arguments = (*numbers, out)
     if function not in _compiled:
         signature = tuple(type_of(each) for each in arguments)

@@ -19,6 +19,7 @@ from aloft.planner.checking.plan_tests import (
     _standing_knots,
     active_limits,
     allowed_motor_torque,
+    interval_defects,
 )
 from aloft.planner.checking.replay import replay
 from aloft.planner.checking.validity import PlanTest, check_plan
@@ -472,3 +473,13 @@ def test_the_hardest_motors_are_named(by_hand: PlannedJump, evidence: Evidence) 
     assert half["motor_speed"].limit == pytest.approx(
         1.01 * 0.5 * ROBOT.motors.no_load_speed[motor]
     )
+
+
+def test_what_one_interval_may_err_is_as_documented(evidence: Evidence) -> None:
+    found = {each.name: (each.limit, each.unit) for each in interval_defects(evidence)}
+    assert found == {
+        "position_defect": (1e-3, "m"),
+        "rotation_defect": (pytest.approx(np.radians(0.5)), "rad"),
+        "velocity_defect": (0.05, "m/s"),
+        "angular_velocity_defect": (0.5, "rad/s"),
+    }

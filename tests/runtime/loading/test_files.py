@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.loading import check
+from aloft.runtime.loading.reading.files import addresses_like
 
 ROOT = Path(__file__).parents[3]
 PART = "inputs: {u: a signal}\noutputs: {y: gain.y}\nblocks:\n  gain: {use: blocks.Gain}\n"
@@ -81,3 +82,10 @@ def test_a_graph_with_a_key_too_many_is_a_graph(tmp_path: Path) -> None:
     assert any(
         "'inputs' belongs to the file of a sub-graph" in p.message for p in check(path).problems
     )
+
+
+def test_addresses_like_a_missing_file_are_its_own_or_the_nearest() -> None:
+    for name in ("jump.yaml", "graphs/jump.yaml", "graphs/jump", "aloft:jump"):
+        assert addresses_like(Path(name)) == ("aloft:jump",)
+    assert "aloft:jump" in addresses_like(Path("jmup.yaml"))
+    assert addresses_like(Path("nothing_of_the_kind_at_all.yaml")) == ()

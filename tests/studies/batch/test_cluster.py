@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import pytest
 
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.batch.jobs import JobResult, run_jobs, running_loop
+from aloft.studies.batch.jobs import JobResult, job_results, running_loop
 
 from ...local_cluster import local_cluster
 
@@ -29,8 +29,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def results(function: object, jobs: object, address: str) -> dict[int, JobResult]:
-    found: list[JobResult] = []
-    run_jobs(function, jobs, cluster=address, on_result=found.append)  # type: ignore[arg-type]
+    found = list(job_results(function, jobs, cluster=address))  # type: ignore[arg-type]
     assert len({result.index for result in found}) == len(found)
     return {result.index: result for result in found}
 

@@ -16,12 +16,11 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.units import parse_unit
-from aloft.studies.batch.jobs import JobResult, attempt, job_results, processors, run_jobs
+from aloft.studies.batch.jobs import JobResult, attempt, job_results, processors
 
 
 def results(function: Any, jobs: Any, workers: int = 2) -> dict[int, JobResult]:
-    found: list[JobResult] = []
-    run_jobs(function, jobs, workers=workers, on_result=found.append)
+    found = list(job_results(function, jobs, workers=workers))
     assert len({result.index for result in found}) == len(found)
     return {result.index: result for result in found}
 
@@ -118,13 +117,10 @@ def test_a_result_that_cannot_be_sent_is_an_error() -> None:
     assert found[0].error.startswith("the result cannot be sent: cannot pickle")
 
 
-def test_what_on_result_raises_stops_the_jobs() -> None:
-    def refuse(result: JobResult) -> None:
-        raise KeyboardInterrupt
-
+def test_closing_the_results_stops_the_jobs() -> None:
     started = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        run_jobs(time.sleep, [0.0, 300.0, 300.0, 300.0], workers=2, on_result=refuse)
+    with closing(job_results(time.sleep, [0.0, 300.0, 300.0, 300.0], workers=2)) as found:
+        assert next(found) == JobResult(0, None, "")
     assert time.monotonic() - started < 300.0
 
 
@@ -140,8 +136,8 @@ def test_processors() -> None:
 def test_a_script_without_a_guard_is_told(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
-        "import math\nfrom aloft.studies.batch.jobs import run_jobs\n"
-        "run_jobs(math.sqrt, [1.0] * 50, workers=2, on_result=print)\n"
+        "import math\nfrom aloft.studies.batch.jobs import job_results\n"
+        "list(job_results(math.sqrt, [1.0] * 50, workers=2))\n"
     )
     done = subprocess.run(
         [sys.executable, script], capture_output=True, check=False, text=True, timeout=240
@@ -162,13 +158,13 @@ def work(seconds):
 # Python that is started so never raises KeyboardInterrupt. The parent therefore asks for it.
 PARENT = """
 import signal, sys
-from aloft.studies.batch.jobs import run_jobs
+from aloft.studies.batch.jobs import job_results
 from work import work
 if __name__ == "__main__":
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         print("go", flush=True)
-        run_jobs(work, [600.0] * 4, workers=2, on_result=print)
+        list(job_results(work, [600.0] * 4, workers=2))
     except KeyboardInterrupt:
         sys.exit(130)
 """

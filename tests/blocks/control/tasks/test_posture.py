@@ -54,6 +54,27 @@ def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
     assert chosen_joints(held, PostureParameters()) == [5]
 
 
+def test_only_held_joints_stay_at_their_angle_and_weights_go_by_pattern():
+    robot = BRUCE.changed(held={"left_hip_yaw": 0.1})
+    params = PostureParameters(
+        joints=["left_hip_*"], posture_weight={"*": 1.0, "*_yaw": 3.0}, posture_stiffness=50.0
+    )
+    names = [robot.joints[joint].name for joint in chosen_joints(robot, params)]
+    n = len(names)
+    task = SimpleNamespace(
+        params=params, robot=robot, rows=SimpleNamespace(desired=np.zeros(n)),
+        weight=np.zeros(n), stiffness=np.zeros(n), damping=np.zeros(n),
+    )  # fmt: skip
+    Posture.setup(task)
+    Posture.prepare(task)
+    assert n > 1 and "left_hip_yaw" in names
+    for row, name in enumerate(names):
+        held = name == "left_hip_yaw"
+        assert task.chosen.held[row] == held and task.chosen.angle[row] == (0.1 if held else 0.0)
+        assert task.weight[row] == (3.0 if name.endswith("_yaw") else 1.0)
+    assert task.stiffness.tolist() == [50.0] * n
+
+
 def test_a_pattern_that_matches_no_joint_is_an_unmet_requirement():
     entry = {"task": "Posture", "gains": {"joints": ["*_ankle", "tail"]}}
     with pytest.raises(BlockError, match="task Posture: no joint of bruce is called 'tail'; there"):
