@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import aloft
 from aloft.cli.blocks import all_references, reference_page
 from aloft.robots.description import find_robot
+from aloft.runtime.language.block import Block
 from aloft.runtime.loading import LoadError
 
 ROOT = Path(__file__).parent.parent
@@ -192,3 +194,19 @@ def test_the_readme_shows_files_that_are_there() -> None:
     text = (ROOT / "README.md").read_text()
     for path in re.findall(r"`([\w/]+\.(?:py|yaml|md))`", text):
         assert (ROOT / path).is_file(), path
+
+
+def test_the_tutorial_has_every_method_that_a_block_may_define() -> None:
+    table = (
+        (ROOT / "docs" / "tutorial.md").read_text().split("| method | when |")[1].split("\n\n")[0]
+    )
+    named = [
+        name for row in table.splitlines()[2:] for name in re.findall(r"`(\w+)`", row.split("|")[1])
+    ]
+    own = {"is_moore", "request_stop"}  # to be called, not to be defined
+    defined = {
+        name
+        for name, value in vars(Block).items()
+        if not name.startswith("_") and isinstance(value, FunctionType | classmethod)
+    }
+    assert sorted(named) == sorted(defined - own)
