@@ -59,6 +59,8 @@ if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-buil
     echo "the packages could not be installed within $limit s: nothing is tested with $which on $python"
     exit 0
 fi
+# where the environment forbids to write bytecode, every process of the tests would compile all sources
+"$folder/bin/python" -m compileall -q -x '/(\.venv|build|tests)/' .
 echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
     --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
