@@ -128,12 +128,15 @@ def test_without_acknowledgements_what_is_lost_stays_lost() -> None:
     try:
         second.subscribe("data/a/b/x", received.append)
         assert wait_for(lambda: knows(first, "data/a/b/x"))
-        put = first.publisher("data/a/b/x")
-        for number in range(200):
-            put(bytes([number]))
-        assert wait_for(lambda: len(received) > 100)
+        put, sent = first.publisher("data/a/b/x"), 0
+        while len(received) <= 100 and sent < 10_000:  # a busy machine may drop some as well
+            for _ in range(20):
+                put(sent.to_bytes(2, "big"))
+                sent += 1
+            wait_for(lambda: len(received) > 100, 0.05)
+        assert len(received) > 100
         assert not any(peer.unconfirmed for peer in first._peers.values())
-        assert len({bytes(data) for data in received}) < 200
+        assert len({bytes(data) for data in received}) < sent
     finally:
         first.close()
         second.close()
