@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..runtime.loading import load_text
 from ..runtime.running.executor import Executor
 from ..runtime.running.timing import FIRST_TIMED
+from .loading import chain
 from .rows import Row, compare, take_turns
 
 COUNT = 1_000
@@ -31,9 +32,10 @@ WARM_TICKS = FIRST_TIMED + TICKS
 """After its first ticks a run reads the clock in some ticks only."""
 GOAL, COMPILE_GOAL = 3.0, 5.0
 BLOCKS = {
-    "Gain": "{use: blocks.Gain, with: {gain: 1.001}",
-    "MovingAverage": f"{{use: blocks.MovingAverage, with: {{samples: {SAMPLES}}}",
+    "Gain": "use: blocks.Gain, with: {gain: 1.001}",
+    "MovingAverage": f"use: blocks.MovingAverage, with: {{samples: {SAMPLES}}}",
 }
+SOURCE = "use: blocks.Constant, with: {value: [1.5]}"
 C_SOURCE = f"""
 struct block {{ const double *u; double *y; double gain; long samples, count; double window[{SAMPLES}]; }};
 typedef void step(struct block *);
@@ -71,16 +73,9 @@ print(time.process_time() - start)
 Case = Callable[[int], object]
 
 
-def chain(name: str) -> str:
-    """The graph file of a chain."""
-    lines = ["rate: 1 kHz", "blocks:", "  b0: {use: blocks.Constant, with: {value: [1.5]}}"]
-    lines += [f"  b{k}: {BLOCKS[name]}, in: {{u: b{k - 1}.y}}}}" for k in range(1, COUNT + 1)]
-    return "\n".join(lines) + "\n"
-
-
 def executor(name: str) -> Executor:
     """The chain, ready to start: with times and the check for finite values, as every run has."""
-    graph = load_text(chain(name), Path("chain.yaml"))
+    graph = load_text(chain(COUNT, BLOCKS[name], SOURCE), Path("chain.yaml"))
     return Executor(graph, log=False, run_hash=False)
 
 
@@ -100,41 +95,40 @@ def general_blocks(rounds: int = 40) -> list[Row]:
     Raises:
         AssertionError: a chain computes other bits than the calls in C.
     """
-    compiler = next(
-        (c for c in (os.environ.get("CC", "cc"), "gcc", "clang") if shutil.which(c)), None
-    )
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
+        library = _library(Path(folder))
         for name in BLOCKS:
             fused, in_c = f"{COUNT:,} {name}, fused", f"{COUNT:,} {name}, calls in C"
             running = executor(name)
             running.start()
+            running.ticker.advance(WARM_TICKS)
             cases: dict[str, Case] = {fused: running.ticker.advance}
-            if compiler is not None:
-                cases[in_c], signals = calls_in_c(name, _library(compiler, Path(folder), name))
-                for case in cases.values():
-                    case(WARM_TICKS)
-                blocks: list[Any] = [running.bound.blocks[f"b{k}"] for k in range(COUNT + 1)]
+            if library is not None:
+                cases[in_c], signals = calls_in_c(name, library)
+                cases[in_c](WARM_TICKS)
+                blocks: list[Any] = [running.bound.blocks[f"g{k}"] for k in range(COUNT + 1)]
                 found = np.concatenate([block.y.value for block in blocks])
                 assert found.tobytes() == signals.tobytes(), f"{name}: other bits than in C"
-            else:
-                cases[fused](WARM_TICKS)
             times = take_turns(cases, rounds, TICKS)
-            if compiler is None:
-                rows.append(
-                    Row(
-                        fused, float(np.median(times[fused])), "us/tick", in_c, note="no C compiler"
-                    )
-                )
-            else:
+            if library is not None:
                 rows.append(Row(in_c, float(np.median(times[in_c])), "us/tick"))
                 rows.append(compare(fused, times, in_c, goal=GOAL))
+            else:
+                value = float(np.median(times[fused]))
+                rows.append(Row(fused, value, "us/tick", in_c, note="no C compiler"))
             rows.append(_first_compile(name))
     return rows
 
 
-def _library(compiler: str, folder: Path, name: str) -> Path:
-    source, library = folder / f"{name}.c", folder / f"{name}.so"
+def _library(folder: Path) -> Path | None:
+    """``C_SOURCE`` as a library; none where there is no C compiler."""
+    compiler = next(
+        (c for c in (os.environ.get("CC", "cc"), "gcc", "clang") if shutil.which(c)), None
+    )
+    if compiler is None:
+        return None
+    source, library = folder / "chains.c", folder / "chains.so"
     source.write_text(C_SOURCE, encoding="utf-8")
     options = ["-O2", "-ffp-contract=off", "-shared", "-fPIC"]
     subprocess.run([compiler, *options, str(source), "-o", str(library)], check=True)

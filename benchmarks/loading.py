@@ -15,13 +15,14 @@ FEW, MANY = 1_000, 4_900
 LOAD_GOAL, GROWTH_GOAL = 1.0, 1.3
 
 
-def chain(count: int) -> str:
-    """A graph file of ``count`` gains, one behind another."""
-    lines = ["rate: 100 Hz", "blocks:", "  g0: {use: blocks.SineWave, with: {amplitude: 1.0}}"]
-    lines += [
-        f"  g{k}: {{use: blocks.Gain, with: {{gain: 1.01}}, in: {{u: g{k - 1}.y}}}}"
-        for k in range(1, count + 1)
-    ]
+def chain(
+    count: int,
+    block: str = "use: blocks.Gain, with: {gain: 1.01}",
+    source: str = "use: blocks.SineWave, with: {amplitude: 1.0}",
+) -> str:
+    """A graph file of ``count`` blocks, one behind another: ``g1``, ``g2``, ...; ``g0`` is the source."""
+    lines = ["rate: 100 Hz", "blocks:", f"  g0: {{{source}}}"]
+    lines += [f"  g{k}: {{{block}, in: {{u: g{k - 1}.y}}}}" for k in range(1, count + 1)]
     return "\n".join(lines) + "\n"
 
 
