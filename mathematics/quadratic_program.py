@@ -15,7 +15,7 @@ import numpy as np
 
 from .arrays import Array
 
-Solve = Callable[[Array, Array, Array, Array, Array, Array], Array | None]
+Solve = Callable[..., Array | None]
 
 DAQP, CLARABEL = "daqp", "clarabel"
 EQUALITY = 5
@@ -61,12 +61,13 @@ class QuadraticProgramSolver:
         self.check_name(name)
         self.name = name
         given = dict(options or {})
-        self._clarabel = Clarabel(**given) if name == CLARABEL else None
-        self._solve: Solve = (
-            self._clarabel.solve
-            if self._clarabel is not None
-            else (_daqp if name == DAQP else _any_solver)(name, given)
-        )
+        self._solve: Solve
+        if name == CLARABEL:
+            self._solve = Clarabel(**given).solve
+        elif name == DAQP:
+            self._solve = _daqp(given)
+        else:
+            self._solve = _any_solver(name, given)
 
     def solve(
         self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array | None = None
@@ -75,12 +76,15 @@ class QuadraticProgramSolver:
 
         Args:
             c: the rows C of cones, (3 k, n); only for Clarabel.
+
+        Raises:
+            ValueError: there are cones, and the solver is another one.
         """
+        if c is not None and self.name != CLARABEL:
+            raise ValueError(f"{self.name} has no cones; {CLARABEL} has")
+        cones = () if c is None else (c,)
         try:
-            if c is not None and self._clarabel is not None:
-                x = self._clarabel.solve(p, q, g, h, a, b, c)
-            else:
-                x = self._solve(p, q, g, h, a, b)
+            x = self._solve(p, q, g, h, a, b, *cones)
         except Exception:  # noqa: BLE001
             # On an infeasible problem solvers raise errors of many types. The caller has a defined
             # fallback for all of them, so each means that there is no solution.
@@ -90,7 +94,7 @@ class QuadraticProgramSolver:
         return np.asarray(x)
 
 
-def _daqp(_: str, options: Mapping[str, float]) -> Solve:
+def _daqp(options: Mapping[str, float]) -> Solve:
     """DAQP's own function. With equalities in the last rows it calls some programs infeasible that are not."""
     import daqp
 

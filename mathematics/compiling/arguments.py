@@ -1,7 +1,8 @@
 """The arguments of a kernel as machine code gets them: types, and one row of 64-bit words.
 
-A number is one word. An array is its address, its shape and its strides in bytes. A named tuple is its parts, one after the other. Before the
-arguments there are two words with which machine code reports a division by zero to Python.
+A number is one word. An array is its address, its shape and its strides in bytes. A named tuple is its
+parts, one after the other. Before the arguments there are two words with which machine code reports a
+division by zero to Python.
 """
 
 from __future__ import annotations
