@@ -262,7 +262,8 @@ def tokens_of(
             before, afters = OPERATORS[type(op)]
             yield node.lineno, node.col_offset, before, afters
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-            written = ast.get_source_segment("\n".join(lines), node) or ""
+            content = lines[node.lineno - 1].encode()
+            written = content[node.col_offset : node.end_col_offset].decode()
             if is_index and isinstance(value, int):
                 yield node.lineno, node.col_offset, written, (str(value + 1),)
             elif value != 0:

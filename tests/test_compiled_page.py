@@ -36,6 +36,7 @@ def shell(folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_commands_of_the_page_run(folder: Path) -> None:
     (commands,) = re.findall(r"```sh\n(aloft run pid.yaml.*?)```", TEXT, re.DOTALL)
     for line in commands.splitlines():

@@ -11,6 +11,7 @@ from aloft.benchmarks import general_blocks as benchmark
 TIMED = ("Gain", "MovingAverage")
 
 
+@pytest.mark.long
 def test_chains_compute_what_the_calls_in_c_compute() -> None:
     rows = {row.name: row for row in benchmark.general_blocks(rounds=2)}
     compiler = any(map(shutil.which, ("cc", "gcc", "clang")))

@@ -1,8 +1,11 @@
 """The recorder's benchmark: that it is complete; how fast is for ``aloft bench``."""
 
+import pytest
+
 from aloft.benchmarks.recorder import COST_GOAL, recorder
 
 
+@pytest.mark.long
 def test_rows_are_complete_and_nothing_is_dropped() -> None:
     found = recorder(seconds=1.0, rounds=2)
     rows = {row.name: row for row in found}

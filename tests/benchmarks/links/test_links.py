@@ -1,8 +1,11 @@
 """The benchmark of links measures round trips beside bare Zenoh, the cost of sending, and loss."""
 
+import pytest
+
 from aloft.benchmarks.links.links import COUNT, graph, links
 
 
+@pytest.mark.long
 def test_rows() -> None:
     rows = {row.name: row for row in links(rounds=2, repetitions=5, ticks=100)}
     assert list(rows) == [
