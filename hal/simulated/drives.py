@@ -162,6 +162,7 @@ class Joints(NamedTuple):
     arrived: Flags1D
     position: Array1D
     velocity: Array1D
+    speed: Array1D
     torque: Array1D
 
 
@@ -206,7 +207,7 @@ def drive_joints(
 ) -> None:
     """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
     follow_commands(commands, released, joints)
-    drive_motors(joints.velocity, joints.torque, motors, scratch, record)
+    drive_motors(joints.speed, joints.torque, motors, scratch, record)
 
 
 @kernel
@@ -227,7 +228,7 @@ def drive_loops(
             loops, commands, active, joints.arrived[0], joints.position, joints.velocity,
             joints.torque,
         )  # fmt: skip
-    drive_motors(joints.velocity, joints.torque, motors, scratch, record)
+    drive_motors(joints.speed, joints.torque, motors, scratch, record)
 
 
 class CommandLatency(NamedTuple):
@@ -309,18 +310,22 @@ class SimulatedDrives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
+        self.motor_torque = limits.motor_torque
         self._damping = damping
         self._motors = limits.motors, limits.scratch, limits.record
 
-    def torque_call(self, step: Counts, position: Array, velocity: Array, out: Array) -> KernelCall:
+    def torque_call(
+        self, step: Counts, position: Array, velocity: Array, speed: Array, out: Array
+    ) -> KernelCall:
         """Writes the joint torques [N m] during a physics step to ``out``, (n_joints,).
 
         Args:
             step: the count of the step, without a dimension.
             position: the reading of the drives' own encoders [rad], (n_joints,).
-            velocity: the joint velocity [rad/s], (n_joints,).
+            velocity: the joint velocity that they make of it [rad/s], (n_joints,).
+            speed: the true joint velocity [rad/s], (n_joints,).
         """
-        joints = Joints(step, np.zeros(1, np.bool_), position, velocity, out)
+        joints = Joints(step, np.zeros(1, np.bool_), position, velocity, speed, out)
         first = self._state, self._damping
         if self._feedback is None:
             return signal_call(drive_joints, *first, joints, *self._motors)

@@ -27,7 +27,6 @@ from __future__ import annotations
 
 from collections import deque
 from copy import copy
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -37,11 +36,11 @@ from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
 from ...runtime.language.terrain import Terrain
-from ..random_streams import Purpose, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .simulated_robot import SimulatorParameters
 from .unsupported import shared_motors, unsupported_motor
+from .variation import Variation
 
 if TYPE_CHECKING:
     from mujoco import MjModel, MjSpec
@@ -53,19 +52,6 @@ MAX_LIMBS = 30
 last of these."""
 CONTACT_TIME_CONSTANT = 0.004
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
-
-
-@dataclass(frozen=True)
-class Variation:
-    """The differences from the nominal world: friction coefficient, factor on the stiffness of the
-    contacts, factor on every mass and inertia, offset of the base link's CoM [m, base frame], factor on
-    the friction and damping of the motors."""
-
-    friction: float = 0.7
-    contact_stiffness: float = 1.0
-    mass: float = 1.0
-    base_com_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    joint_friction: float = 1.0
 
 
 def build_mujoco_model(
@@ -195,15 +181,20 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
     centres = contact_centres(robot)
     balls = [robot.contacts[ball.point].name for ball in ball_feet(robot)]
     bodies: dict[str, Any] = {}
+    names = [link.name for link in robot.links]
 
     def add_link(name: str, parent: Any, position: tuple[float, float, float]) -> None:
-        link = robot.link(name)
+        link, number = robot.link(name), names.index(name)
         com = np.array(link.com)
         if name == robot.base:
             com = com + variation.base_com_offset
+        if variation.link_com:
+            com = com + variation.link_com[number]
+        mass = variation.mass * variation.factor(variation.link_mass, number)
         inertial: dict[str, Any] = {
-            "mass": link.mass * variation.mass, "ipos": com, "explicitinertial": True,
-            "fullinertia": np.array(link.inertia) * variation.mass,
+            "mass": link.mass * mass, "ipos": com, "explicitinertial": True,
+            "fullinertia": np.array(link.inertia)
+            * mass * variation.factor(variation.link_inertia, number),
         }  # fmt: skip
         # A base that is bolted to the world may have no mass.
         inertial = inertial if link.mass > 0.0 else {}
@@ -238,24 +229,26 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
 
     add_link(robot.base, spec.worldbody, (0.0, 0.0, 0.0))
     BASES[robot.base_joint].add_joints(bodies[robot.base])
-    bodies[robot.base].add_site(name="imu")
-    armature, motors = joint_armature(robot), robot.motors
+    x, y, z, w = variation.imu.quaternion.tolist()
+    bodies[robot.base].add_site(name="imu", pos=variation.imu.position, quat=[w, x, y, z])
+    armature, motors = joint_armature(robot, variation), robot.motors
     hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
     yes, no = mujoco.mjtLimited.mjLIMITED_TRUE, mujoco.mjtLimited.mjLIMITED_FALSE
     for k, joint in enumerate(robot.joints):
         add_link(joint.child, bodies[joint.parent], joint.origin)
+        friction = variation.joint_friction * variation.factor(variation.friction_of_joint, k)
         bodies[joint.child].add_joint(
             name=joint.name, type=slide if joint.kind == "slide" else hinge, axis=joint.axis,
             limited=no if joint.limits is None else yes, range=joint.limits or (0.0, 0.0),
             solref_limit=[CONTACT_TIME_CONSTANT, 1.0], armature=armature[k],
-            frictionloss=motors.friction[k] * variation.joint_friction,
-            damping=[motors.damping[k] * variation.joint_friction, 0.0, 0.0],
+            frictionloss=motors.friction[k] * friction,
+            damping=[motors.damping[k] * friction, 0.0, 0.0],
         )  # fmt: skip
         motor = spec.add_actuator(
             name=f"motor/{joint.name}", target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
         )
         motor.set_to_motor()
-    add_rotors(spec, robot)
+    add_rotors(spec, robot, variation)
 
 
 def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription) -> None:
@@ -297,28 +290,6 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
         )  # fmt: skip
 
 
-def draw_variation(params: SimulatorParameters) -> Variation:
-    """Draw the variation of the world from the seed in these parameters."""
-
-    def uniform(purpose: Purpose) -> float:
-        return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
-
-    friction = params.friction
-    if params.friction_range is not None:
-        low, high = params.friction_range
-        friction = low + (high - low) * 0.5 * (1.0 + uniform(Purpose.FRICTION))
-    stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
-        Purpose.CONTACT_STIFFNESS
-    )
-    offsets = stream(params.seed, Purpose.BASE_COM).uniform(-1.0, 1.0, 3)
-    x, y, z = (
-        nominal + params.base_com_spread * float(draw)
-        for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
-    )
-    mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
-    return Variation(friction, stiffness, mass, (x, y, z), params.joint_friction)
-
-
 def build_world(
     params: SimulatorParameters, robot: RobotDescription, variation: Variation
 ) -> MjModel:
@@ -355,16 +326,16 @@ _model_cache: deque[_CachedModel] = deque(maxlen=4)
 it takes longer than anything else before a run. Callers get copies."""
 
 
-def joint_armature(robot: RobotDescription) -> Array:
+def joint_armature(robot: RobotDescription, variation: Variation | None = None) -> Array:
     """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
     armature, shared = np.zeros(len(robot.joints)), shared_motors(robot)
-    for motor, inertia in enumerate(robot.motors.rotor_inertia.tolist()):
+    for motor, inertia in enumerate((variation or Variation()).rotors(robot).tolist()):
         if motor not in shared:
             armature += inertia * robot.joint_to_motor[motor] ** 2
     return armature
 
 
-def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
+def add_rotors(spec: MjSpec, robot: RobotDescription, variation: Variation | None = None) -> None:
     """Add a fixed tendon for every motor whose rotor couples joints.
 
     With ``A`` the transmission's ``joint_to_motor`` and ``I_m`` the motors' rotor inertias at the
@@ -381,10 +352,11 @@ def add_rotors(spec: MjSpec, robot: RobotDescription) -> None:
     complaint = unsupported_motor(robot)
     if complaint:
         raise ValueError(f"{robot.name}: {complaint}")
+    inertia = (variation or Variation()).rotors(robot)
     for motor in shared_motors(robot):
         tendon = spec.add_tendon(
             name=f"rotor/{robot.transmission.motors[motor]}",
-            armature=float(robot.motors.rotor_inertia[motor]),
+            armature=float(inertia[motor]),
         )
         for joint, weight in zip(robot.joints, robot.joint_to_motor[motor].tolist(), strict=True):
             if weight:

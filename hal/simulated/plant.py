@@ -35,7 +35,9 @@ from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .mujoco_model import Variation, body_name, build_world, draw_variation
+from .drive_effects import DriveEffects
+from .imu_effects import ImuModel
+from .mujoco_model import body_name, build_world
 from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
 from .stance import (
@@ -57,6 +59,7 @@ from .state import (
     record_step,
 )
 from .truth import TruthReport
+from .variation import Variation, draw_variation
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
@@ -177,10 +180,15 @@ OBSERVED_TIME = 0.02
 class JointTorques(Protocol):
     """The drives of a plant, as its physics sees them."""
 
-    def torque_call(self, step: Indices, position: Array, velocity: Array, out: Array) -> Call:
+    motor_torque: Array
+    """What the motors are asked for within their limits [N m], (n_joints,)."""
+
+    def torque_call(
+        self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
+    ) -> Call:
         """The call that writes the joint torques [N m] during the physics step ``step``, a count
-        without a dimension, to ``out``, from the reading of the drives' encoders [rad] and the true
-        joint velocities [rad/s]. All arrays keep their place in memory."""
+        without a dimension, to ``out``, from the reading of the drives' encoders [rad, rad/s] and the true
+        joint velocities ``speed`` [rad/s]. All arrays keep their place in memory."""
 
 
 class Plant:
@@ -205,6 +213,7 @@ class Plant:
         sensors: what makes readings of the true motion.
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
+        sensed: what the encoders make of both, without their offsets.
         clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         late: by how much [s] the physics steps begin after the control clock's ticks.
@@ -223,12 +232,18 @@ class Plant:
         import mujoco
 
         self.physics, self.record = physics, record
-        self.variation = draw_variation(params)
+        self.variation = draw_variation(params, robot)
         self.model = build_world(params, robot, self.variation)
         self._robot, self._params, self._period = robot, params, period
         self.streams = RandomStreams(params.seed, _noisy_fields(robot))
         self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
         self._samples_per_tick = samples_per_tick
+        self.imu = None
+        if not params.imu.ideal:
+            self.imu = ImuModel(params.imu, params.seed, params.timestep, physics)
+        self.drives = DriveEffects(
+            robot, params.encoders, params.motors, params.seed, params.timestep, physics
+        )
         self.stiffness, self.damping = holding_gains(self.model, robot)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
@@ -248,6 +263,8 @@ class Plant:
             "n_integration": mujoco.mj_stateSize(model, everything),
             "n_random": RandomStreams(params.seed, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
+            **ImuModel.dimensions(params.imu, params.timestep),
+            **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
         }
 
     def _attach(self, data: MjData) -> None:
@@ -256,20 +273,30 @@ class Plant:
         self.data = data
         base = self._base = BASES[self._robot.base_joint](data)
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
-        self._sampled = (data.sensor("accelerometer").data, data.sensor("contacts").data)
         period = self._period / self._samples_per_tick
         self.sensors.attach(model, data, period, self._samples_per_tick)
         # The sensors of the contact points are the model's last.
         first = model.nsensordata - 4 * len(self._robot.contacts)
         load = data.sensordata[first:].reshape(-1, 4)
         self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
-        sensors = self.sensors
+        sensors, physics = self.sensors, self.physics
+        force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
+        self._rate = base.angular_velocity
+        self._sensing: list[Call] = []
+        if self.imu is not None:
+            self._sensing += [*base.refreshing(), self.imu.sensing(self._rate, force)]
+            self._rate, force = self.imu.rate, self.imu.force
+        self.sensed = self.position, self.velocity
+        self._seeing: list[Call] = []
+        if self.drives.has_encoders:
+            self._seeing.append(self.drives.sensing(*self.sensed, data.ctrl))
+            self.sensed = physics.encoder_position, physics.encoder_velocity
         self._note = signal_call(
-            record_step, self.physics.step, StepSensors(load, *self._sampled, self.position),
+            record_step, self.physics.step, StepSensors(load, force, contacts, self.position),
             *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
         )  # fmt: skip
         self._encoding = KernelCall(
-            read_encoders, self.position, sensors.encoder_offset, self._encoder
+            read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
         self._step1, self._step2 = step_calls(model, data)
         self.forces = ExternalForces(model, data, self._robot)
@@ -295,6 +322,7 @@ class Plant:
         place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
         rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
         pose = self.position.copy()
+        self._begin_sensing()
         torque = holding_torque(model, data, base, robot)
         hold(self.position + self.sensors.encoder_offset, torque)
         phase = 0.0
@@ -320,6 +348,13 @@ class Plant:
             sensor.reset()
         self._settle(step, steps)
 
+    def _begin_sensing(self) -> None:
+        """Let encoders and IMU begin anew."""
+        self.physics.encoder_taken[0] = self.physics.imu_taken[0] = 0
+        self._step1.run()
+        for call in self._seeing:
+            call.run()
+
     def _settle(self, step: CallSequence, steps: int) -> None:
         """Simulate physics steps in which joints that no motor can move stay in the standing pose,
         as if held by hand."""
@@ -337,11 +372,18 @@ class Plant:
 
         ``push`` is a force from outside, held for all these steps; see ``forces.check``.
         """
+        step, torque = self.physics.step, self.data.ctrl
         one: list[Call] = [
             self._encoding,
-            drives.torque_call(self.physics.step, self._encoder, self.velocity, self.data.ctrl),
+            drives.torque_call(step, self._encoder, self.sensed[1], self.velocity, torque),
+        ]
+        if self.drives.has_motors:
+            requested = drives.motor_torque
+            one.append(self.drives.producing(self.position, self.velocity, requested, torque))
+        one += [
             *([] if push is None else [self.forces.pushing(push)]),
-            self._step2, self._note, *self.sensors.after_step(), self._step1,
+            self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
+            *self._seeing,
         ]  # fmt: skip
         return CallSequence([self.forces.releasing(), *(one * steps)])
 
@@ -354,7 +396,7 @@ class Plant:
             KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
             KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
             *self.reading_imu(force, imu),
-            *sensors.reading_joints(self.position, self.velocity, torque, joints),
+            *sensors.reading_joints(*self.sensed, torque, joints),
         ]
 
     def reading_imu(self, force: Array, imu: ImuReading) -> list[Call]:
@@ -362,7 +404,7 @@ class Plant:
         [m/s^2, body] as the accelerometer's."""
         base = self._base
         return [
-            *base.refreshing(), *self.sensors.reading_imu(base.angular_velocity, force, imu)
+            *base.refreshing(), *self.sensors.reading_imu(self._rate, force, imu)
         ]  # fmt: skip
 
     def clear_record(self) -> None:
@@ -398,6 +440,8 @@ class Plant:
             "robot_friction": float(self.variation.friction),
             "robot_mass_kg": float(self._robot.total_mass * self.variation.mass),
             "robot_contact_stiffness": float(self.variation.contact_stiffness),
+            **({} if self.imu is None else self.imu.metrics()),
+            **(self.drives.metrics() if self.drives.has_motors else {}),
         }
 
 

@@ -17,7 +17,10 @@ from ..drive_control import DriveGains
 from ..robot import Robot
 from ..sensors.sensor import MountedSensor
 from . import scenes
+from .drive_effects import EncoderEffects, MotorEffects
+from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
+from .variation import JointEffects, LinkEffects
 
 
 class SimulatorParameters(DriveGains):
@@ -128,6 +131,14 @@ class SimulatorParameters(DriveGains):
         text="factor on noise and bias of the sensors that the robot's description mounts; 0: they "
         "have no errors",
     )  # fmt: skip
+
+    imu: ImuEffects = parameter(ImuEffects(), text="the IMU: place, mount, filter, delay")
+    encoders: EncoderEffects = parameter(EncoderEffects(), text="the joint encoders")
+    motors: MotorEffects = parameter(MotorEffects(), text="the motors and their current loops")
+    links: LinkEffects = parameter(LinkEffects(), text="how the links differ from the description")
+    joints: JointEffects = parameter(
+        JointEffects(), text="how joints and rotors differ from the description"
+    )
 
     drive_damping: float | None = parameter(
         None, unit="N m s/rad", ge=0,

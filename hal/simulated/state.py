@@ -27,6 +27,16 @@ class PhysicsState(Signal):
     step = Field(dtype="int64", text="physics steps since the run began")
     integration = Field("n_integration", text="time, positions, velocities, warm start, forces")
     random = Field("n_random", dtype="int64", text="the state of the random streams")
+    imu_filters = Field(("n_imu_filters", 2), text="memory of the IMU's filters")
+    imu_samples = Field(("n_imu_slots", "n_imu_axes"), text="past samples: rate and force")
+    imu_taken = Field(1, dtype="int64", text="how many samples the IMU has taken")
+    imu_reading = Field("n_imu_axes", text="what it reads: rate and force")
+    encoder_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint angles")
+    speed_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint velocities")
+    encoder_taken = Field(1, dtype="int64", text="how many samples the encoders have taken")
+    encoder_position = Field("n_sensed_joints", unit="rad", text="what the encoders read")
+    encoder_velocity = Field("n_sensed_joints", unit="rad/s", text="what they make of it")
+    motor_torque = Field("n_real_motors", unit="N m", text="behind the drives' current loops")
 
 
 class DriveState(CommandTargets):

@@ -51,7 +51,7 @@ class EmulatedDrives:
         self.actuators = tuple(actuators)
         self._transmission = TransmissionMap(robot)
         limits = MotorLimits(robot, record)
-        self._motor_torque = limits.motor_torque
+        self.motor_torque = limits.motor_torque
         self._moving_at, self._limited = np.zeros(n), np.zeros(n)
         self._limit = signal_call(
             drive_motors, self._moving_at, self._limited, limits.motors, limits.scratch,
@@ -140,8 +140,11 @@ class EmulatedDrives:
         np.logical_not(self.stuck, out=self._not_stuck)
         return self._not_stuck
 
-    def joint_torque(self, step: int, position: Array, velocity: Array, out: Array) -> None:
-        """Write the joint torques [N m] of a physics step, from the joints' motion."""
+    def joint_torque(
+        self, step: int, position: Array, velocity: Array, speed: Array, out: Array
+    ) -> None:
+        """Write the joint torques [N m] of a physics step, from the joints' motion as the encoders read
+        it, and their true velocities ``speed`` [rad/s]."""
         self.sense(position, velocity)
         self._arrive(step)
         goals, current, requested = self.goals, self.current, self._requested
@@ -159,10 +162,10 @@ class EmulatedDrives:
         np.multiply(current, self._constant, out=self._torque)
         np.multiply(self._torque, self.sign, out=self._torque)
         self._transmission.joint_torque(self._torque, self._limited)
-        self._moving_at[:] = velocity
+        self._moving_at[:] = speed
         self._limit.run()
         out[:] = self._limited
-        np.add(self.torque_sum, self._motor_torque, out=self.torque_sum)
+        np.add(self.torque_sum, self.motor_torque, out=self.torque_sum)
         self.torque_steps += 1
 
     def mean_current(self, out: Array) -> None:

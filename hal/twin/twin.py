@@ -75,6 +75,7 @@ class Twin:
         self.bus = EmulatedBus(self.actuators, self._answer_with_faults)
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
+        self.motor_torque = self.drives.motor_torque
         self.faults = Faults(faults, params.seed)
         self.lockstep = True
         """Whether time goes on with the exchanges; else only by ``advance``."""
@@ -104,7 +105,7 @@ class Twin:
         self._current, self._nothing = np.zeros(n), np.zeros(n)
         plant, sensors = self.plant, self.plant.sensors
         self._reading_joints = CallSequence(
-            sensors.reading_joints(plant.position, plant.velocity, self._nothing, self._sample)
+            sensors.reading_joints(*plant.sensed, self._nothing, self._sample)
         )
         self._reading_imu = CallSequence(plant.reading_imu(self._force, self._imu))
         self._reading_switches = CallSequence(
@@ -213,13 +214,13 @@ class Twin:
         self._pushed = self._step if push is None else self.plant.simulating(self, 1, push)
 
     def torque_call(
-        self, step: Indices, position: Array, velocity: Array, out: Array
+        self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
     ) -> LibraryCall:
         """The torques of the drives, and of the gantry until it lets go."""
-        holding = self._gantry.torque_call(step, position, velocity, self._held)
+        holding = self._gantry.torque_call(step, position, velocity, speed, self._held)
 
         def write() -> None:
-            self.drives.joint_torque(int(step), position, velocity, out)
+            self.drives.joint_torque(int(step), position, velocity, speed, out)
             self._release_gantry()
             if not self.released:
                 holding.run()

@@ -15,8 +15,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.hal.simulated.mujoco_model import Variation, build_mujoco_model
+from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.scenes import platform, step
+from aloft.hal.simulated.variation import Variation
 from aloft.mathematics.rotations import to_matrix
 from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
 from aloft.robots.contact_kinematics import ContactKinematics

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from aloft.hal.simulated import mujoco_model
-from aloft.hal.simulated.mujoco_model import Variation, build_world
+from aloft.hal.simulated.mujoco_model import build_world
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.variation import Variation
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")

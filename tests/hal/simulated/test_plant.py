@@ -35,7 +35,7 @@ class Held:
         self.position, self.torque = position.copy(), torque.copy()
 
     def torque_call(
-        self, step: Indices, position: Array, velocity: Array, out: Array
+        self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
     ) -> LibraryCall:
         def write() -> None:
             self.steps.append(int(step))

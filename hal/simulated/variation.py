@@ -1,0 +1,119 @@
+"""How the bodies of a simulated robot and its ground differ from their descriptions, drawn by the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...mathematics.arrays import Array
+from ...robots.description import RobotDescription
+from ...runtime.language.parameters import Parameters, parameter
+from ..random_streams import Purpose, stream
+from .imu_effects import NOMINAL, ImuPlace, draw_place
+
+if TYPE_CHECKING:
+    from .simulated_robot import SimulatorParameters
+
+
+class LinkEffects(Parameters):
+    """How the links differ from the description, besides a common factor on all masses."""
+
+    mass_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor on the mass of every link"
+    )
+    com_spread: float = parameter(
+        0.0, unit="m", ge=0.0, text="spread of the offset of every link's CoM, per axis"
+    )
+    inertia_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of a further factor on the inertia of every link"
+    )
+
+
+class JointEffects(Parameters):
+    """How joints and rotors differ from the description, besides the common factor ``joint_friction``."""
+
+    friction_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor on friction and damping of every joint"
+    )
+    rotor_inertia: float = parameter(1.0, gt=0.0, text="factor on the inertia of all rotors")
+    rotor_inertia_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor, per motor"
+    )
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The differences from the nominal world.
+
+    ``friction`` is the coefficient of the ground, ``contact_stiffness`` a factor on the stiffness of the
+    contacts, ``mass`` a factor on every mass and inertia, ``base_com_offset`` [m, base frame] that of the
+    base link's CoM, and ``joint_friction`` a factor on friction and damping of the motors. The others
+    have an element for each link (``link_mass`` and ``link_inertia``, factors, and ``link_com`` [m, link
+    frame]), joint (``friction_of_joint``, a factor) or motor (``rotor_inertia``, a factor); empty: all
+    nominal. ``imu`` is where the IMU is.
+    """
+
+    friction: float = 0.7
+    contact_stiffness: float = 1.0
+    mass: float = 1.0
+    base_com_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    joint_friction: float = 1.0
+    link_mass: tuple[float, ...] = ()
+    link_com: tuple[tuple[float, float, float], ...] = ()
+    link_inertia: tuple[float, ...] = ()
+    friction_of_joint: tuple[float, ...] = ()
+    rotor_inertia: tuple[float, ...] = ()
+    imu: ImuPlace = NOMINAL
+
+    def factor(self, of: tuple[float, ...], k: int) -> float:
+        """The factor of a link, joint or motor."""
+        return of[k] if of else 1.0
+
+    def rotors(self, robot: RobotDescription) -> Array:
+        """The inertias of all rotors at their outputs [kg m^2], (n_motors,)."""
+        nominal = np.asarray(robot.motors.rotor_inertia)
+        return nominal * np.array(self.rotor_inertia) if self.rotor_inertia else nominal
+
+
+def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Variation:
+    """Draw the variation of the world from the seed in these parameters."""
+
+    def uniform(purpose: Purpose) -> float:
+        return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
+
+    def factors(purpose: Purpose, spread: float, count: int) -> tuple[float, ...]:
+        if not spread:
+            return ()
+        draws = stream(params.seed, purpose).uniform(-1.0, 1.0, count)
+        return tuple((1.0 + spread * draws).tolist())
+
+    friction = params.friction
+    if params.friction_range is not None:
+        low, high = params.friction_range
+        friction = low + (high - low) * 0.5 * (1.0 + uniform(Purpose.FRICTION))
+    stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
+        Purpose.CONTACT_STIFFNESS
+    )
+    offsets = stream(params.seed, Purpose.BASE_COM).uniform(-1.0, 1.0, 3)
+    x, y, z = (
+        nominal + params.base_com_spread * float(draw)
+        for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
+    )
+    mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
+    links, joints, n = params.links, params.joints, len(robot.joints)
+    centres: tuple[tuple[float, float, float], ...] = ()
+    if links.com_spread:
+        draws = stream(params.seed, Purpose.LINK_COM).uniform(-1.0, 1.0, (len(robot.links), 3))
+        centres = tuple((a, b, c) for a, b, c in (links.com_spread * draws).tolist())
+    rotors = factors(Purpose.ROTOR_INERTIA, joints.rotor_inertia_spread, n)
+    if joints.rotor_inertia != 1.0:
+        rotors = tuple(joints.rotor_inertia * each for each in rotors or (1.0,) * n)
+    return Variation(
+        friction, stiffness, mass, (x, y, z), params.joint_friction,
+        factors(Purpose.LINK_MASS, links.mass_spread, len(robot.links)), centres,
+        factors(Purpose.LINK_INERTIA, links.inertia_spread, len(robot.links)),
+        factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
+        draw_place(params.imu, params.seed) if params.imu.moved else NOMINAL,
+    )  # fmt: skip
