@@ -276,7 +276,7 @@ class MotorLimits:
             np.ascontiguousarray(robot.joint_to_motor.T),
             motors.peak_torque,
             motors.peak_torque / (motors.no_load_speed - motors.corner_speed),
-            motors.no_load_speed,
+            np.array(motors.no_load_speed),
         )
         self.scratch = MotorScratch.allocate(robot.dimensions)
         self.record = record
@@ -310,7 +310,7 @@ class SimulatedDrives:
         self._feedback = feedback
         self._state = state
         limits = MotorLimits(robot, record)
-        self.motor_torque = limits.motor_torque
+        self.limits = limits
         self._damping = damping
         self._motors = limits.motors, limits.scratch, limits.record
 

@@ -329,7 +329,7 @@ it takes longer than anything else before a run. Callers get copies."""
 def joint_armature(robot: RobotDescription, variation: Variation | None = None) -> Array:
     """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
     armature, shared = np.zeros(len(robot.joints)), shared_motors(robot)
-    for motor, inertia in enumerate((variation or Variation()).rotors(robot).tolist()):
+    for motor, inertia in enumerate(_carried(robot, variation)):
         if motor not in shared:
             armature += inertia * robot.joint_to_motor[motor] ** 2
     return armature
@@ -352,12 +352,19 @@ def add_rotors(spec: MjSpec, robot: RobotDescription, variation: Variation | Non
     complaint = unsupported_motor(robot)
     if complaint:
         raise ValueError(f"{robot.name}: {complaint}")
-    inertia = (variation or Variation()).rotors(robot)
+    inertia = _carried(robot, variation)
     for motor in shared_motors(robot):
         tendon = spec.add_tendon(
             name=f"rotor/{robot.transmission.motors[motor]}",
-            armature=float(inertia[motor]),
+            armature=inertia[motor],
         )
         for joint, weight in zip(robot.joints, robot.joint_to_motor[motor].tolist(), strict=True):
             if weight:
                 tendon.wrap_joint(joint.name, weight)
+
+
+def _carried(robot: RobotDescription, variation: Variation | None) -> list[float]:
+    """The rotor inertia of every motor that the bodies carry [kg m^2]."""
+    variation = variation or Variation()
+    found: list[float] = (variation.rotor_share * variation.rotors(robot)).tolist()
+    return found

@@ -35,7 +35,10 @@ from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
+from .battery import Battery
 from .drive_effects import DriveEffects
+from .drives import MotorLimits
+from .gears import Gears
 from .imu_effects import ImuModel
 from .mujoco_model import body_name, build_world
 from .sensors import SimulatedSensors
@@ -180,8 +183,8 @@ OBSERVED_TIME = 0.02
 class JointTorques(Protocol):
     """The drives of a plant, as its physics sees them."""
 
-    motor_torque: Array
-    """What the motors are asked for within their limits [N m], (n_joints,)."""
+    limits: MotorLimits
+    """What the motors can do, and what is asked of them within that."""
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
@@ -244,6 +247,13 @@ class Plant:
         self.drives = DriveEffects(
             robot, params.encoders, params.motors, params.seed, params.timestep, physics
         )
+        self.battery = None
+        if params.battery is not None:
+            self.battery = Battery(params.battery, params.timestep, physics)
+        self.gears = None
+        if params.gears is not None:
+            rotors = self.variation.rotors(robot)
+            self.gears = Gears(params.gears, robot, rotors, params.timestep, physics)
         self.stiffness, self.damping = holding_gains(self.model, robot)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
@@ -265,6 +275,8 @@ class Plant:
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
             **ImuModel.dimensions(params.imu, params.timestep),
             **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
+            "n_rotors": 0 if params.gears is None else len(robot.joints),
+            "n_battery": 0 if params.battery is None else 4,
         }
 
     def _attach(self, data: MjData) -> None:
@@ -288,6 +300,10 @@ class Plant:
             self._rate, force = self.imu.rate, self.imu.force
         self.sensed = self.position, self.velocity
         self._seeing: list[Call] = []
+        if self.gears is not None:
+            self._seeing.append(self.gears.sensing())
+            self.sensed = self.gears.position, self.gears.velocity
+        self._turning = self.sensed[1]  # at what speed the motors turn, as joints
         if self.drives.has_encoders:
             self._seeing.append(self.drives.sensing(*self.sensed, data.ctrl))
             self.sensed = physics.encoder_position, physics.encoder_velocity
@@ -351,6 +367,10 @@ class Plant:
     def _begin_sensing(self) -> None:
         """Let encoders and IMU begin anew."""
         self.physics.encoder_taken[0] = self.physics.imu_taken[0] = 0
+        if self.battery is not None:
+            self.battery.begin()
+        if self.gears is not None:
+            self.gears.begin(self.position)
         self._step1.run()
         for call in self._seeing:
             call.run()
@@ -372,14 +392,18 @@ class Plant:
 
         ``push`` is a force from outside, held for all these steps; see ``forces.check``.
         """
-        step, torque = self.physics.step, self.data.ctrl
+        step, torque, turning = self.physics.step, self.data.ctrl, self._turning
         one: list[Call] = [
             self._encoding,
-            drives.torque_call(step, self._encoder, self.sensed[1], self.velocity, torque),
+            drives.torque_call(step, self._encoder, self.sensed[1], turning, torque),
         ]
+        if self.battery is not None:
+            one.append(self.battery.feeding(drives.limits))
         if self.drives.has_motors:
-            requested = drives.motor_torque
-            one.append(self.drives.producing(self.position, self.velocity, requested, torque))
+            requested = drives.limits.motor_torque
+            one.append(self.drives.producing(self.position, turning, requested, torque))
+        if self.gears is not None:
+            one.append(self.gears.turning(self.position, self.velocity, torque))
         one += [
             *([] if push is None else [self.forces.pushing(push)]),
             self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
@@ -429,6 +453,12 @@ class Plant:
         )
         self.streams.load(self.physics.random)
         self._step1.run()
+        if self.gears is not None:
+            self.gears.sensing().run()
+
+    def voltage(self, supply: float) -> float:
+        """The voltage of the pack [V], or of the ``supply`` where none is simulated."""
+        return supply if self.battery is None else float(self.battery.voltage[0])
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed."""

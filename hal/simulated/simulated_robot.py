@@ -17,7 +17,9 @@ from ..drive_control import DriveGains
 from ..robot import Robot
 from ..sensors.sensor import MountedSensor
 from . import scenes
+from .battery import BatteryParameters
 from .drive_effects import EncoderEffects, MotorEffects
+from .gears import GearParameters
 from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
 from .variation import JointEffects, LinkEffects
@@ -135,6 +137,13 @@ class SimulatorParameters(DriveGains):
     imu: ImuEffects = parameter(ImuEffects(), text="the IMU: place, mount, filter, delay")
     encoders: EncoderEffects = parameter(EncoderEffects(), text="the joint encoders")
     motors: MotorEffects = parameter(MotorEffects(), text="the motors and their current loops")
+    gears: GearParameters | None = parameter(
+        None,
+        text="gears that yield, with encoders on the rotors; none: rotor and joint are one body",
+    )
+    battery: BatteryParameters | None = parameter(
+        None, text="the pack; none: a supply whose voltage never changes"
+    )
     links: LinkEffects = parameter(LinkEffects(), text="how the links differ from the description")
     joints: JointEffects = parameter(
         JointEffects(), text="how joints and rotors differ from the description"

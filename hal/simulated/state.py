@@ -37,6 +37,9 @@ class PhysicsState(Signal):
     encoder_position = Field("n_sensed_joints", unit="rad", text="what the encoders read")
     encoder_velocity = Field("n_sensed_joints", unit="rad/s", text="what they make of it")
     motor_torque = Field("n_real_motors", unit="N m", text="behind the drives' current loops")
+    rotor_angle = Field("n_rotors", unit="rad", text="of rotors behind gears that yield")
+    rotor_speed = Field("n_rotors", unit="rad/s", text="of them")
+    battery = Field("n_battery", text="voltage, charge gone, voltage to recover, current")
 
 
 class DriveState(CommandTargets):

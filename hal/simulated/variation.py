@@ -52,7 +52,8 @@ class Variation:
     base link's CoM, and ``joint_friction`` a factor on friction and damping of the motors. The others
     have an element for each link (``link_mass`` and ``link_inertia``, factors, and ``link_com`` [m, link
     frame]), joint (``friction_of_joint``, a factor) or motor (``rotor_inertia``, a factor); empty: all
-    nominal. ``imu`` is where the IMU is.
+    nominal. ``imu`` is where the IMU is. ``rotor_share`` is the share of the
+    rotors' inertia that the bodies carry; gears that yield have the rest.
     """
 
     friction: float = 0.7
@@ -66,6 +67,7 @@ class Variation:
     friction_of_joint: tuple[float, ...] = ()
     rotor_inertia: tuple[float, ...] = ()
     imu: ImuPlace = NOMINAL
+    rotor_share: float = 1.0
 
     def factor(self, of: tuple[float, ...], k: int) -> float:
         """The factor of a link, joint or motor."""
@@ -116,4 +118,5 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         factors(Purpose.LINK_INERTIA, links.inertia_spread, len(robot.links)),
         factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
         draw_place(params.imu, params.seed) if params.imu.moved else NOMINAL,
+        1.0 if params.gears is None else params.gears.output_share,
     )  # fmt: skip

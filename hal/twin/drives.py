@@ -51,6 +51,7 @@ class EmulatedDrives:
         self.actuators = tuple(actuators)
         self._transmission = TransmissionMap(robot)
         limits = MotorLimits(robot, record)
+        self.limits = limits
         self.motor_torque = limits.motor_torque
         self._moving_at, self._limited = np.zeros(n), np.zeros(n)
         self._limit = signal_call(

@@ -75,7 +75,7 @@ class Twin:
         self.bus = EmulatedBus(self.actuators, self._answer_with_faults)
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
-        self.motor_torque = self.drives.motor_torque
+        self.limits = self.drives.limits
         self.faults = Faults(faults, params.seed)
         self.lockstep = True
         """Whether time goes on with the exchanges; else only by ``advance``."""
@@ -134,7 +134,7 @@ class Twin:
             lambda pose, torque: self._gantry.hold(pose, torque, plant.stiffness, plant.damping),
         )
         for actuator in self.actuators:
-            actuator.status["input_voltage"] = SUPPLY
+            actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
         self._sense()
         self._begin_packet()
 
@@ -297,12 +297,15 @@ class Twin:
 
     def _apply_drive_faults(self) -> None:
         """Let faults of drives begin and end."""
+        if self.plant.battery is not None:
+            for actuator in self.actuators:
+                actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
         if not self.faults:
             return
         for k, (name, actuator) in enumerate(zip(self._names, self.actuators, strict=True)):
             self.drives.stuck[k] = bool(self.faults.of(name, "stuck_encoder"))
             low, hot = self.faults.of(name, "low_voltage"), self.faults.of(name, "hot")
-            actuator.status["input_voltage"] = low[0].value if low else SUPPLY
+            actuator.status["input_voltage"] = low[0].value if low else self.plant.voltage(SUPPLY)
             actuator.status["winding_temperature"] = hot[0].value if hot else 25.0
             if self.faults.of(name, "dead"):
                 actuator.status["torque_enable"] = 0.0

@@ -1,0 +1,135 @@
+"""The pack that feeds a simulated robot: its voltage sags under load, and with it the motors' speeds.
+
+A pack is an open voltage behind a resistance, with a further part that builds up and recovers slowly
+(one resistance beside one capacitor), and an open voltage that falls with the charge taken from it. The
+load is what the motors turn into work and copper heat, and the board. Regenerated power charges it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...mathematics.arrays import Array, Array1D
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.steps import signal_call
+from .drives import DriveTrain, MotorLimits, MotorScratch
+from .state import PhysicsState
+
+
+class BatteryParameters(Parameters):
+    """A pack; the defaults are estimates for four lithium-polymer cells of 2.2 A h."""
+
+    open_voltage: float = parameter(16.0, unit="V", gt=0.0, text="without load, at the start")
+    resistance: float = parameter(0.03, unit="Ohm", ge=0.0, text="what a load sees at once")
+    recovery_resistance: float = parameter(
+        0.01, unit="Ohm", ge=0.0, text="what builds up under load and recovers after it"
+    )
+    recovery_time: float = parameter(
+        10.0, unit="s", gt=0.0, text="time constant of building up and recovering"
+    )
+    capacity: float = parameter(7920.0, unit="C", gt=0.0, text="charge of the full pack")
+    fall: float = parameter(
+        2.4, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
+    )
+    board_power: float = parameter(15.0, unit="W", ge=0.0, text="what computer and boards draw")
+    rated_voltage: float = parameter(
+        14.8, unit="V", gt=0.0,
+        text="voltage at which the motors reach the speeds of the robot's description",
+    )  # fmt: skip
+    winding_resistance: float = parameter(
+        0.2, unit="Ohm", ge=0.0, text="of a motor, as its torque current sees it"
+    )
+    torque_constant: float = parameter(
+        0.35, unit="N m/A", gt=0.0, text="torque at the output for each ampere"
+    )
+
+
+class Pack(NamedTuple):
+    """The pack's parameters as numbers, and the motors' curves at the rated voltage, (n_motors,)."""
+
+    open_voltage: float
+    resistance: float
+    share: float
+    recovery_resistance: float
+    fall: float
+    capacity: float
+    board_power: float
+    rated_voltage: float
+    heating: float
+    timestep: float
+    slope: Array1D
+    no_load: Array1D
+
+
+@kernel
+def draw_power(pack: Pack, motors: DriveTrain, scratch: MotorScratch, memory: PhysicsState) -> None:
+    """The voltage after a physics step with these motor torques and speeds, and the limits at it.
+
+    ``memory.battery`` holds the voltage [V], the charge that is gone [C], the voltage that is still to
+    recover [V], and the current [A].
+    """
+    power = pack.board_power
+    for k in range(scratch.torque.shape[0]):
+        torque = scratch.torque[k]
+        power += torque * scratch.speed[k] + pack.heating * torque * torque
+    battery = memory.battery
+    inner = pack.open_voltage - pack.fall * battery[1] / pack.capacity - battery[2]
+    inner = max(inner, 0.0)
+    voltage = 0.5 * inner
+    if pack.resistance == 0.0:
+        voltage = inner
+    else:
+        # Beyond this root the load asks for more than the pack can give at any current.
+        root = inner * inner - 4.0 * pack.resistance * power
+        if root > 0.0:
+            voltage = 0.5 * (inner + math.sqrt(root))
+    current = 0.0
+    if voltage > 0.0:
+        current = min(power / voltage, inner / (2.0 * pack.resistance + 1e-9))
+    battery[0] = voltage
+    battery[1] += current * pack.timestep
+    battery[2] += pack.share * (pack.recovery_resistance * current - battery[2])
+    battery[3] = current
+    ratio = max(voltage / pack.rated_voltage, 0.05)
+    for k in range(pack.no_load.shape[0]):
+        motors.no_load[k] = pack.no_load[k] * ratio
+        motors.slope[k] = pack.slope[k] / ratio
+
+
+class Battery:
+    """The pack of a simulated robot.
+
+    Args:
+        params: of the pack.
+        timestep: of the physics [s].
+        memory: keeps voltage and charge.
+    """
+
+    def __init__(self, params: BatteryParameters, timestep: float, memory: PhysicsState) -> None:
+        self._params, self._timestep, self._memory = params, timestep, memory
+
+    def begin(self) -> None:
+        """The pack is full and has rested."""
+        self._memory.battery[:] = [self._params.open_voltage, 0.0, 0.0, 0.0]
+
+    @property
+    def voltage(self) -> Array:
+        """The voltage [V], (1,), a view of the memory."""
+        found: Array = self._memory.battery[:1]
+        return found
+
+    def feeding(self, limits: MotorLimits) -> KernelCall:
+        """Feeds the motors in a physics step, and sets what they can do in the next one."""
+        p, motors = self._params, limits.motors
+        pack = Pack(
+            p.open_voltage, p.resistance, -math.expm1(-self._timestep / p.recovery_time),
+            p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage,
+            p.winding_resistance / p.torque_constant**2, self._timestep, np.array(motors.slope),
+            np.array(motors.no_load),
+        )  # fmt: skip
+        return signal_call(draw_power, pack, motors, limits.scratch, self._memory)
