@@ -51,6 +51,8 @@ class Purpose(IntEnum):
     LINK_COM = 25
     LINK_INERTIA = 26
     ECCENTRICITY = 27
+    FLOOR_TILT = 28
+    CABLE = 29
 
 
 RUNNING = (

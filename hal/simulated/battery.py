@@ -25,14 +25,14 @@ class BatteryParameters(Parameters):
     """A pack; the defaults are estimates for four lithium-polymer cells of 2.2 A h."""
 
     open_voltage: float = parameter(16.0, unit="V", gt=0.0, text="without load, at the start")
-    resistance: float = parameter(0.03, unit="Ohm", ge=0.0, text="what a load sees at once")
+    resistance: float = parameter(0.03, unit="ohm", ge=0.0, text="what a load sees at once")
     recovery_resistance: float = parameter(
-        0.01, unit="Ohm", ge=0.0, text="what builds up under load and recovers after it"
+        0.01, unit="ohm", ge=0.0, text="what builds up under load and recovers after it"
     )
     recovery_time: float = parameter(
         10.0, unit="s", gt=0.0, text="time constant of building up and recovering"
     )
-    capacity: float = parameter(7920.0, unit="C", gt=0.0, text="charge of the full pack")
+    capacity: float = parameter(7920.0, unit="A s", gt=0.0, text="charge of the full pack")
     fall: float = parameter(
         2.4, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
     )
@@ -42,7 +42,7 @@ class BatteryParameters(Parameters):
         text="voltage at which the motors reach the speeds of the robot's description",
     )  # fmt: skip
     winding_resistance: float = parameter(
-        0.2, unit="Ohm", ge=0.0, text="of a motor, as its torque current sees it"
+        0.2, unit="ohm", ge=0.0, text="of a motor, as its torque current sees it"
     )
     torque_constant: float = parameter(
         0.35, unit="N m/A", gt=0.0, text="torque at the output for each ampere"
@@ -99,6 +99,12 @@ def draw_power(pack: Pack, motors: DriveTrain, scratch: MotorScratch, memory: Ph
     for k in range(pack.no_load.shape[0]):
         motors.no_load[k] = pack.no_load[k] * ratio
         motors.slope[k] = pack.slope[k] / ratio
+
+
+@kernel
+def spread_voltage(voltage: Array1D, drives: Array1D) -> None:
+    """Every drive sees the pack's ``voltage`` (1,)."""
+    drives[:] = voltage[0]
 
 
 class Battery:

@@ -32,7 +32,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
 from ...runtime.language.terrain import Terrain
@@ -100,7 +99,7 @@ def mujoco_spec(
     spec.modelname = robot.name
     spec.compiler.degree = False
     spec.option.timestep = timestep
-    spec.option.gravity = [0.0, 0.0, -GRAVITY]
+    spec.option.gravity = variation.gravity
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = 10.0
@@ -146,6 +145,14 @@ def _surface(variation: Variation) -> dict[str, Any]:
         "solref": [time_constant, 1.0],
         "solimp": CONTACT_IMPEDANCE,
     }
+
+
+def _sole(variation: Variation) -> dict[str, Any]:
+    """Those of a contact point: rubber decides alone how soft its contacts are."""
+    surface = _surface(variation)
+    if variation.sole is not None:
+        surface |= {"solref": list(variation.sole), "priority": 1}
+    return surface
 
 
 def _add_ground(spec: MjSpec, scene: Terrain, variation: Variation) -> None:
@@ -219,7 +226,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
                     continue
                 body.add_geom(
                     name=contact.name, type=mujoco.mjtGeom.mjGEOM_SPHERE, mass=0.0,
-                    size=[contact.radius, 0, 0], pos=centre, **bits, **_surface(variation),
+                    size=[contact.radius, 0, 0], pos=centre, **bits, **_sole(variation),
                 )  # fmt: skip
                 is_ball = contact.name in balls
                 body.add_site(name=contact.name, pos=centre if is_ball else contact.position)

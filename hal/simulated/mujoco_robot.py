@@ -14,7 +14,7 @@ from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .simulated_robot import SimulatedRobot, SimulatorParameters
+from .simulated_robot import SimulatedRobot, SimulatorParameters, too_fast_effects
 from .state import DriveState, TickRecord
 from .unsupported import uneven_contacts, unsupported_motor
 
@@ -54,8 +54,11 @@ class MujocoRobot(SimulatedRobot):
     All random numbers follow from ``seed``. Every disturbance has a stream of its own, so setting
     one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
 
-    It does not model: motor temperature and supply voltage, belt and cable elasticity, backlash,
-    contact of a limb with the torso or with itself, an IMU lever arm, wind.
+    A real robot differs from its description in what ``imu``, ``encoders``, ``motors``, ``gears``,
+    ``battery``, ``switches``, ``soles``, ``links``, ``joints``, ``cable`` and ``floor_tilt`` say; by default
+    in nothing. The trial ``graphs/trials/real.yaml`` has the usual sizes.
+
+    It does not model: motor temperature, contact of a limb with the torso or with itself, wind.
 
     Raises:
         StartError: the robot does not stand as its description says.
@@ -79,7 +82,28 @@ class MujocoRobot(SimulatedRobot):
             "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
             "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
             "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
-            "bus_period": 0.001,
+            "bus_period": 0.001, "floor_tilt": 0.01, "timestep": 0.00025,
+            "imu": {
+                "gyro_delay": 0.001, "accelerometer_delay": 0.002, "delay_spread": 0.0005,
+                "bandwidth": 100.0, "mount_frequency": 300.0, "position": [0.01, 0.0, 0.02],
+                "position_spread": 0.005, "rotation_spread": 0.01, "gyro_scale_spread": 0.01,
+                "accelerometer_scale_spread": 0.01, "acceleration_sensitivity": 1e-4,
+            },
+            "encoders": {
+                "delay": 0.0005, "velocity_filter": 0.001, "eccentricity": 0.002,
+                "compliance": 0.001, "backlash": 0.005,
+            },
+            "motors": {
+                "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
+                "torque_limit": 100.0, "ripple": 0.05, "load_friction": 0.05,
+            },
+            "gears": {"stiffness": 500.0, "damping": 0.3, "backlash": 0.001},
+            "battery": {"resistance": 0.03},
+            "links": {"mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1},
+            "joints": {"friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1},
+            "switches": {"debounce": 0.001, "sticking": 0.002},
+            "soles": {"time_constant": 0.006, "damping_ratio": 0.8},
+            "cable": {"pull": 0.2, "weight": 0.1},
         }  # fmt: skip
 
     @classmethod
@@ -101,6 +125,7 @@ class MujocoRobot(SimulatedRobot):
                 uneven,
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
+        yield from too_fast_effects(params, robot)
         bus = params.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"
@@ -174,9 +199,10 @@ class MujocoRobot(SimulatedRobot):
         drives = self._drives = SimulatedDrives(robot, damping, self.drives, self.record, feedback)
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
-            *plant.sensors.reading_switches(self.physics.step, self.record, self.contacts.closed),
+            *plant.reading_switches(self.contacts.closed),
             *plant.sensors.reading_mounted(self.mounted()),
             *plant.truth.reporting(self.truth), self.reporting(),
+            *plant.reporting_voltage(self.health),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep

@@ -15,15 +15,17 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from ...blocks.signals import ExternalForce, ImuReading, JointState
+from ...blocks.signals import ExternalForce, ImuReading, JointState, RobotHealth
 from ...mathematics.arrays import (
     Array,
     Array1D,
     Array2D,
+    Flags,
     Flags1D,
     Indices,
     Indices0D,
     Indices1D,
+    Vector3,
 )
 from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...mathematics.compiling.kernel_call import KernelCall
@@ -35,7 +37,7 @@ from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .battery import Battery
+from .battery import Battery, spread_voltage
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
 from .gears import Gears
@@ -61,8 +63,9 @@ from .state import (
     read_encoders,
     record_step,
 )
+from .switch_effects import SwitchDelays, SwitchEffects
 from .truth import TruthReport
-from .variation import Variation, draw_variation
+from .variation import Variation, draw_pull, draw_variation
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
@@ -112,11 +115,18 @@ def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
     wrench[body, 5] = x * fy - y * fx
 
 
+@kernel
+def add_force(force: Vector3, total: Vector3) -> None:
+    """Add a ``force`` [N, world] to what acts on the centre of mass of a body."""
+    total[:] += force
+
+
 class ExternalForces:
     """Lets forces act on the robot's named points."""
 
     def __init__(self, model: MjModel, data: MjData, robot: RobotDescription) -> None:
         self._robot = robot
+        self._base = int(model.body(body_name(robot.base)).id)
         sites = [int(model.site(f"point/{name}").id) for name in robot.points]
         bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
         self._points = PushPoints(
@@ -131,6 +141,14 @@ class ExternalForces:
     def pushing(self, push: ExternalForce) -> KernelCall:
         """The push acts in the next physics step; ``check`` says whether it has a point."""
         return KernelCall(apply_push, push.force, push.point, self._points)
+
+    def pulling(self, params: SimulatorParameters) -> list[Call]:
+        """In every physics step, what a cable does: the first call goes before that of a push, which
+        it makes begin anew, the second after it."""
+        assert params.cable is not None
+        base = self._points.wrenches[self._base, :3]
+        force = np.array(draw_pull(params.cable, params.seed))
+        return [self.releasing(), KernelCall(add_force, force, base)]
 
     def check(self, push: ExternalForce) -> None:
         """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
@@ -250,6 +268,9 @@ class Plant:
         self.battery = None
         if params.battery is not None:
             self.battery = Battery(params.battery, params.timestep, physics)
+        self.switches = None
+        if params.switches != SwitchEffects():
+            self.switches = SwitchDelays(params.switches, params.timestep, physics)
         self.gears = None
         if params.gears is not None:
             rotors = self.variation.rotors(robot)
@@ -277,6 +298,7 @@ class Plant:
             **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
             "n_rotors": 0 if params.gears is None else len(robot.joints),
             "n_battery": 0 if params.battery is None else 4,
+            "n_late_switches": 0 if params.switches == SwitchEffects() else len(robot.contacts),
         }
 
     def _attach(self, data: MjData) -> None:
@@ -300,6 +322,8 @@ class Plant:
             self._rate, force = self.imu.rate, self.imu.force
         self.sensed = self.position, self.velocity
         self._seeing: list[Call] = []
+        if self.switches is not None:
+            self._seeing.append(self.switches.settling(self.record.closed))
         if self.gears is not None:
             self._seeing.append(self.gears.sensing())
             self.sensed = self.gears.position, self.gears.velocity
@@ -371,6 +395,8 @@ class Plant:
             self.battery.begin()
         if self.gears is not None:
             self.gears.begin(self.position)
+        if self.switches is not None:
+            self.switches.begin()
         self._step1.run()
         for call in self._seeing:
             call.run()
@@ -404,8 +430,9 @@ class Plant:
             one.append(self.drives.producing(self.position, turning, requested, torque))
         if self.gears is not None:
             one.append(self.gears.turning(self.position, self.velocity, torque))
+        pulling = [] if self._params.cable is None else self.forces.pulling(self._params)
         one += [
-            *([] if push is None else [self.forces.pushing(push)]),
+            *pulling[:1], *([] if push is None else [self.forces.pushing(push)]), *pulling[1:],
             self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
             *self._seeing,
         ]  # fmt: skip
@@ -431,6 +458,11 @@ class Plant:
             *base.refreshing(), *self.sensors.reading_imu(self._rate, force, imu)
         ]  # fmt: skip
 
+    def reading_switches(self, closed: Flags) -> list[Call]:
+        """Write a sample of the switches, (n_contacts,)."""
+        pressed = self.record.closed if self.switches is None else self.switches.closed
+        return self.sensors.reading_switches(self.physics.step, self.record, pressed, closed)
+
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
         self.clearing.run()
@@ -455,6 +487,12 @@ class Plant:
         self._step1.run()
         if self.gears is not None:
             self.gears.sensing().run()
+
+    def reporting_voltage(self, health: RobotHealth) -> list[Call]:
+        """Write the voltage of the pack at all drives, where there is a pack."""
+        if self.battery is None:
+            return []
+        return [KernelCall(spread_voltage, self.battery.voltage, health.voltage)]
 
     def voltage(self, supply: float) -> float:
         """The voltage of the pack [V], or of the ``supply`` where none is simulated."""

@@ -237,11 +237,13 @@ class SimulatedSensors:
         true = {"position": position, "velocity": velocity, "torque": torque}
         return self._joints.reading(true, self._joint_errors, out)
 
-    def reading_switches(self, step: Counts, record: TickRecord, closed: Flags) -> list[Call]:
-        """Write a sample of the switches, (n_contacts,); without switches none is closed. ``step`` is a
-        count without a dimension."""
+    def reading_switches(
+        self, step: Counts, record: TickRecord, pressed: Flags, closed: Flags
+    ) -> list[Call]:
+        """Write a sample of the switches that are ``pressed``, (n_contacts,); without switches none is
+        closed. ``step`` is a count without a dimension."""
         return SwitchSensors.calls(
-            self._has_switches, bool(self.bounce_steps), step, record.closed, record.bounce_end,
+            self._has_switches, bool(self.bounce_steps), step, pressed, record.bounce_end,
             self._streams[Purpose.BOUNCE], closed,
         )  # fmt: skip
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Input, Output, Port, State
+from ...runtime.language.block import Input, Output, Port, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Terrain
 from ..drive_control import DriveGains
@@ -19,10 +19,11 @@ from ..sensors.sensor import MountedSensor
 from . import scenes
 from .battery import BatteryParameters
 from .drive_effects import EncoderEffects, MotorEffects
-from .gears import GearParameters
+from .gears import GearParameters, longest_step
 from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
-from .variation import JointEffects, LinkEffects
+from .switch_effects import SwitchEffects
+from .variation import CableParameters, JointEffects, LinkEffects, SoleParameters
 
 
 class SimulatorParameters(DriveGains):
@@ -144,6 +145,17 @@ class SimulatorParameters(DriveGains):
     battery: BatteryParameters | None = parameter(
         None, text="the pack; none: a supply whose voltage never changes"
     )
+    switches: SwitchEffects = parameter(
+        SwitchEffects(), text="the foot switches, besides threshold and bounce"
+    )
+    soles: SoleParameters | None = parameter(
+        None, text="soles of rubber; none: as stiff as all else"
+    )
+    cable: CableParameters | None = parameter(None, text="a cable that pulls at the base")
+    floor_tilt: float = parameter(
+        0.0, unit="rad", ge=0.0, le=0.2,
+        text="by which the whole scene leans, in a drawn direction; the truth is told in its frame",
+    )  # fmt: skip
     links: LinkEffects = parameter(LinkEffects(), text="how the links differ from the description")
     joints: JointEffects = parameter(
         JointEffects(), text="how joints and rotors differ from the description"
@@ -174,6 +186,38 @@ class SimulatorParameters(DriveGains):
         if self.scene == "none":
             return scenes.nowhere()
         return scenes.flat()
+
+
+def too_fast_effects(
+    params: SimulatorParameters, robot: RobotDescription
+) -> Iterator[UnmetRequirement]:
+    """Report effects that the physics' steps are too long for."""
+    step = params.timestep
+    fastest = 0.45 / step
+    for name in ("bandwidth", "mount_frequency"):
+        frequency = getattr(params.imu, name)
+        if frequency is not None and frequency > fastest:
+            yield UnmetRequirement(
+                f"with physics steps of {step:g} s the IMU has no filter of {frequency:g} Hz",
+                parameter="imu", expected=f"imu.{name} up to {fastest:g} Hz",
+                found=f"{frequency:g} Hz", fix=f"timestep: {0.45 / frequency:.2g} s, or less",
+            )  # fmt: skip
+    if params.gears is not None:
+        joints = params.joints
+        least = joints.rotor_inertia * (1.0 - joints.rotor_inertia_spread)
+        longest = longest_step(params.gears, least * robot.motors.rotor_inertia)
+        if step > longest:
+            yield UnmetRequirement(
+                f"gears of {params.gears.stiffness:g} N m/rad move faster than physics steps of "
+                f"{step:g} s follow",
+                parameter="timestep", expected=f"up to {longest:.3g} s",
+                found=f"{step:g} s", fix=f"timestep: {_below(longest):g} s",
+            )  # fmt: skip
+
+
+def _below(step: float) -> float:
+    """A fraction of a millisecond that is a physics step up to this one [s]."""
+    return next(each for each in (5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 1e-6) if each <= step)
 
 
 class SimulatedRobot(Robot, ABC):

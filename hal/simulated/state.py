@@ -39,6 +39,8 @@ class PhysicsState(Signal):
     motor_torque = Field("n_real_motors", unit="N m", text="behind the drives' current loops")
     rotor_angle = Field("n_rotors", unit="rad", text="of rotors behind gears that yield")
     rotor_speed = Field("n_rotors", unit="rad/s", text="of them")
+    switch_closed = Field("n_late_switches", dtype="bool", text="behind debouncing and sticking")
+    switch_waits = Field("n_late_switches", dtype="int64", text="steps that a change has lasted")
     battery = Field("n_battery", text="voltage, charge gone, voltage to recover, current")
 
 

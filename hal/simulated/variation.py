@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from ..random_streams import Purpose, stream
@@ -43,6 +45,22 @@ class JointEffects(Parameters):
     )
 
 
+class SoleParameters(Parameters):
+    """Rubber under the contact points: contacts as soft and as bouncing as these say."""
+
+    time_constant: float = parameter(
+        0.008, unit="s", gt=0.0, le=0.1, text="in which a contact settles; stiff ones take 4 ms"
+    )
+    damping_ratio: float = parameter(1.0, gt=0.0, le=2.0, text="below 1 the soles bounce")
+
+
+class CableParameters(Parameters):
+    """A cable to the robot's base."""
+
+    pull: float = parameter(unit="N", ge=0.0, text="its horizontal force, in a drawn direction")
+    weight: float = parameter(0.0, unit="N", ge=0.0, text="what hangs of it on the robot")
+
+
 @dataclass(frozen=True)
 class Variation:
     """The differences from the nominal world.
@@ -53,7 +71,8 @@ class Variation:
     have an element for each link (``link_mass`` and ``link_inertia``, factors, and ``link_com`` [m, link
     frame]), joint (``friction_of_joint``, a factor) or motor (``rotor_inertia``, a factor); empty: all
     nominal. ``imu`` is where the IMU is. ``rotor_share`` is the share of the
-    rotors' inertia that the bodies carry; gears that yield have the rest.
+    rotors' inertia that the bodies carry; gears that yield have the rest. ``sole`` is the time constant [s]
+    and the damping ratio of the contact points' contacts, ``gravity`` [m/s^2] is seen from the floor.
     """
 
     friction: float = 0.7
@@ -68,6 +87,8 @@ class Variation:
     rotor_inertia: tuple[float, ...] = ()
     imu: ImuPlace = NOMINAL
     rotor_share: float = 1.0
+    sole: tuple[float, float] | None = None
+    gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
 
     def factor(self, of: tuple[float, ...], k: int) -> float:
         """The factor of a link, joint or motor."""
@@ -77,6 +98,21 @@ class Variation:
         """The inertias of all rotors at their outputs [kg m^2], (n_motors,)."""
         nominal = np.asarray(robot.motors.rotor_inertia)
         return nominal * np.array(self.rotor_inertia) if self.rotor_inertia else nominal
+
+
+def _gravity(params: SimulatorParameters) -> tuple[float, float, float]:
+    """Gravity [m/s^2] in the frame of a floor that leans."""
+    if not params.floor_tilt:
+        return 0.0, 0.0, -GRAVITY
+    heading = 2.0 * math.pi * float(stream(params.seed, Purpose.FLOOR_TILT).random())
+    along, down = GRAVITY * math.sin(params.floor_tilt), GRAVITY * math.cos(params.floor_tilt)
+    return along * math.cos(heading), along * math.sin(heading), -down
+
+
+def draw_pull(cable: CableParameters, seed: int) -> tuple[float, float, float]:
+    """The force of a cable [N, world]."""
+    heading = 2.0 * math.pi * float(stream(seed, Purpose.CABLE).random())
+    return cable.pull * math.cos(heading), cable.pull * math.sin(heading), -cable.weight
 
 
 def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Variation:
@@ -119,4 +155,6 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
         draw_place(params.imu, params.seed) if params.imu.moved else NOMINAL,
         1.0 if params.gears is None else params.gears.output_share,
+        None if params.soles is None else (params.soles.time_constant, params.soles.damping_ratio),
+        _gravity(params),
     )  # fmt: skip

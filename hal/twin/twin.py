@@ -108,9 +108,7 @@ class Twin:
             sensors.reading_joints(*plant.sensed, self._nothing, self._sample)
         )
         self._reading_imu = CallSequence(plant.reading_imu(self._force, self._imu))
-        self._reading_switches = CallSequence(
-            sensors.reading_switches(physics.step, record, self.closed)
-        )
+        self._reading_switches = CallSequence(plant.reading_switches(self.closed))
         self._samples = {
             sensor.name: sensor.signal.allocate(robot.dimensions)
             for sensor in mounted_sensors(robot)

@@ -1,0 +1,67 @@
+"""What lies between the force on a foot's switch and its reading, besides threshold and bounce."""
+
+from __future__ import annotations
+
+import math
+
+from ...mathematics.arrays import Flags, Flags1D
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.steps import signal_call
+from .state import PhysicsState
+
+
+class SwitchEffects(Parameters):
+    """What delays the foot switches; by default nothing."""
+
+    debounce: float = parameter(
+        0.0, unit="s", ge=0.0, le=0.1,
+        text="for how long a switch must be pressed or free before the board says so",
+    )  # fmt: skip
+    sticking: float = parameter(
+        0.0, unit="s", ge=0.0, le=0.1, text="for how long a switch stays closed that is free again"
+    )
+
+
+@kernel
+def settle_switches(pressed: Flags1D, debounce: int, sticking: int, memory: PhysicsState) -> None:
+    """Update ``memory.switch_closed`` after a physics step: a change counts once it has lasted for
+    ``debounce`` steps, and that of a switch that opens for ``sticking`` steps more."""
+    for point in range(pressed.shape[0]):
+        if pressed[point] == memory.switch_closed[point]:
+            memory.switch_waits[point] = 0
+            continue
+        memory.switch_waits[point] += 1
+        wait = debounce if pressed[point] else debounce + sticking
+        if memory.switch_waits[point] > wait:
+            memory.switch_closed[point] = pressed[point]
+            memory.switch_waits[point] = 0
+
+
+class SwitchDelays:
+    """The delays of all switches of a robot.
+
+    Args:
+        effects: how long they are.
+        timestep: of the physics [s].
+        memory: what the switches read, and for how long another reading waits.
+
+    Attributes:
+        closed: what the switches read before they bounce, (n_contacts,).
+    """
+
+    def __init__(self, effects: SwitchEffects, timestep: float, memory: PhysicsState) -> None:
+        self.closed: Flags = memory.switch_closed
+        self._memory = memory
+        self._debounce = math.ceil(effects.debounce / timestep - 1e-9)
+        self._sticking = math.ceil(effects.sticking / timestep - 1e-9)
+
+    def begin(self) -> None:
+        """No switch is closed."""
+        self._memory.switch_closed[:] = False
+        self._memory.switch_waits[:] = 0
+
+    def settling(self, pressed: Flags) -> KernelCall:
+        """Updates ``closed`` after a physics step."""
+        return signal_call(settle_switches, pressed, self._debounce, self._sticking, self._memory)
