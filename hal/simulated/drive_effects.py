@@ -224,6 +224,8 @@ class DriveEffects:
         )
         """The factor on the torque constant of every motor, (n,)."""
         band = motors.current_bandwidth
+        self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
+        """By how much [s] a drive's loop is late beside that of an ideal drive."""
         limit = math.inf if motors.torque_limit is None else motors.torque_limit
         self._motors = MotorModel(
             np.ascontiguousarray(robot.joint_to_motor),

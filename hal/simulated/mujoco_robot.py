@@ -75,7 +75,7 @@ class MujocoRobot(SimulatedRobot):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """All disturbances at once, so that the conformance suite covers them."""
+        """All disturbances at once that any robot bears, so that the conformance suite covers them."""
         return {
             "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
             "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
@@ -90,14 +90,13 @@ class MujocoRobot(SimulatedRobot):
                 "accelerometer_scale_spread": 0.01, "acceleration_sensitivity": 1e-4,
             },
             "encoders": {
-                "delay": 0.0005, "velocity_filter": 0.001, "eccentricity": 0.002,
-                "compliance": 0.001, "backlash": 0.005,
+                "delay": 0.00025, "velocity_filter": 0.0005, "eccentricity": 0.002,
+                "compliance": 1e-5, "backlash": 0.002,
             },
             "motors": {
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
-                "torque_limit": 100.0, "ripple": 0.05, "load_friction": 0.05,
+                "torque_limit": 1000.0, "ripple": 0.05, "load_friction": 0.05,
             },
-            "gears": {"stiffness": 500.0, "damping": 0.3, "backlash": 0.001},
             "battery": {"resistance": 0.03},
             "links": {"mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1},
             "joints": {"friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1},

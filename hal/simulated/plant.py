@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -275,7 +276,10 @@ class Plant:
         if params.gears is not None:
             rotors = self.variation.rotors(robot)
             self.gears = Gears(params.gears, robot, rotors, params.timestep, physics)
-        self.stiffness, self.damping = holding_gains(self.model, robot)
+        whole = self.model
+        if params.gears is not None:
+            whole = build_world(params, robot, replace(self.variation, rotor_share=1.0))
+        self.stiffness, self.damping = holding_gains(whole, robot, self.drives.lag)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
@@ -416,7 +420,8 @@ class Plant:
     ) -> CallSequence:
         """Calls that simulate physics steps; afterwards all derived quantities are up to date.
 
-        ``push`` is a force from outside, held for all these steps; see ``forces.check``.
+        ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
+        pulls, too: it is put on when the robot stands.
         """
         step, torque, turning = self.physics.step, self.data.ctrl, self._turning
         one: list[Call] = [
@@ -430,9 +435,12 @@ class Plant:
             one.append(self.drives.producing(self.position, turning, requested, torque))
         if self.gears is not None:
             one.append(self.gears.turning(self.position, self.velocity, torque))
-        pulling = [] if self._params.cable is None else self.forces.pulling(self._params)
+        if push is not None and self._params.cable is not None:
+            release, pull = self.forces.pulling(self._params)
+            one += [release, self.forces.pushing(push), pull]
+        elif push is not None:
+            one.append(self.forces.pushing(push))
         one += [
-            *pulling[:1], *([] if push is None else [self.forces.pushing(push)]), *pulling[1:],
             self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
             *self._seeing,
         ]  # fmt: skip

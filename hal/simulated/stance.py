@@ -395,7 +395,7 @@ RELEASED = 1.0 / 3.0
 """The damping of a drive in its damping mode, as a share of its damping while it holds the pose."""
 
 
-def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array]:
+def holding_gains(model: MjModel, robot: RobotDescription, lag: float = 0.0) -> tuple[Array, Array]:
     """The stiffness [N m/rad] and damping [N m s/rad] that hold every joint before the first command,
     each (n_joints,).
 
@@ -410,7 +410,7 @@ def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array
     Both gains are bounded so that the drive's loop is stable. It is closed once in every physics step
     of ``dt`` on the inertia ``I`` of the joint with all others free, so the stiffness is at most
     ``I / (4 dt^2)`` and the damping at most ``I / dt``. Apart from that bound, the gains do not depend
-    on what is drawn from the seed.
+    on what is drawn from the seed. A ``lag`` [s] of encoders and currents counts as a longer ``dt``.
     """
     import mujoco
 
@@ -436,7 +436,7 @@ def holding_gains(model: MjModel, robot: RobotDescription) -> tuple[Array, Array
         height = float(standing_com(robot)[2] - standing_heights(robot).min())
         needed = _two_digits(GRAVITY_SHARE * robot.total_mass * GRAVITY * max(height, 0.01))
         stiffness[legs], damping[legs] = needed, DAMPING_TIME * needed
-    step = float(model.opt.timestep)
+    step = float(model.opt.timestep) + lag
     return np.minimum(stiffness, 0.25 * free / step**2), np.minimum(damping, free / step)
 
 

@@ -55,7 +55,7 @@ class SoleParameters(Parameters):
 
 
 class CableParameters(Parameters):
-    """A cable to the robot's base."""
+    """A cable to the robot's base, which pulls from the first tick on."""
 
     pull: float = parameter(unit="N", ge=0.0, text="its horizontal force, in a drawn direction")
     weight: float = parameter(0.0, unit="N", ge=0.0, text="what hangs of it on the robot")

@@ -150,7 +150,7 @@ def test_they_give_the_joints_what_the_twins_drives_give() -> None:
             now = motion(rng)
             if exchange or step:
                 made.write(wanted, False, *now, mine)
-                twin.joint_torque(exchange * STEPS + step, *now, its)
+                twin.joint_torque(exchange * STEPS + step, *now, now[1], its)
                 np.testing.assert_allclose(mine, its, atol=1e-9)
             if step == 0 and exchange:
                 seen = now

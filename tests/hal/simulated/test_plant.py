@@ -88,9 +88,12 @@ def test_loaded_it_goes_on_bit_for_bit() -> None:
 PUSHES = {3: [20.0, -5.0, 1.0], 9: [0.0, 40.0, 0.0]}
 
 
+GEARS = {"gears": {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}}
+
+
 def run(ticks: int = 20, **options: Any) -> tuple[BlockBench[MujocoRobot], list[bytes]]:
     """A robot with every disturbance that is pushed at two points; its ports in every tick."""
-    params = {**MujocoRobot.example_parameters(), "seed": 7}
+    params = {**MujocoRobot.example_parameters(), "seed": 7, **GEARS}
     robot: BlockBench[MujocoRobot] = BlockBench(MujocoRobot, params, robot="bruce", **options)
     hold(robot)
     seen = []

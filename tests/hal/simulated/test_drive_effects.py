@@ -1,0 +1,261 @@
+"""Encoders, motors, gears and pack of a simulated robot, against closed forms."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.hal.simulated.battery import Battery, BatteryParameters
+from aloft.hal.simulated.drive_effects import DriveEffects, EncoderEffects, MotorEffects
+from aloft.hal.simulated.drives import MotorLimits
+from aloft.hal.simulated.gears import GearParameters, Gears, longest_step
+from aloft.hal.simulated.state import PhysicsState, TickRecord
+from aloft.robots.description import find_robot
+
+from .simulated_bruce import bench, hold
+
+ROBOT = find_robot("bruce")
+N = len(ROBOT.joints)
+STEP = 0.0005
+SIZES = dict.fromkeys(
+    ("n_integration", "n_random", "n_imu_filters", "n_imu_slots", "n_imu_axes", "n_encoder_slots",
+     "n_sensed_joints", "n_real_motors", "n_rotors", "n_late_switches", "n_battery"), 0,
+)  # fmt: skip
+
+
+def drives(encoders: Any = (), motors: Any = ()) -> tuple[DriveEffects, PhysicsState]:
+    chosen = (
+        EncoderEffects.model_validate(dict(encoders)),
+        MotorEffects.model_validate(dict(motors)),
+    )
+    memory = PhysicsState.allocate({**SIZES, **DriveEffects.dimensions(ROBOT, *chosen, STEP)})
+    return DriveEffects(ROBOT, *chosen, 5, STEP, memory), memory
+
+
+def reader(**encoders: Any) -> Any:
+    """What the encoders read of a joint motion and torque."""
+    effects, memory = drives(encoders)
+    true = SimpleNamespace(q=np.zeros(N), v=np.zeros(N), torque=np.zeros(N))
+    call = effects.sensing(true.q, true.v, true.torque)
+
+    def read(q: float, v: float, torque: float = 0.0) -> tuple[float, float]:
+        true.q[:], true.v[:], true.torque[:] = q, v, torque
+        call.run()
+        return float(memory.encoder_position[0]), float(memory.encoder_velocity[0])
+
+    return read
+
+
+def giver(velocity: float = 0.0, angle: float = 0.0, **motors: Any) -> Any:
+    """What the motors give of the torques that are asked of them."""
+    effects, _ = drives((), motors)
+    position, speed = np.full(N, angle), np.full(N, velocity)
+    asked, torque = np.zeros(N), np.zeros(N)
+    call = effects.producing(position, speed, asked, torque)
+
+    def give(requested: np.ndarray | float) -> np.ndarray:
+        asked[:] = requested
+        torque[:] = ROBOT.joint_to_motor.T @ asked
+        call.run()
+        given: np.ndarray = np.linalg.solve(ROBOT.joint_to_motor.T, torque)
+        return given
+
+    return give
+
+
+def test_encoders_are_late() -> None:
+    read = reader(delay=3 * STEP)
+    seen = [read(0.1 * k, 1.0 * k) for k in range(10)]
+    np.testing.assert_allclose(seen[8], (0.5, 5.0))
+
+
+def test_the_velocity_is_filtered_and_the_angle_is_not() -> None:
+    read = reader(velocity_filter=0.002)
+    read(0.0, 0.0)
+    for k in range(1, 20):
+        angle, velocity = read(0.7, 1.0)
+        assert angle == 0.7
+        assert velocity == pytest.approx(1.0 - math.exp(-k * STEP / 0.002))
+
+
+def test_a_gear_before_the_encoder_yields_and_has_play() -> None:
+    read = reader(compliance=0.002, backlash=0.01)
+    assert read(0.3, 0.0, 0.0)[0] == 0.3
+    assert read(0.3, 0.0, 5.0)[0] == pytest.approx(0.3 + 0.01 + 0.005)
+    assert read(0.3, 0.0, -5.0)[0] == pytest.approx(0.3 - 0.01 - 0.005)
+
+
+def test_an_eccentric_encoder_errs_once_a_turn() -> None:
+    read = reader(eccentricity=0.01)
+    angles = np.linspace(0.0, 2.0 * math.pi, 64, endpoint=False)
+    errors = np.array([read(angle, 0.0)[0] - angle for angle in angles])
+    assert abs(errors.mean()) < 1e-9
+    assert errors.std() == pytest.approx(0.01 / math.sqrt(2.0))
+
+
+def test_torque_constants_differ_and_the_drive_does_not_know() -> None:
+    give = giver(torque_constant_spread=0.05)
+    factors = give(2.0) / 2.0
+    assert len(set(factors.round(9))) == N and (abs(factors - 1.0) <= 0.05).all()
+    np.testing.assert_allclose(give(-4.0) / -4.0, factors)
+
+
+def test_iron_saturates_with_the_square_of_the_torque() -> None:
+    give, peak = giver(saturation=0.2), np.array(ROBOT.motors.peak_torque)
+    np.testing.assert_allclose(give(peak), 0.8 * peak)
+    np.testing.assert_allclose(give(-0.5 * peak), -0.5 * 0.95 * peak)
+
+
+def test_the_current_follows_its_loop() -> None:
+    give = giver(current_bandwidth=100.0)
+    for k in range(1, 10):
+        expected = 3.0 * (1.0 - math.exp(-2.0 * math.pi * 100.0 * k * STEP))
+        np.testing.assert_allclose(give(3.0), expected)
+
+
+def test_the_current_is_limited() -> None:
+    np.testing.assert_allclose(giver(torque_limit=7.0)(9.0), 7.0)
+    np.testing.assert_allclose(giver(torque_limit=7.0)(-9.0), -7.0)
+
+
+def test_ripple_has_its_amplitude_and_no_mean() -> None:
+    turn = 2.0 * math.pi / 12
+    given = np.array([
+        giver(angle=float(angle), ripple=0.1, ripple_periods=12)(1.0)[4] - 1.0
+        for angle in np.linspace(0.0, turn, 32, endpoint=False)
+    ])  # fmt: skip
+    assert abs(given.mean()) < 1e-9 and abs(given).max() == pytest.approx(0.1, rel=0.02)
+
+
+@pytest.mark.parametrize("velocity", [-5.0, 5.0])
+def test_load_friction_opposes_the_motion_and_takes_its_share(velocity: float) -> None:
+    give = giver(velocity=velocity, load_friction=0.05)
+    turning = np.sign(ROBOT.joint_to_motor @ np.full(N, velocity))
+    moving = abs(ROBOT.joint_to_motor @ np.full(N, velocity)) > 1.0
+    np.testing.assert_allclose(give(4.0)[moving], (4.0 - 0.2 * turning)[moving], rtol=1e-6)
+
+
+def gears(inertia: float, step: float, **params: Any) -> tuple[Gears, PhysicsState]:
+    chosen = GearParameters.model_validate(params)
+    memory = PhysicsState.allocate({**SIZES, "n_rotors": N})
+    return Gears(chosen, ROBOT, np.full(N, inertia), step, memory), memory
+
+
+def test_two_bodies_swing_with_the_period_of_the_closed_form() -> None:
+    """A rotor and a link of inertia J, without torque, swing with w^2 = k (1 / I + 1 / J)."""
+    stiffness, rotor, link, step = 500.0, 1.6e-3, 4e-3, 2e-5
+    model, memory = gears(rotor / 0.9, step, stiffness=stiffness)
+    q, v, torque = np.zeros(N), np.zeros(N), np.zeros(N)
+    model.begin(q)
+    memory.rotor_angle[:] = 0.01
+    call = model.turning(q, v, torque)
+    matrix = ROBOT.joint_to_motor
+    twists = []
+    for _ in range(3000):
+        torque[:] = 0.0
+        call.run()
+        # links of equal inertia in the motors' coordinates
+        gear = np.linalg.solve(matrix.T, torque)
+        v += np.linalg.solve(matrix, gear / link) * step
+        q += v * step
+        twists.append(memory.rotor_angle[0] - (matrix @ q)[0])
+    crossings = [k for k in range(1, 3000) if twists[k - 1] < 0.0 <= twists[k]]
+    period = np.diff(crossings).mean() * step
+    assert period == pytest.approx(
+        2 * math.pi / math.sqrt(stiffness * (1 / rotor + 1 / link)), rel=1e-3
+    )
+    momentum = rotor * memory.rotor_speed + link * (matrix @ v)
+    np.testing.assert_allclose(momentum, 0.0, atol=1e-9)
+
+
+def test_within_its_play_a_gear_passes_nothing() -> None:
+    model, memory = gears(1e-3, STEP, stiffness=500.0, damping=1.0, backlash=0.02)
+    q, v, torque = np.zeros(N), np.zeros(N), np.zeros(N)
+    model.begin(q)
+    call = model.turning(q, v, torque)
+    for twist, passed in ((0.009, 0.0), (-0.009, 0.0), (0.012, 1.0), (-0.012, -1.0)):
+        memory.rotor_angle[:], memory.rotor_speed[:], torque[:] = twist, 0.0, 0.0
+        call.run()
+        np.testing.assert_allclose(
+            np.linalg.solve(ROBOT.joint_to_motor.T, torque), passed, atol=1e-9
+        )
+
+
+def test_stiff_gears_stand_like_rigid_ones() -> None:
+    poses = []
+    for gears_ in (None, {"stiffness": 5000.0, "damping": 0.5}):
+        robot = bench(timestep=0.00005, **({"gears": gears_} if gears_ else {}))
+        hold(robot)
+        robot.step(50)
+        robot.block.emit()
+        poses.append(robot.get("truth").joint_position.copy())
+    np.testing.assert_allclose(poses[1], poses[0], atol=2e-3)
+
+
+def test_gears_that_are_too_stiff_for_the_steps_are_refused() -> None:
+    with pytest.raises(Exception, match=r"move faster than physics steps of 0\.0005 s"):
+        bench(gears={"stiffness": 20000.0})
+    params = GearParameters.model_validate({"stiffness": 2000.0})
+    assert longest_step(params, np.full(3, 1e-3)) == pytest.approx(
+        0.1 * 2 * math.pi * math.sqrt(1e-3 * 0.09 / 2000.0)
+    )
+
+
+def pack(**params: Any) -> tuple[Battery, PhysicsState, MotorLimits, Any]:
+    chosen = BatteryParameters.model_validate(params)
+    memory = PhysicsState.allocate({**SIZES, "n_battery": 4})
+    battery = Battery(chosen, STEP, memory)
+    battery.begin()
+    limits = MotorLimits(ROBOT, TickRecord.allocate({**ROBOT.dimensions}))
+    return battery, memory, limits, battery.feeding(limits)
+
+
+def test_a_pack_sags_as_its_resistance_says() -> None:
+    battery, memory, limits, call = pack(
+        open_voltage=16.0, resistance=0.04, board_power=0.0, winding_resistance=0.0
+    )
+    limits.scratch.torque[:], limits.scratch.speed[:] = 4.0, 20.0
+    call.run()
+    power, voltage = 4.0 * 20.0 * N, float(battery.voltage[0])
+    assert voltage * memory.battery[3] == pytest.approx(power)
+    assert voltage == pytest.approx(16.0 - 0.04 * memory.battery[3])
+    ratio = voltage / 14.8
+    np.testing.assert_allclose(limits.motors.no_load, ratio * ROBOT.motors.no_load_speed)
+    corner = limits.motors.no_load - limits.motors.peak / limits.motors.slope
+    np.testing.assert_allclose(corner, ratio * ROBOT.motors.corner_speed)
+    limits.scratch.torque[:] = -4.0  # braking charges it
+    call.run()
+    assert battery.voltage[0] > 15.9 and memory.battery[3] < 0.0
+
+
+def test_beyond_what_a_pack_can_give_its_voltage_is_half() -> None:
+    battery, _, limits, call = pack(open_voltage=16.0, resistance=1.0)
+    limits.scratch.torque[:], limits.scratch.speed[:] = 10.0, 30.0
+    call.run()
+    assert battery.voltage[0] == pytest.approx(8.0, rel=1e-3)
+
+
+def test_a_pack_empties_and_recovers() -> None:
+    battery, memory, _, call = pack(
+        open_voltage=16.0, resistance=0.0, recovery_resistance=0.1, recovery_time=0.1,
+        board_power=160.0, capacity=100.0, fall=2.0,
+    )  # fmt: skip
+    for _ in range(2000):
+        call.run()
+    charge, recover = memory.battery[1], memory.battery[2]
+    assert charge == pytest.approx(10.5, rel=0.05)
+    assert recover == pytest.approx(0.1 * memory.battery[3], rel=0.02)
+    assert battery.voltage[0] == pytest.approx(16.0 - 2.0 * charge / 100.0 - recover, rel=1e-3)
+
+
+def test_the_voltage_of_the_pack_is_reported() -> None:
+    robot = bench(battery={"open_voltage": 15.0})
+    hold(robot)
+    robot.step(5)
+    robot.block.emit()
+    voltage = robot.get("health").voltage
+    assert (voltage == voltage[0]).all() and 13.0 < voltage[0] < 15.0
