@@ -28,6 +28,7 @@ from result_tables import (
     agreement_table,
     comparison_table,
     direction_table,
+    effects_table,
     frontier_table,
     impulse_table,
     quarter_table,
@@ -242,6 +243,16 @@ def write_robots_results(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
 
 
+def write_effects(file: Path) -> None:
+    """What each effect of a real robot does to a jump."""
+    refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
+
+
+def write_late(file: Path) -> None:
+    """Late sensors, told and not told."""
+    refresh(DOCS / "real_robots.md", "late", effects_table(read_json(file)["rows"]))
+
+
 def write_tick(file: Path) -> None:
     """How long a tick takes, with a picture, and some of it in README."""
     found = read_json(file)
@@ -270,6 +281,7 @@ STUDIES = "aloft study graphs/studies/"
 PAGES = {
     "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
     "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
+    "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "excerpts": Page(write_excerpts),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "landing": Page(
@@ -277,6 +289,7 @@ PAGES = {
         f"{STUDIES}push_polar.yaml and push_polar_12cm.yaml",
         "results/push_polar/summary.json results/push_polar_12cm/summary.json",
     ),
+    "late": Page(write_late, f"{STUDIES}late_sensors.yaml", "results/late_sensors/summary.json"),
     "results": Page(write_results),
     "robots": Page(write_robots),
     "robots_results": Page(

@@ -422,6 +422,18 @@ def twin_table(rows: Sequence[Row], runs: Sequence[Row]) -> str:
     return table(TWIN_HEAD, lines) + "\n" + _verdict({task: pairs[task] for task in shown})
 
 
+def effects_table(rows: Sequence[Row]) -> str:
+    """One row an effect, one column a task."""
+    tasks = list(dict.fromkeys(row["task"] for row in rows))
+    by_effect: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        by_effect.setdefault(row["effect"], {})[row["task"]] = row
+    return table(
+        ("effect", *tasks),
+        [(effect, *(succeeded(of[task]) for task in tasks)) for effect, of in by_effect.items()],
+    )
+
+
 def equally_likely(first: int, second: int) -> float:
     """The probability of a split at least as uneven as ``first`` to ``second`` between two sides that
     are equally likely: McNemar's exact test, on both sides."""
