@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -176,8 +176,7 @@ def _inside(node: Node, step: str) -> Node | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Array:
+class _Array(NamedTuple):
     """One array of memory that a block needs."""
 
     port: str
