@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -176,7 +176,8 @@ def _inside(node: Node, step: str) -> Node | None:
     return None
 
 
-class _Array(NamedTuple):
+@dataclass(frozen=True)
+class _Array:
     """One array of memory that a block needs."""
 
     port: str
