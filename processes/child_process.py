@@ -69,8 +69,9 @@ class ChildProcess:
             socket's descriptor, to which it writes ``READY``.
         arguments: texts for it.
         descriptors: open files that it inherits under their numbers.
-        stdout: whether its standard output is a pipe to here, instead of this process's.
-        shows_errors: whether its standard error is this process's; otherwise errors quote its end.
+        stdout: whether its standard output is a pipe to here.
+        shows_output: whether it prints where this process does; otherwise nothing is seen of it, but
+            errors quote the end of its standard error.
         environment: variables that it gets beside those of this process.
         parent_death: the signal that ends it when this process has died; ``None`` if it sees to
             that itself.
@@ -91,14 +92,14 @@ class ChildProcess:
         *,
         descriptors: Sequence[int] = (),
         stdout: bool = False,
-        shows_errors: bool = False,
+        shows_output: bool = False,
         environment: Mapping[str, str] | None = None,
         parent_death: signal.Signals | None = signal.SIGKILL,
     ) -> None:
         self.name = name
         self._owner = os.getpid()
         self._said = b""
-        self._errors = None if shows_errors else _file_without_name()
+        self._errors = None if shows_output else _file_without_name()
         self._socket, theirs = socket.socketpair()
         if isinstance(target, Path):
             command = ["-I", "-S", str(target), str(theirs.fileno())]
@@ -106,11 +107,12 @@ class ChildProcess:
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
             number = str(int(parent_death or 0))
             command = ["-c", _PROGRAM, folders, str(theirs.fileno()), number, target]
+        output = None if shows_output else subprocess.DEVNULL
         try:
             self._process = subprocess.Popen(
                 [sys.executable, *command, *arguments],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE if stdout else None,
+                stdout=subprocess.PIPE if stdout else output,
                 stderr=self._errors,
                 pass_fds=[theirs.fileno(), *descriptors],
                 env={**os.environ, **(environment or {})},
@@ -159,13 +161,12 @@ class ChildProcess:
         """Wait until it has called ``report_ready``.
 
         Raises:
-            ChildError: it has died, or takes longer; then it is ended.
+            ChildError: it has died, or takes longer; it is for the caller to end it then.
         """
         end = monotonic() + seconds
         while READY not in self._said:
             left = end - monotonic()
             if left <= 0:
-                self.stop()
                 raise ChildError(f"{self.name} was not ready within {seconds:g} s", None)
             if not self._listen(left):
                 raise self.failure()
@@ -181,17 +182,16 @@ class ChildProcess:
             if line.startswith(b"{"):
                 message = json.loads(line)
         if message:
-            how = f"{message['type']}: {message['text']}"
+            how = f"failed with {message['type']}: {message['text']}"
         elif code is None:
-            how = "it does not answer"
+            how = "does not answer"
         elif code < 0:
-            how = f"it was killed by {signal.Signals(-code).name}"
+            how = f"was killed by {signal.Signals(-code).name}"
         else:
-            how = f"it ended with exit code {code}"
+            how = f"ended with exit code {code}"
         lines = [] if message else self.last_lines()
-        return ChildError(
-            "; ".join([f"{self.name} has died: {how}", *lines]), code, message.get("type", "")
-        )
+        text = "; ".join([f"{self.name} {how}", *lines])
+        return ChildError(text, code, message.get("type", ""))
 
     def last_lines(self) -> list[str]:
         """The end of what it wrote to its standard error, if that is kept."""

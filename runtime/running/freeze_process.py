@@ -36,6 +36,7 @@ _FRAME = re.compile(r'^  File "(?P<file>[^"]*)", line (?P<line>\d+) in (?P<name>
 def main() -> int:
     """Watch until the pipe ends, or until the beats stop."""
     pid, limit, as_json = int(sys.argv[2]), float(sys.argv[3]), sys.argv[4] == "1"
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # meant for the run
     head = b""
     while not head.endswith(b"\n"):
         letter = os.read(0, 1)

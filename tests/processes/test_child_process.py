@@ -101,7 +101,7 @@ def test_bytes_go_there_and_back(start: Start) -> None:
 
 @pytest.mark.parametrize("kind", ["ValueError", "RuntimeError", "ImportError"])
 def test_an_exception_comes_back_with_its_type_and_text(start: Start, kind: str) -> None:
-    said = f"the helper has died: {kind}: no such\nthing"
+    said = f"the helper failed with {kind}: no such\nthing"
     with start("fail", kind, "no such\nthing") as child, pytest.raises(ChildError) as found:
         child.wait_until_ready(SECONDS)
     assert str(found.value) == said
@@ -116,14 +116,12 @@ def test_a_missing_function_is_named(start: Start) -> None:
 def test_the_last_lines_of_a_child_that_leaves_are_quoted(start: Start) -> None:
     with start("leave", "3") as child, pytest.raises(ChildError) as found:
         child.wait_until_ready(SECONDS)
-    assert str(found.value) == (
-        "the helper has died: it ended with exit code 3; first line; last line"
-    )
+    assert str(found.value) == "the helper ended with exit code 3; first line; last line"
 
 
 def test_a_child_that_hangs_at_its_start_is_ended(start: Start) -> None:
-    child = start("hang")
-    with pytest.raises(ChildError, match=r"the helper was not ready within 0\.3 s"):
+    said = r"the helper was not ready within 0\.3 s"
+    with start("hang") as child, pytest.raises(ChildError, match=said):
         child.wait_until_ready(0.3)
     assert not Path(f"/proc/{child.pid}").exists()
 
@@ -135,7 +133,7 @@ def test_a_death_in_the_middle_is_noticed_at_once(start: Start) -> None:
         threading.Timer(0.2, os.kill, (child.pid, signal.SIGKILL)).start()
         assert select([child], [], [], SECONDS)[0]
         assert time.monotonic() - begun < 5.0
-        assert str(child.failure()) == "the helper has died: it was killed by SIGKILL"
+        assert str(child.failure()) == "the helper was killed by SIGKILL"
 
 
 def test_one_that_ignores_sigterm_is_killed(start: Start) -> None:
