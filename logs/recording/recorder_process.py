@@ -3,8 +3,8 @@
 It is told what to do by a ``RecorderTask`` on its command line and by the first record in the ring, the
 header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
-written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
-that it is ready and, at the end, a ``RecorderReport``.
+written, and the file is closed and gets its name. On its standard output it writes a
+``RecorderReport`` at the end, as a line of JSON.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ...processes.child_process import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
@@ -360,7 +361,7 @@ def main(task: str) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     recorder = RecorderProcess(RecorderTask(**json.loads(task)))
-    _say({"ready": True})
+    report_ready()
     told: set[str] = set()
     text, source = b"", sys.stdin.fileno()
     while True:
