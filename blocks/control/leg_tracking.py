@@ -92,6 +92,7 @@ class LegSettings(NamedTuple):
 class LegScratch(NamedTuple):
     """Memory for intermediate results; ``line`` and ``rate`` lead from one kernel to the other."""
 
+    least_squares: VelocityScratch
     line: Vector3
     rate: Vector3
     angles: Array1D
@@ -101,7 +102,6 @@ class LegScratch(NamedTuple):
     velocity: Vector3
     place: Vector3
     jacobian: Array2D
-    least_squares: VelocityScratch
 
 
 def with_margin(leg: Leg, margin: float) -> Leg:
@@ -112,7 +112,7 @@ def with_margin(leg: Leg, margin: float) -> Leg:
 def leg_scratch() -> LegScratch:
     """Zero memory for one leg."""
     shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5))
-    return LegScratch(*(np.zeros(shape) for shape in shapes), velocity_scratch())
+    return LegScratch(velocity_scratch(), *(np.zeros(shape) for shape in shapes))
 
 
 @kernel
