@@ -37,7 +37,7 @@ from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, Recor
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
 _MAIN = (
-    "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
+    "import gc, json, sys; gc.disable(); sys.path[:] = json.loads(sys.argv[2]); "
     "from aloft.logs.recording.recorder_process import main; main(sys.argv[1])"
 )
 START_TIME = 30.0

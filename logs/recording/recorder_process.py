@@ -9,6 +9,7 @@ that it is ready and, at the end, a ``RecorderReport``.
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import select
@@ -19,7 +20,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,10 +28,12 @@ from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
-from .live_feed import LiveFeed
 from .place import RecordingPlace, cause_of, split_name, take_place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
+
+if TYPE_CHECKING:
+    from .live_feed import LiveFeed
 
 HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
@@ -131,7 +134,7 @@ class RecorderProcess:
         if task.path:
             self._place = RecordingPlace(Path(task.path), task.file, task.keep)
             self._guard(lambda: self._open(header))
-        self.feed = LiveFeed(task.live, header) if task.live else None
+        self.feed = _live_feed(task.live, header) if task.live else None
         self._fed_rows = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
@@ -330,6 +333,12 @@ class RecorderProcess:
         self.report.error_number = cause_of(error)
 
 
+def _live_feed(source: str, header: Header) -> LiveFeed:
+    from .live_feed import LiveFeed  # imports what only a viewer of a part needs
+
+    return LiveFeed(source, header)
+
+
 def _went_on(path: Path, ticks: int) -> dict[str, Any]:
     """The outcome in a file of a run that goes on in the file ``path``; ``ticks`` were run so far."""
     return {
@@ -356,6 +365,8 @@ def _memory() -> int:
 
 def main(task: str) -> None:
     """Do what the task says, until standard input ends."""
+    gc.freeze()  # what was imported stays, and is not looked through
+    gc.enable()
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
