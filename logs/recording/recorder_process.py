@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,10 +28,12 @@ from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
-from .live_feed import LiveFeed
 from .place import RecordingPlace, cause_of, split_name, take_place
 from .ring import Record, RingReader
 from .writer import RecordingWriter, warm_up
+
+if TYPE_CHECKING:
+    from .live_feed import LiveFeed
 
 HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
 """The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
@@ -132,7 +134,7 @@ class RecorderProcess:
         if task.path:
             self._place = RecordingPlace(Path(task.path), task.file, task.keep)
             self._guard(lambda: self._open(header))
-        self.feed = LiveFeed(task.live, header) if task.live else None
+        self.feed = _live_feed(task.live, header) if task.live else None
         self._fed_rows = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
@@ -329,6 +331,12 @@ class RecorderProcess:
     def _note_problem(self, error: Exception, text: str) -> None:
         self.report.problem = text
         self.report.error_number = cause_of(error)
+
+
+def _live_feed(source: str, header: Header) -> LiveFeed:
+    from .live_feed import LiveFeed  # imports what only a viewer of a part needs
+
+    return LiveFeed(source, header)
 
 
 def _went_on(path: Path, ticks: int) -> dict[str, Any]:
