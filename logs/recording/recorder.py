@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -24,6 +22,7 @@ from pathlib import Path
 from select import select
 from typing import Any, Literal
 
+from ...processes.child_process import ChildError, ChildProcess
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
@@ -33,15 +32,13 @@ from ..file.header import header_of
 from ..file.reader import read
 from ..viewing.robot_shapes import missing_meshes
 from .place import RecordingPlace, cause_of, part_of, remedy, replaced, take_place
-from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
+from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask, main
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
-_MAIN = (
-    "import gc, json, sys; gc.disable(); sys.path[:] = json.loads(sys.argv[2]); "
-    "from aloft.logs.recording.recorder_process import main; main(sys.argv[1])"
-)
 START_TIME = 30.0
 """Seconds the process may take to be ready for a run in real time."""
+ENDING = 10.0
+"""Seconds from the process's report to its end."""
 STALL_TIME = 60.0
 """Seconds without any progress that are worth a warning, and more than a robot waits. A process
 that is slow, as its disk is slow or the machine has too much to do, makes progress."""
@@ -87,18 +84,17 @@ class RecorderLink:
             task = RecorderTask(
                 descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
             )
-            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
-            # not forked, as a copy of this process would hold its robot; and in a session of its
-            # own, so that nobody's Ctrl-C ends it before the run has come to rest
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _MAIN, json.dumps(asdict(task)), folders],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                pass_fds=[descriptor, *([file] if file >= 0 else [])],
+            self._process = ChildProcess(
+                "the recorder",
+                f"{main.__module__}:main",
+                [json.dumps(asdict(task))],
+                descriptors=[descriptor, *([file] if file >= 0 else [])],
+                stdout=True,
+                shows_output=True,
                 # What fails, a viewer or the disk, this process says in a line of its own; Rerun's log
                 # would say it again several times, as raw lines. Who wants them sets RUST_LOG.
-                env={"RUST_LOG": "off", **os.environ},
-                start_new_session=True,
+                environment={"RUST_LOG": os.environ.get("RUST_LOG", "off")},
+                parent_death=None,  # it completes the file when its input ends
             )
         except BaseException:
             if place is not None:
@@ -109,7 +105,7 @@ class RecorderLink:
                 os.close(descriptor)
             if place is not None:
                 place.close()  # the process holds the file and its lock
-        assert self._process.stdin is not None and self._process.stdout is not None
+        assert self._process.stdout is not None
         self._input, self._output = self._process.stdin, self._process.stdout
         self._said = b""
         self._seen, self._since = (0, 0), time.monotonic()
@@ -121,7 +117,7 @@ class RecorderLink:
 
     def is_alive(self) -> bool:
         """Whether the process is running."""
-        return self._process.poll() is None
+        return self._process.is_alive()
 
     def stalled_for(self) -> float:
         """The seconds since the process last made progress, or since ``reset_stall_timer`` was called.
@@ -146,13 +142,9 @@ class RecorderLink:
         """Restart the clock of ``stalled_for``, because the process had nothing to read until now."""
         self._since = time.monotonic()
 
-    def wait_until_ready(self) -> bool:
-        """Wait until the process reads from the ring. Returns whether it does."""
-        end = time.monotonic() + START_TIME
-        while b"\n" not in self._said and time.monotonic() < end:
-            if not self._listen(0.1):
-                return False
-        return b"\n" in self._said
+    def wait_until_ready(self) -> None:
+        """Wait until the process reads from the ring. Raises ``ChildError``."""
+        self._process.wait_until_ready(START_TIME)
 
     def finish(
         self, outcome: dict[str, Any], goes_on: Callable[[], bool]
@@ -172,17 +164,14 @@ class RecorderLink:
             # In this order: the process may end just now, and then ``goes_on`` says no as well.
             if not goes_on() and self.is_alive():
                 return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
-        self._output.close()
-        code = self._process.wait()
+        whole = self._said.endswith(b"\n")
+        problem = "" if whole else str(self._process.failure())
+        self._process.stop(asked=ENDING)
         self.ring.close()
-        lines = [json.loads(line) for line in self._said.splitlines()]
-        if lines and "rows" in lines[-1]:
-            return RecorderReport(**lines[-1]), ""
-        how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
-        return None, f"the recorder {how}"
+        return (None, problem) if problem else (RecorderReport(**json.loads(self._said)), "")
 
     def _listen(self, seconds: float) -> bool:
-        """Read the process's messages within that time. Returns false when no more can come."""
+        """Read the process's report within that time. Returns false when no more can come."""
         if not select([self._output], [], [], seconds)[0]:
             return True
         part = os.read(self._output.fileno(), 65536)
@@ -295,8 +284,11 @@ class Recorder:
                 self._warn(missing)
         self._write = self.link.ring.write
         bound.parameters.listeners.append(self._note_change)
-        if not free and not self.link.wait_until_ready():
-            self._warn("the recorder was not ready when the run began")
+        if not free:
+            try:
+                self.link.wait_until_ready()
+            except ChildError as error:
+                self._warn(f"the run began without a recorder: {error}")
         if self._every and bound.clock.tick:
             self._keep_keyframe(bound.clock.tick)  # a run that goes on from a snapshot
 

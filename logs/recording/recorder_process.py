@@ -3,13 +3,12 @@
 It is told what to do by a ``RecorderTask`` on its command line and by the first record in the ring, the
 header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
-written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
-that it is ready and, at the end, a ``RecorderReport``.
+written, and the file is closed and gets its name. On its standard output it writes a
+``RecorderReport`` at the end, as a line of JSON.
 """
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import select
@@ -24,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...processes.child_process import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
@@ -365,13 +365,11 @@ def _memory() -> int:
 
 def main(task: str) -> None:
     """Do what the task says, until standard input ends."""
-    gc.freeze()  # what was imported stays, and is not looked through
-    gc.enable()
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     recorder = RecorderProcess(RecorderTask(**json.loads(task)))
-    _say({"ready": True})
+    report_ready()
     told: set[str] = set()
     text, source = b"", sys.stdin.fileno()
     while True:

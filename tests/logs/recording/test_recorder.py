@@ -167,7 +167,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     recorded = read(tmp_path / "a.part.rrd")
     count = len(recorded.ticks)
     warning = result.warnings[-1]
-    assert "is not whole: the recorder was killed by signal 9" in warning
+    assert "is not whole: the recorder was killed by SIGKILL" in warning
     # every tick is accounted for, also those that waited in the ring
     assert f"{count} ticks are in" in warning
     assert f"{5000 - count} were run but are not recorded" in warning
