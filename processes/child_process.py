@@ -39,7 +39,7 @@ KILL_TIME = 5.0
 LAST_LINES = 5
 """Lines of a child's standard error that an error quotes."""
 _PROGRAM = (
-    "import sys, json; sys.path[:] = json.loads(sys.argv.pop(1)); "
+    "import gc, json, sys; gc.disable(); sys.path[:] = json.loads(sys.argv.pop(1)); "
     f"from {__name__} import main; main()"
 )
 _link = -1
@@ -289,11 +289,10 @@ def main() -> None:
         end_with(_link, number)
     module, function = target.split(":")
     try:
-        gc.disable()  # nothing that is imported is garbage
-        called = getattr(import_module(module), function)
-        gc.freeze()
+        work = getattr(import_module(module), function)
+        gc.freeze()  # what was imported stays, and is not looked through
         gc.enable()
-        called(*sys.argv[4:])
+        work(*sys.argv[4:])
     except Exception as error:
         message = {"type": type(error).__name__, "text": str(error)}
         with suppress(OSError):
