@@ -90,7 +90,6 @@ class RecorderLink:
                 [json.dumps(asdict(task))],
                 descriptors=[descriptor, *([file] if file >= 0 else [])],
                 stdout=True,
-                shows_output=True,
                 # What fails, a viewer or the disk, this process says in a line of its own; Rerun's log
                 # would say it again several times, as raw lines. Who wants them sets RUST_LOG.
                 environment={"RUST_LOG": os.environ.get("RUST_LOG", "off")},
