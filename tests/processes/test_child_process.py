@@ -13,6 +13,8 @@ import pytest
 
 from aloft.processes.child_process import ChildError, ChildProcess
 
+from ..waiting import is_gone
+
 SECONDS = 30.0
 """No wait of a test lasts longer."""
 PROGRAMS = """
@@ -72,20 +74,6 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Start:
         return ChildProcess("the helper", target, arguments, **options)  # type: ignore[arg-type]
 
     return begin
-
-
-def is_gone(pid: int, seconds: float = SECONDS) -> bool:
-    """Whether a process ends within that time; one that nobody waited for counts as ended."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        try:
-            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        except OSError:
-            return True
-        if state == "Z":
-            return True
-        time.sleep(0.01)
-    return False
 
 
 def test_bytes_go_there_and_back(start: Start) -> None:
