@@ -79,7 +79,8 @@ def cost(graph: CheckedGraph, folder: Path, rounds: int) -> list[Row]:
     opened = (sink, with_keyframes)
     for one in opened:
         one.open(bound)
-        assert one.link is not None and one.link.wait_until_ready()
+        assert one.link is not None
+        one.link.wait_until_ready()
 
     def copy(tick: int) -> None:
         target[:] = bus

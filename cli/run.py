@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -11,8 +13,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.option_groups import expand_option_groups
-from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
+from .shared.options import (
+    CompletedOverrides,
+    JsonBesideTables,
+    NoRecord,
+    Quiet,
+    expand_option_groups,
+)
 from .shared.output import (
     console,
     errors_reported,
@@ -21,6 +28,7 @@ from .shared.output import (
 from .shared.run_graph import OneRunOptions, RunnableGraph, run_many, run_once
 
 if TYPE_CHECKING:
+    from ..logs.recording.recorder_link import RecorderLink
     from ..logs.viewing.viewer import Viewer
     from ..runtime.live.parameter_endpoint import ParameterEndpoint
 
@@ -173,27 +181,43 @@ def run(
             seeds = parse_seeds(changes.seeds)
             code = run_many(graph, settings, seeds, out, as_json, plain=plain, fuse=compiling.fuse)
         else:
-            loaded: RunnableGraph = load(graph, settings)
-            name = loaded.checked.name
-            if parts.machine:
-                from .shared.run_machines import MachineRun
+            with recorder_started(wanted=not observation.no_record) as link:
+                loaded: RunnableGraph = load(graph, settings)
+                name = loaded.checked.name
+                if parts.machine:
+                    from .shared.run_machines import MachineRun
 
-                loaded = MachineRun(loaded.checked, parts.machine, parts.keys)
-                name = f"{name}-{parts.machine}"
-            endpoint = open_endpoint(loaded, observation.params, name)
-            messages: list[str] = []
-            viewer = open_viewer(observation.rerun, messages)
-            default = Path("recordings") / f"{name}.rrd"
-            one_run = OneRunOptions(
-                record=None if observation.no_record else observation.record or default,
-                keep=observation.keep, split=split_time(observation.split), as_json=as_json,
-                traceback=traceback, plain=plain, fuse=compiling.fuse, real_time=thread_options,
-            )  # fmt: skip
-            sinks = [endpoint] if endpoint is not None else []
-            code = run_once(loaded, one_run, out, sinks=sinks, viewer=viewer, messages=messages)
-            if viewer is not None:
-                leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
+                    loaded = MachineRun(loaded.checked, parts.machine, parts.keys)
+                    name = f"{name}-{parts.machine}"
+                endpoint = open_endpoint(loaded, observation.params, name)
+                messages: list[str] = []
+                viewer = open_viewer(observation.rerun, messages)
+                default = Path("recordings") / f"{name}.rrd"
+                one_run = OneRunOptions(
+                    record=None if observation.no_record else observation.record or default,
+                    keep=observation.keep, split=split_time(observation.split), as_json=as_json,
+                    traceback=traceback, plain=plain, fuse=compiling.fuse, real_time=thread_options,
+                )  # fmt: skip
+                sinks = [endpoint] if endpoint is not None else []
+                code = run_once(
+                    loaded, one_run, out, sinks=sinks, viewer=viewer, link=link, messages=messages
+                )
+                if viewer is not None:
+                    leave_viewer(viewer, wait=not as_json and sys.stdin.isatty())
     raise typer.Exit(code)
+
+
+@contextmanager
+def recorder_started(*, wanted: bool) -> Iterator[RecorderLink | None]:
+    """The recorder's process if one is wanted, which starts while the graph is loaded."""
+    from ..logs.recording.recorder_link import start_early
+
+    link = start_early() if wanted else None
+    try:
+        yield link
+    finally:
+        if link is not None:
+            link.close()
 
 
 def check_combination(

@@ -16,11 +16,11 @@ A target beyond reach is moved into reach in the plane of its sole, and a leg th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Array1D, Array2D, Matrix3, Vector3
+from ..mathematics.arrays import Array1D, Array2D, Indices1D, Matrix3, Vector3
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_matrices, solve_damped
 from ..mathematics.rotations import unit, wrap
@@ -38,23 +38,22 @@ LEVEL = 1e-3
 """The least ``level`` of ``inverse``: nearer to gimbal lock the exact yaw would be noise."""
 
 
-@dataclass(frozen=True)
-class Leg:
+class Leg(NamedTuple):
     """The geometry of one leg.
 
     Attributes:
-        joints: the indices of yaw, pitch, roll, knee and ankle among the robot's joints.
+        joints: the indices of yaw, pitch, roll, knee and ankle among the robot's joints, (5,).
         hip: the hip centre [m, base frame], (3,).
         plane: hip to knee, knee to ankle, ankle to sole centre [m], rows of (x, z).
         signs: the robot's angle = sign times the canonical one, (5,).
         limits: lower and upper limits of the robot's angles [rad], (5, 2).
     """
 
-    joints: tuple[int, ...]
-    hip: Array
-    plane: Array
-    signs: Array
-    limits: Array
+    joints: Indices1D
+    hip: Vector3
+    plane: Array2D
+    signs: Array1D
+    limits: Array2D
 
 
 def read_leg(robot: RobotDescription, foot: int) -> Leg:
@@ -75,7 +74,7 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
     offsets = np.array([joints[3].origin, joints[4].origin, robot.feet[foot].sole])
     signs = [joint.axis[k] * c for joint, (_, k), c in zip(joints, _AXES, _CANONICAL, strict=True)]
     return Leg(
-        joints=chain,
+        joints=np.array(chain),
         hip=np.array(joints[0].origin),
         plane=np.ascontiguousarray(offsets[:, ::2]),
         signs=np.array(signs),
@@ -115,16 +114,10 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
 
 
 @kernel
-def forward(
-    hip: Vector3,
-    plane: Array2D,
-    signs: Array1D,
-    angles: Array1D,
-    position: Vector3,
-    rotation: Matrix3,
-) -> None:
+def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> None:
     """The sole centre (3,) and the foot's rotation (3, 3) to the base, from the joint angles."""
-    a, b, c, k, n = _canonical(signs, angles)
+    hip, plane = leg.hip, leg.plane
+    a, b, c, k, n = _canonical(leg.signs, angles)
     _thigh_rotation(a, b, c, rotation)
     cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
     calf_x, calf_z = plane[1, 0], plane[1, 1]
@@ -182,10 +175,7 @@ def jacobian(plane: Array2D, signs: Array1D, angles: Array1D, out: Array2D) -> N
 
 @kernel
 def inverse(
-    hip: Array1D,
-    plane: Array2D,
-    signs: Array1D,
-    limits: Array2D,
+    leg: Leg,
     sole: Array1D,
     line: Array1D,
     softness: float,
@@ -210,7 +200,7 @@ def inverse(
     past its place by at most ``level`` times the yaw that is left out.
 
     Args:
-        hip, plane, signs, limits: of the ``Leg``; limits with any margin already taken off.
+        leg: its limits with any margin already taken off.
         sole: where the sole centre should be [m, base frame].
         line: the direction from heel to toe [base frame], of any length.
         softness: see above [m]; zero for none.
@@ -222,6 +212,7 @@ def inverse(
         Whether the target is met without touching a limit, and how much the foot moves away from
         the hip per movement of the target: one, or less where the leg is stretched.
     """
+    hip, plane, signs, limits = leg.hip, leg.plane, leg.signs, leg.limits
     px = min(max(sole[0] - hip[0], -_FAR), _FAR)
     py = min(max(sole[1] - hip[1], -_FAR), _FAR)
     pz = min(max(sole[2] - hip[2], -_FAR), _FAR)
@@ -380,10 +371,7 @@ def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
 
 @kernel
 def slide(
-    hip: Array1D,
-    plane: Array2D,
-    signs: Array1D,
-    limits: Array2D,
+    leg: Leg,
     sole: Array1D,
     rotation: Array2D,
     softness: float,
@@ -400,7 +388,7 @@ def slide(
     is found by bisection, to within a 256th of their distance.
 
     Args:
-        hip, plane, signs, limits, softness, kept_yaw, level: as for ``five_joint_leg.inverse``.
+        leg, softness, kept_yaw, level: as for ``inverse``.
         sole, rotation: the target's place and axes, of which the third is normal to the sole.
         place: scratch (3,).
         angles: out, the joint angles (5,) for that place; as they were where there is none.
@@ -411,7 +399,7 @@ def slide(
     nx, ny, nz = rotation[0, 2], rotation[1, 2], rotation[2, 2]
     if nz < _LEVEL or not abs(nx * nx + ny * ny + nz * nz - 1.0) < 0.1:
         return False, 1.0
-    hx, hy, hz = hip[0], hip[1], hip[2]
+    hx, hy, hz = leg.hip[0], leg.hip[1], leg.hip[2]
     sx = min(max(sole[0], -_FARTHEST), _FARTHEST)
     sy = min(max(sole[1], -_FARTHEST), _FARTHEST)
     sz = min(max(sole[2], -_FARTHEST), _FARTHEST)
@@ -429,9 +417,7 @@ def slide(
             place[0] = ax + part * (sx - ax)
             place[1] = ay + part * (sy - ay)
             place[2] = az + part * (sz - az)
-            inside, kept = inverse(
-                hip, plane, signs, limits, place, line, softness, kept_yaw, level, angles
-            )
+            inside, kept = inverse(leg, place, line, softness, kept_yaw, level, angles)
             if inside:
                 near, share = part, kept
             elif step == 0:
@@ -440,7 +426,7 @@ def slide(
                 far = part
             if last:
                 return True, share
-    inverse(hip, plane, signs, limits, sole, line, softness, kept_yaw, level, angles)
+    inverse(leg, sole, line, softness, kept_yaw, level, angles)
     return False, 1.0
 
 
@@ -455,16 +441,16 @@ def keep_along(axis: Vector3, vector: Vector3) -> None:
 
 @kernel
 def slow_stretch(
-    hip: Vector3, plane: Array2D, sole: Vector3, rotation: Matrix3, share: float, velocity: Vector3
+    leg: Leg, sole: Vector3, rotation: Matrix3, share: float, velocity: Vector3
 ) -> None:
     """Keep only a ``share`` of the velocity [m/s] that leads the ankle away from the hip.
 
     Args:
-        hip, plane: of the ``Leg``.
-        sole, rotation: of the foot, from ``five_joint_leg.forward``.
+        sole, rotation: of the foot, from ``forward``.
     """
     if share == 1.0:
         return
+    hip, plane = leg.hip, leg.plane
     square, along = 1e-9, 0.0
     for i in range(3):
         lever = plane[2, 0] * rotation[i, 0] + plane[2, 1] * rotation[i, 2]
@@ -495,6 +481,19 @@ def line_rate(line: Array1D, last: Array1D, period: float, known: bool, out: Arr
     last[0], last[1], last[2] = x, y, z
 
 
+class VelocityScratch(NamedTuple):
+    """Memory of ``inverse_velocity``."""
+
+    rows: Array2D
+    turns: Array2D
+    normal: Array2D
+
+
+def velocity_scratch() -> VelocityScratch:
+    """Zero memory for one leg."""
+    return VelocityScratch(np.zeros((6, 5)), np.zeros((3, 5)), np.zeros((5, 5)))
+
+
 @kernel
 def inverse_velocity(
     sole_jacobian: Array2D,
@@ -505,9 +504,7 @@ def inverse_velocity(
     damping: float,
     held: float,
     kept_rate: float,
-    rows: Array2D,
-    turns: Array2D,
-    normal: Array2D,
+    scratch: VelocityScratch,
     out: Array1D,
 ) -> None:
     """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
@@ -524,8 +521,8 @@ def inverse_velocity(
         damping: in m; 1e-4 has no effect until a leg is within 1e-4 rad of full stretch.
         held: from 0 to 1, how much the hip's yaw keeps to ``kept_rate``; see ``yaw_share``.
         kept_rate: of the robot's hip yaw near gimbal lock [rad/s].
-        rows, turns, normal: scratch of shapes (6, 5), (3, 5) and (5, 5).
     """
+    rows, turns = scratch.rows, scratch.turns
     multiply_matrices(rotation.T, sole_jacobian[3:6, :], turns)
     turn = nod = 0.0
     for i in range(3):
@@ -544,4 +541,4 @@ def inverse_velocity(
         for i in range(3):
             value += rows[i, j] * velocity[i]
         out[j] = value + rows[5, j] * held * length * kept_rate
-    solve_damped(rows, damping, normal, out)
+    solve_damped(rows, damping, scratch.normal, out)

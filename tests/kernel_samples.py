@@ -294,7 +294,7 @@ UNUSED = {
     "aloft.robots.limb._along": (POSE, LIMB.tip),
     "aloft.mathematics.rotations.unit": (0.1, 0.2, 0.3, 1.0, 0.0, 0.0),
     "aloft.robots.five_joint_leg.slide": (
-        LEG.hip, LEG.plane, LEG.signs, LEG.limits, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
+        LEG, np.add(LEG.hip, [0.25, 0.02, -0.3]), np.eye(3), 0.005,
         0.1, 0.05, np.zeros(3), np.zeros(5),
     ),
     "aloft.mathematics.rotations.skew": (np.ones(3), np.zeros((3, 3))),

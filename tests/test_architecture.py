@@ -16,16 +16,17 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
+    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
+    "processes": (),
     "files": ("runtime/language/errors", "runtime/language/units"),
-    "mathematics": (),
+    "mathematics": ("processes",),
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel"),
     "runtime/running": (
-        "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
+        "processes", "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
     "runtime/loading": (
         "files", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
@@ -56,7 +57,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "planner/models": ("planner/task", "mathematics", "robots"),
     "planner/problem": ("planner/task", "planner/models", "mathematics", "robots", "blocks/signals"),
     "planner/solving": (
-        "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
+        "processes", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
         "blocks/signals",
     ),
     "planner/checking": (
@@ -76,14 +77,14 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
-    "hal": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
+    "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "ros2": ("robots", "runtime/language"),
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
-        "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
+        "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
     "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
@@ -92,7 +93,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "runtime/language",
     ),
     "logs": ("logs/file",),
-    "studies": ("files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
+    "studies": ("processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
     "benchmarks": (
         "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
     ),

@@ -25,12 +25,12 @@ from .leg_tracking import (
     LegSettings,
     follow_foot,
     follow_limb,
-    leg_geometry,
     leg_scratch,
     limb_geometry,
     limb_memory,
     watch_foot,
     watch_line,
+    with_margin,
 )
 
 LATERAL = 0.9
@@ -238,7 +238,7 @@ class LegInverseKinematics(KernelBlock):
             watch_line, foot, self.feet, self.reference, pitched, self.period, self.memory, scratch
         )
         follow = signal_call(
-            follow_foot, leg_geometry(leg, self.params.margin), foot, self.feet, self.reference,
+            follow_foot, with_margin(leg, self.params.margin), foot, self.feet, self.reference,
             self._settings, scratch, self.target,
         )  # fmt: skip
         return watch, follow

@@ -25,6 +25,7 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...robots.five_joint_leg import (
     Leg,
+    VelocityScratch,
     forward,
     inverse,
     inverse_velocity,
@@ -34,6 +35,7 @@ from ...robots.five_joint_leg import (
     pitched_line,
     slide,
     slow_stretch,
+    velocity_scratch,
     yaw_share,
 )
 from ...robots.kinematics import ball_feet
@@ -87,19 +89,10 @@ class LegSettings(NamedTuple):
 # Legs in closed form
 
 
-class LegGeometry(NamedTuple):
-    """A ``Leg`` as arrays; ``joints`` (5,) are its joints' indices."""
-
-    joints: Indices1D
-    hip: Vector3
-    plane: Array2D
-    signs: Array1D
-    limits: Array2D
-
-
 class LegScratch(NamedTuple):
     """Memory for intermediate results; ``line`` and ``rate`` lead from one kernel to the other."""
 
+    least_squares: VelocityScratch
     line: Vector3
     rate: Vector3
     angles: Array1D
@@ -109,21 +102,17 @@ class LegScratch(NamedTuple):
     velocity: Vector3
     place: Vector3
     jacobian: Array2D
-    rows: Array2D
-    turns: Array2D
-    normal: Array2D
 
 
-def leg_geometry(leg: Leg, margin: float) -> LegGeometry:
+def with_margin(leg: Leg, margin: float) -> Leg:
     """A leg whose joints stay ``margin`` [rad] inside their limits."""
-    limits = leg.limits + np.array([margin, -margin])
-    return LegGeometry(np.array(leg.joints), leg.hip, leg.plane, leg.signs, limits)
+    return leg._replace(limits=leg.limits + np.array([margin, -margin]))
 
 
 def leg_scratch() -> LegScratch:
     """Zero memory for one leg."""
-    shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5), (6, 5), (3, 5), (5, 5))
-    return LegScratch(*(np.zeros(shape) for shape in shapes))
+    shapes = (3, 3, 5, 5, 3, (3, 3), 3, 3, (6, 5))
+    return LegScratch(velocity_scratch(), *(np.zeros(shape) for shape in shapes))
 
 
 @kernel
@@ -152,7 +141,7 @@ def watch_line(
 
 @kernel
 def follow_foot(
-    leg: LegGeometry,
+    leg: Leg,
     number: int,
     feet: FootTarget,
     reference: JumpReference,
@@ -173,35 +162,23 @@ def follow_foot(
     position, rotation = feet.position[number], feet.rotation[number]
     yaw = reference.joint_position[leg.joints[0]]
     yaw_rate = reference.joint_velocity[leg.joints[0]]
-    inside, share = inverse(
-        leg.hip,
-        leg.plane,
-        leg.signs,
-        leg.limits,
-        position,
-        scratch.line,
-        softness,
-        yaw,
-        level,
-        angles,
-    )
+    inside, share = inverse(leg, position, scratch.line, softness, yaw, level, angles)
     target.reachable[number] = inside
     velocity[:] = min(max(feet.velocity[number], -_FASTEST), _FASTEST)  # of each element
     if settings.slides and not inside:
         slid, slid_share = slide(
-            leg.hip, leg.plane, leg.signs, leg.limits, position, rotation, softness, yaw,
-            level, scratch.place, angles,
-        )  # fmt: skip
+            leg, position, rotation, softness, yaw, level, scratch.place, angles
+        )
         if slid:
             share = slid_share
             keep_along(rotation[:, 2], velocity)
-    forward(leg.hip, leg.plane, leg.signs, angles, scratch.sole, turn)
+    forward(leg, angles, scratch.sole, turn)
     jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
-    slow_stretch(leg.hip, leg.plane, scratch.sole, turn, share, velocity)
+    slow_stretch(leg, scratch.sole, turn, share, velocity)
     yaw_held = 1.0 - yaw_share(math.cos(angles[1]), level)
     inverse_velocity(
         scratch.jacobian, turn, velocity, scratch.rate, settings.turn_length,
-        settings.damping, yaw_held, yaw_rate, scratch.rows, scratch.turns, scratch.normal, speeds,
+        settings.damping, yaw_held, yaw_rate, scratch.least_squares, speeds,
     )  # fmt: skip
     limit = settings.speed_limit
     for i in range(5):

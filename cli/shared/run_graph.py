@@ -27,6 +27,7 @@ from .output import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ...logs.recording.recorder_link import RecorderLink
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
     from ...runtime.running.real_time import RealTimeOptions
@@ -90,11 +91,13 @@ def run_once(
     *,
     sinks: Sequence[Sink] = (),
     viewer: Viewer | None = None,
+    link: RecorderLink | None = None,
     messages: Sequence[str] = (),
     also: Mapping[str, Any] | None = None,
 ) -> ExitCode:
-    """Run the graph, record and show it, and print the result; ``messages`` are warnings so far,
-    and ``also`` is what else the JSON object has."""
+    """Run the graph, record and show it, and print the result; ``link`` is the recorder's process if
+    it was started early, ``messages`` are warnings so far, and ``also`` is what else the JSON object
+    has."""
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
     from ...runtime.running.real_time import NO_REAL_TIME
@@ -106,8 +109,9 @@ def run_once(
     if record is not None or viewer is not None:
         live = viewer.source if viewer is not None else ""
         recorder = Recorder(
-            record, keep=options.keep, split=options.split, live=live, on_warning=print_warning
-        )
+            record, keep=options.keep, split=options.split, live=live, link=link,
+            on_warning=print_warning,
+        )  # fmt: skip
     with (
         progress_bar(out, f"running {name}", graph.checked.ticks) as (progress, task),
         compiling_shown(progress),

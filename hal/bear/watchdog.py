@@ -6,20 +6,22 @@ from __future__ import annotations
 import mmap
 import os
 import struct
-import subprocess
 import sys
 import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
+from ...processes.child_process import ChildError, ChildProcess
 from .bus import BusError
 from .configuration import DeadMan
 from .protocol import BROADCAST, STATUS, Instruction, Torque, frame_bytes
-from .watchdog_process import CLOSING, READY, SIZE, TRIPPED, UNTIL
+from .watchdog_process import CLOSING, SIZE, TRIPPED, UNTIL
 
 _STARTING = 10.0
 """How long the process may take to start [s]."""
+_ENDING = 5.0
+"""How long it may take to end, once it is told to [s]."""
 
 
 def damping_frame(devices: list[int]) -> bytes:
@@ -35,7 +37,9 @@ class DriveWatchdog:
     links have brought no commands for ``silence`` seconds, or when this process has died. It shares
     the open port, so no opening can fail then.
 
-    It begins to count at the first beat.
+    It begins to count at the first beat. Its process looks every millisecond whether its parent is
+    still the one that started it: a pipe's end would come late where a copy of the graph's process
+    still holds the other end.
 
     Args:
         port_fd: the file descriptor of the drives' port.
@@ -56,19 +60,18 @@ class DriveWatchdog:
         self._limit, self._silence = int(limit * 1e9), int(silence * 1e9)
         program = Path(__file__).with_name("watchdog_process.py")
         frame = damping_frame(devices).hex()
-        self._process = subprocess.Popen(
-            [sys.executable, "-I", str(program), str(port_fd), str(memory_fd), frame],
-            pass_fds=(port_fd, memory_fd),
-            stdin=subprocess.DEVNULL,
-            start_new_session=True,  # Ctrl-C in the terminal is for the graph only
-        )
-        os.close(memory_fd)
-        end = time.monotonic() + _STARTING
-        while not self._read(READY):
-            if self._process.poll() is not None or time.monotonic() > end:
-                self.close()
-                raise BusError("the watchdog's process does not start: nothing was enabled")
-            time.sleep(0.005)
+        try:
+            self._process = ChildProcess(
+                "the watchdog's process", program, [str(port_fd), str(memory_fd), frame],
+                descriptors=(port_fd, memory_fd),
+            )  # fmt: skip
+        finally:
+            os.close(memory_fd)
+        try:
+            self._process.wait_until_ready(_STARTING)
+        except ChildError as error:
+            self.close()
+            raise BusError(f"{error}: nothing was enabled") from error
 
     @property
     def pid(self) -> int:
@@ -95,11 +98,7 @@ class DriveWatchdog:
         """End the process: the drives are in damping already, or were never on."""
         with suppress(ValueError):
             struct.pack_into("Q", self._memory, CLOSING, 1)
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._process.stop(asked=_ENDING)
 
     def _read(self, place: int) -> int:
         return int(struct.unpack_from("Q", self._memory, place)[0])

@@ -2,7 +2,7 @@
 
 It knows nothing of aloft: it gets the open port, some shared memory and the bytes that damp. So it starts fast, and nothing that the graph imports can fail in it.
 
-    python watchdog_process.py PORT_FD MEMORY_FD FRAME_IN_HEX
+    python watchdog_process.py SOCKET_FD PORT_FD MEMORY_FD FRAME_IN_HEX
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ import sys
 import time
 from contextlib import suppress
 
-UNTIL, TRIPPED, CLOSING, READY = 0, 8, 16, 24
+UNTIL, TRIPPED, CLOSING = 0, 8, 16
 """Where each unsigned number of 8 bytes lies in the shared memory. The first is the time until which
 the graph may be left alone, by the monotonic clock [ns]; zero before there is one."""
-SIZE = 32
+SIZE = 24
 LASTING = 2.0
 """For how long damping is commanded again and again [s]."""
 
 
 def main() -> int:
     """Watch until the graph says that it closes, or until it hangs or has died."""
-    port, memory = int(sys.argv[1]), int(sys.argv[2])
-    frame = bytes.fromhex(sys.argv[3])
+    parents_socket, port, memory = map(int, sys.argv[1:4])
+    frame = bytes.fromhex(sys.argv[4])
     parent = os.getppid()
     with mmap.mmap(memory, SIZE) as shared:
 
         def read(place: int) -> int:
             return int(struct.unpack_from("Q", shared, place)[0])
 
-        struct.pack_into("Q", shared, READY, 1)
+        os.write(parents_socket, b"ready\n")
         while not read(CLOSING):
             until = read(UNTIL)
             died = os.getppid() != parent

@@ -44,7 +44,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import RobotDescription
+from ...robots.robot_description import RobotDescription
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 from ...runtime.language.terrain import Ground, Terrain

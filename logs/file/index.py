@@ -81,8 +81,10 @@ class Index:
         for column in pa.ipc.read_schema(pa.py_buffer(schema)):
             store.columns.setdefault(column.name, column)
         table = _read_table(parts[_CHUNKS])
-        there = [place in places for place in table["chunk_byte_offset"].to_pylist()]
-        table = table.filter(pa.array(there, pa.bool_()))
+        offsets = table["chunk_byte_offset"].to_pylist()
+        there = [row for row, place in enumerate(offsets) if place in places]
+        if len(there) < len(offsets):
+            table = pa.concat_tables([table.slice(0, 0), *(table.slice(row, 1) for row in there)])
         moved = {
             "chunk_byte_offset": [places[p] for p in table["chunk_byte_offset"].to_pylist()],
             "chunk_byte_size": [s + self._grown for s in table["chunk_byte_size"].to_pylist()],
@@ -115,8 +117,9 @@ def _filled(table: Any) -> Any:
 
     for at, column in enumerate(table.schema):
         if column.type in (pa.bool_(), pa.uint64()) and table[at].null_count:
-            nothing = pa.scalar(0, pa.uint64()).cast(column.type)
-            table = table.set_column(at, column, table[at].fill_null(nothing))
+            nothing = False if column.type == pa.bool_() else 0
+            values = [nothing if value is None else value for value in table[at].to_pylist()]
+            table = table.set_column(at, column, pa.array(values, column.type))
     return table
 
 

@@ -11,19 +11,15 @@ to the writing process or to the disk; ``warnings`` says what is missing then.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from select import select
-from typing import Any, Literal
+from typing import Literal
 
+from ...processes.child_process import ChildError
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
@@ -32,162 +28,16 @@ from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
 from ..viewing.robot_shapes import missing_meshes
-from .place import RecordingPlace, cause_of, part_of, remedy, replaced, take_place
-from .recorder_process import HEADER, KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
-from .ring import RingWriter, fitting_capacity, make_memory, space_of
+from .place import cause_of, part_of, remedy, replaced, take_place
+from .recorder_link import RecorderLink, rerun_is_installed
+from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
+from .ring import space_of
 
-_MAIN = (
-    "import sys, json; sys.path[:] = json.loads(sys.argv[2]); "
-    "from aloft.logs.recording.recorder_process import main; main(sys.argv[1])"
-)
-START_TIME = 30.0
-"""Seconds the process may take to be ready for a run in real time."""
 STALL_TIME = 60.0
 """Seconds without any progress that are worth a warning, and more than a robot waits. A process
 that is slow, as its disk is slow or the machine has too much to do, makes progress."""
 GIVE_UP_TIME = 600.0
 """Seconds without any progress after which a simulation gives the process up, too."""
-
-
-class RecorderLink:
-    """A recorder's process that was started for one file, and the ring it reads.
-
-    Args:
-        place: the file's place, if there is to be a file. The process takes it over.
-        header: of the recording, as text.
-        capacity: least size of the ring [bytes].
-        flush_period, sync_period, live, split: see ``RecorderTask``.
-        least: the size with which the ring makes do where files may not be larger.
-
-    Raises:
-        OSError: the process cannot be started.
-    """
-
-    def __init__(
-        self,
-        place: RecordingPlace | None,
-        header: str,
-        capacity: int,
-        flush_period: float,
-        sync_period: float,
-        live: str = "",
-        split: int = 0,
-        least: int = 1 << 16,
-    ) -> None:
-        text = header.encode()
-        head = space_of(len(text))
-        capacity = fitting_capacity(max(1 << 16, capacity + head), least + head)
-        descriptor = -1
-        try:
-            descriptor = make_memory(capacity)
-            self.ring = RingWriter(descriptor, capacity)
-            self.ring.write(HEADER, 0, text)
-            path = str(place.target.absolute()) if place is not None else ""
-            file, keep = (place.descriptor, place.keep) if place is not None else (-1, 0)
-            task = RecorderTask(
-                descriptor, capacity, path, file, keep, flush_period, sync_period, live, split
-            )
-            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
-            # not forked, as a copy of this process would hold its robot; and in a session of its
-            # own, so that nobody's Ctrl-C ends it before the run has come to rest
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _MAIN, json.dumps(asdict(task)), folders],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                pass_fds=[descriptor, *([file] if file >= 0 else [])],
-                # What fails, a viewer or the disk, this process says in a line of its own; Rerun's log
-                # would say it again several times, as raw lines. Who wants them sets RUST_LOG.
-                env={"RUST_LOG": "off", **os.environ},
-                start_new_session=True,
-            )
-        except BaseException:
-            if place is not None:
-                place.discard()
-            raise
-        finally:
-            if descriptor >= 0:
-                os.close(descriptor)
-            if place is not None:
-                place.close()  # the process holds the file and its lock
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._input, self._output = self._process.stdin, self._process.stdout
-        self._said = b""
-        self._seen, self._since = (0, 0), time.monotonic()
-
-    @property
-    def process_id(self) -> int:
-        """The process's number."""
-        return self._process.pid
-
-    def is_alive(self) -> bool:
-        """Whether the process is running."""
-        return self._process.poll() is None
-
-    def stalled_for(self) -> float:
-        """The seconds since the process last made progress, or since ``reset_stall_timer`` was called.
-
-        It makes progress when it takes something out of the ring, and, where the system tells,
-        when it reads or writes a file, as it does while it starts and while it ends.
-        """
-        seen = self.ring.read_back, self._bytes_moved()
-        if seen != self._seen:
-            self._seen, self._since = seen, time.monotonic()
-        return time.monotonic() - self._since
-
-    def _bytes_moved(self) -> int:
-        """The bytes that the process has read and written so far; zero where nothing tells it."""
-        try:
-            with open(f"/proc/{self.process_id}/io", encoding="ascii") as file:
-                return sum(int(line.split()[1]) for line in file if line[1:5] == "char")
-        except (OSError, ValueError, IndexError):
-            return 0
-
-    def reset_stall_timer(self) -> None:
-        """Restart the clock of ``stalled_for``, because the process had nothing to read until now."""
-        self._since = time.monotonic()
-
-    def wait_until_ready(self) -> bool:
-        """Wait until the process reads from the ring. Returns whether it does."""
-        end = time.monotonic() + START_TIME
-        while b"\n" not in self._said and time.monotonic() < end:
-            if not self._listen(0.1):
-                return False
-        return b"\n" in self._said
-
-    def finish(
-        self, outcome: dict[str, Any], goes_on: Callable[[], bool]
-    ) -> tuple[RecorderReport | None, str]:
-        """Tell the outcome and wait for the end, as long as ``goes_on`` says so.
-
-        Returns:
-            What the process says was done, if it came to that, and else why it did not.
-        """
-        with suppress(BrokenPipeError):  # it has ended, which is seen below
-            self._input.write(json.dumps(outcome).encode())
-            self._input.flush()
-        with suppress(BrokenPipeError):
-            self._input.close()
-        self.reset_stall_timer()
-        while self._listen(0.05):
-            # In this order: the process may end just now, and then ``goes_on`` says no as well.
-            if not goes_on() and self.is_alive():
-                return None, f"the recorder has been stuck for {self.stalled_for():.0f} s"
-        self._output.close()
-        code = self._process.wait()
-        self.ring.close()
-        lines = [json.loads(line) for line in self._said.splitlines()]
-        if lines and "rows" in lines[-1]:
-            return RecorderReport(**lines[-1]), ""
-        how = f"was killed by signal {-code}" if code < 0 else f"ended with code {code}"
-        return None, f"the recorder {how}"
-
-    def _listen(self, seconds: float) -> bool:
-        """Read the process's messages within that time. Returns false when no more can come."""
-        if not select([self._output], [], [], seconds)[0]:
-            return True
-        part = os.read(self._output.fileno(), 65536)
-        self._said += part
-        return bool(part)
 
 
 WhenFull = Literal["wait", "drop"]
@@ -213,6 +63,7 @@ class Recorder:
             itself. Zero for one file.
         live: where a viewer listens (``viewer.Viewer.source``) that is to show the run while it
             goes on; a viewer that dies or hangs is a warning.
+        link: the process, if it was started early.
         on_warning: called with each warning at once, where ``warnings`` is looked at in the end;
             not with ``problem``, which is for whoever tells how the run ended.
 
@@ -242,6 +93,7 @@ class Recorder:
         ring_time: float = 4.0,
         split: float = 0.0,
         live: str = "",
+        link: RecorderLink | None = None,
         on_warning: Callable[[str], object] | None = None,
     ) -> None:
         if split and keyframe_period <= 0:
@@ -257,6 +109,7 @@ class Recorder:
         self._seen = 0
         self.report: RecorderReport | None = None
         self.link: RecorderLink | None = None
+        self._started = link
         self._when_full = when_full
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
@@ -295,8 +148,11 @@ class Recorder:
                 self._warn(missing)
         self._write = self.link.ring.write
         bound.parameters.listeners.append(self._note_change)
-        if not free and not self.link.wait_until_ready():
-            self._warn("the recorder was not ready when the run began")
+        if not free:
+            try:
+                self.link.wait_until_ready()
+            except ChildError as error:
+                self._warn(f"the run began without a recorder: {error}")
         if self._every and bound.clock.tick:
             self._keep_keyframe(bound.clock.tick)  # a run that goes on from a snapshot
 
@@ -311,10 +167,10 @@ class Recorder:
 
     def _start(self) -> tuple[str, str]:
         """Start the process, or say why it cannot be and what to do, before anything moves."""
-        if find_spec("rerun") is None:
+        if not rerun_is_installed():
             return "Rerun cannot be imported", "pip install rerun-sdk, or --no-record writes none"
-        ticks = round(self._ring_time * self._bound.graph.base_rate)
-        capacity = ticks * space_of(len(self._bus)) + 4 * space_of(len(self._frame))
+        rate, frame = self._bound.graph.base_rate, 4 * space_of(len(self._frame))
+        capacity = round(self._ring_time * rate) * space_of(len(self._bus)) + frame
         header = header_of(self._bound).to_json()
         try:
             place = None
@@ -324,11 +180,13 @@ class Recorder:
                 self.before = replaced(self.path, self._keep)
                 for text in place.said:
                     self._warn(text)
-            split = round(self._split * self._bound.graph.base_rate)
-            self.link = RecorderLink(
-                place, header, capacity, *self._periods, self._live, split,
-                least=4 * space_of(len(self._frame)),
-            )  # fmt: skip
+            path = str(self.path.absolute()) if self.path is not None else ""
+            task = RecorderTask(
+                capacity, path, self._keep, *self._periods, self._live, round(self._split * rate)
+            )
+            link = self._started or RecorderLink()
+            link.begin(task, place, header, least=frame)
+            self.link = link
         except OSError as error:
             what = f"{self.path} cannot be written" if self.path else "the recorder cannot start"
             fix = remedy(cause_of(error), self.path)

@@ -1,10 +1,10 @@
 """The process beside the robot that writes the recording; see ``recorder`` for the other side.
 
-It is told what to do by a ``RecorderTask`` on its command line and by the first record in the ring, the
-header. On its standard input comes the outcome of the run. The end of the input says that nothing
+It imports what it needs, and waits on a socket for a ``RecorderTask`` and the descriptors of the ring
+and of the file; the first record in the ring is the header. On its standard input comes the outcome of the run. The end of the input says that nothing
 more will come, also when the process that runs the graph was killed: then what is in the ring is
-written, and the file is closed and gets its name. On its standard output it says, in lines of JSON,
-that it is ready and, at the end, a ``RecorderReport``.
+written, and the file is closed and gets its name. On its standard output it writes a
+``RecorderReport`` at the end, as a line of JSON.
 """
 
 from __future__ import annotations
@@ -13,27 +13,31 @@ import json
 import os
 import select
 import signal
+import socket
 import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...processes.child_process import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
-from .live_feed import LiveFeed
 from .place import RecordingPlace, cause_of, split_name, take_place
+from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
-from .writer import RecordingWriter, warm_up
+from .writer import RecordingWriter
 
-HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
-"""The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
+if TYPE_CHECKING:
+    from .live_feed import LiveFeed
+
 POLL = 0.02
 """Seconds between two looks at the ring."""
 LIVE_PERIOD = 0.1
@@ -48,68 +52,13 @@ DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
 
-@dataclass(frozen=True)
-class RecorderTask:
-    """What to write.
-
-    Attributes:
-        descriptor, capacity: of the ring.
-        path: the name that the recording gets; empty if no file is written.
-        file: the descriptor of the file, which is locked; see ``place``.
-        keep: the number of earlier recordings of that name that are kept.
-        flush_period: seconds after which what has come is handed to the operating system; four times
-            as many where it is less than a period of the graph's time.
-        sync_period: seconds after which that is told to put it on the disk.
-        live: where a viewer listens that shows the run while it goes on, if one does.
-        split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
-            never.
-    """
-
-    descriptor: int
-    capacity: int
-    path: str
-    file: int
-    keep: int
-    flush_period: float
-    sync_period: float
-    live: str = ""
-    split: int = 0
-
-
-@dataclass
-class RecorderReport:
-    """What was done.
-
-    Attributes:
-        rows: the number of ticks in the file, or in all files together.
-        size: the size of the file or of all files [bytes].
-        files: the files, if there are several.
-        memory: the most memory used [bytes].
-        problem: what went wrong with the file, if anything.
-        error_number: the system's number of what went wrong, as in ``errno``; zero if it has none.
-        lost: the number of ticks that were taken from the ring and are not in the file.
-        odd: what the user must know although the recording is whole.
-        live_problem: why the viewer did not show all of the run.
-    """
-
-    rows: int = 0
-    size: int = 0
-    memory: int = 0
-    problem: str = ""
-    error_number: int = 0
-    lost: int = 0
-    odd: str = ""
-    live_problem: str = ""
-    files: tuple[str, ...] = ()
-
-
 class RecorderProcess:
     """Takes records out of the ring and writes them: ticks and notes at every flush."""
 
-    def __init__(self, task: RecorderTask) -> None:
+    def __init__(self, task: RecorderTask, ring: int, file: int | None = None) -> None:
         self.report = RecorderReport()
         self._task = task
-        self._ring = RingReader(task.descriptor, task.capacity)
+        self._ring = RingReader(ring, task.capacity)
         record = next(self._ring.records())
         header = Header.from_json(bytes(record.data).decode())
         self._bus_size = header.bus.size
@@ -127,11 +76,10 @@ class RecorderProcess:
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
         self._place: RecordingPlace | None = None
-        warm_up()
-        if task.path:
-            self._place = RecordingPlace(Path(task.path), task.file, task.keep)
+        if file is not None:
+            self._place = RecordingPlace(Path(task.path), file, task.keep)
             self._guard(lambda: self._open(header))
-        self.feed = LiveFeed(task.live, header) if task.live else None
+        self.feed = _live_feed(task.live, header) if task.live else None
         self._fed_rows = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
@@ -330,6 +278,12 @@ class RecorderProcess:
         self.report.error_number = cause_of(error)
 
 
+def _live_feed(source: str, header: Header) -> LiveFeed:
+    from .live_feed import LiveFeed  # imports what only a viewer of a part needs
+
+    return LiveFeed(source, header)
+
+
 def _went_on(path: Path, ticks: int) -> dict[str, Any]:
     """The outcome in a file of a run that goes on in the file ``path``; ``ticks`` were run so far."""
     return {
@@ -354,13 +308,18 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-def main(task: str) -> None:
-    """Do what the task says, until standard input ends."""
+def main(tasks: str) -> None:
+    """Do what the task from the socket ``tasks`` says, until standard input ends."""
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    recorder = RecorderProcess(RecorderTask(**json.loads(task)))
-    _say({"ready": True})
+    import_module("rerun")  # which takes longest, and is needed first when there is a task
+    with socket.socket(fileno=int(tasks)) as source_of_tasks:
+        task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)
+    if not task:
+        return  # there was no run
+    recorder = RecorderProcess(RecorderTask(**json.loads(task)), *descriptors)
+    report_ready()
     told: set[str] = set()
     text, source = b"", sys.stdin.fileno()
     while True:

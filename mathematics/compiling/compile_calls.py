@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 
+from ...processes.child_process import ChildProcess
 from ..kernel import kernels
 from . import store
 from .arguments import ArgumentType, pack, type_of
@@ -125,11 +125,10 @@ def _finished(jobs: Sequence[CompileJob]) -> int:
     return sum(store.holds(job.name) for job in jobs)
 
 
-def _wait(process: subprocess.Popen[bytes], own: int, others: Sequence[CompileJob]) -> None:
+def _wait(process: ChildProcess, own: int, others: Sequence[CompileJob]) -> None:
     """Wait for another process, and tell how far it is."""
     for _ in range(int(LONGEST_WAIT / _BETWEEN_LOOKS)):
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(_BETWEEN_LOOKS)
+        if process.wait(_BETWEEN_LOOKS) is not None:
             return
         _tell(own + _finished(others), own + len(others))
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import ast
 import copy
+import linecache
 import textwrap
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -61,11 +62,13 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     """
     import inspect  # costs a start of the command line more than all of this module
 
-    try:
-        lines, first = inspect.getsourcelines(code)
-    except (OSError, TypeError):
+    # not inspect.getsourcelines: for a code object it looks through the files of all modules
+    linecache.checkcache(code.co_filename)
+    lines = linecache.getlines(code.co_filename, function.__globals__)
+    first = code.co_firstlineno
+    if len(lines) < first:
         return None
-    tree = ast.parse(textwrap.dedent("".join(lines)))
+    tree = ast.parse(textwrap.dedent("".join(inspect.getblock(lines[first - 1 :]))))
     ast.increment_lineno(tree, first - 1)
     (definition,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
     if function.__closure__ is None:

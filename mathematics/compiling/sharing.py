@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import pickle
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from ...processes.child_process import ChildProcess
 from . import store
 from .arguments import ArgumentType
 from .fingerprint import closure
@@ -24,8 +24,6 @@ WORTH_A_PROCESS = 15_000
 """Bytes of Python's code that take longer to compile than another process takes to begin."""
 MOST_PROCESSES = 4
 """More would mostly compile the same functions again."""
-
-_START = "import sys; sys.path[:] = {path!r}; from {module} import main; main()"
 
 
 class CompileJob(NamedTuple):
@@ -75,31 +73,17 @@ def processors() -> int:
 
 
 @contextmanager
-def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[subprocess.Popen[bytes]]]:
+def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[ChildProcess]]:
     """A process for each share, whose end the caller waits for; none is left behind."""
-    started: list[subprocess.Popen[bytes]] = []
-    try:
+    with ExitStack() as stack:
+        started: list[ChildProcess] = []
         for share in shares:
             with suppress(OSError):
-                started.append(_start(share))
+                process = ChildProcess("a compiler", f"{__name__}:main", quiet=True)
+                started.append(stack.enter_context(process))
+                with suppress(BrokenPipeError), process.stdin as pipe:
+                    pipe.write(pickle.dumps([_packed(job) for job in share]))
         yield started
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
-
-
-def _start(share: Sequence[CompileJob]) -> subprocess.Popen[bytes]:
-    words = pickle.dumps([_packed(job) for job in share])
-    code = _START.format(path=sys.path, module=__name__)
-    process = subprocess.Popen(
-        [sys.executable, "-c", code],
-        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert process.stdin is not None
-    with suppress(BrokenPipeError), process.stdin as pipe:
-        pipe.write(words)
-    return process
 
 
 def _packed(job: CompileJob) -> bytes:

@@ -8,25 +8,20 @@ then copies itself for every call.
 
 from __future__ import annotations
 
-import atexit
 import contextlib
-import json
 import os
 import pickle
-import signal
-import subprocess
-import sys
 import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...processes.child_process import ChildProcess
 
 
 def cpu_time() -> float:
@@ -96,12 +91,6 @@ Answer = tuple[Array, dict[str, Any]]
 
 KEPT = 12
 """Solvers that the process keeps; a further one is sent again when it is needed again."""
-_PROGRAM = """\
-import json, sys
-sys.path[:] = json.loads(sys.argv[1])
-from aloft.planner.solving.solver_process import serve
-serve()
-"""
 
 
 def has_one_thread() -> bool:
@@ -153,8 +142,7 @@ def quiet() -> Iterator[None]:
 class _Helper:
     """The process, as seen from here."""
 
-    _process: subprocess.Popen[bytes] | None = None
-    _owner: int = 0
+    _process: ChildProcess | None = None
     _sent: OrderedDict[int, Any] = field(default_factory=OrderedDict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -185,35 +173,30 @@ class _Helper:
             self._sent[number] = function
             if len(self._sent) > KEPT:
                 dropped.append(self._sent.popitem(last=False)[0])
-        assert process.stdin is not None and process.stdout is not None
+        assert process.stdout is not None
         plain = {name: np.array(value) for name, value in arguments.items()}
         try:
             pickle.dump((number, data, dropped, plain, limit), process.stdin)
             process.stdin.flush()
             return pickle.load(process.stdout)
         except (OSError, EOFError) as error:
-            raise RuntimeError("the process that calls solvers has died") from error
+            raise process.failure() from error
 
-    def _running(self) -> subprocess.Popen[bytes]:
-        if self._owner != os.getpid():  # this process is a copy of the one that started it
-            self._process, self._owner = None, os.getpid()
-        if self._process is None or self._process.poll() is not None:
+    def _running(self) -> ChildProcess:
+        if self._process is None or not self._process.is_alive():
+            self.stop()
             self._sent.clear()
-            folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM, folders],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            self._process = ChildProcess(
+                "the process that calls solvers", f"{__name__}:serve", stdout=True,
+                environment={"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )  # fmt: skip
-            atexit.register(self.stop)
         return self._process
 
     def stop(self) -> None:
         """End the process, if it runs; the next call starts a new one."""
         process, self._process = self._process, None
-        if process is not None and self._owner == os.getpid():
-            process.kill()
-            process.communicate()
+        if process is not None:
+            process.stop()
 
 
 _helper = _Helper()
@@ -223,7 +206,6 @@ def serve() -> None:
     """What the process does: answers calls until its input ends."""
     import casadi as ca
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the one that asks
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
     answers: IO[bytes] = os.fdopen(os.dup(1), "wb")
     kept: dict[int, Any] = {}

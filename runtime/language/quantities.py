@@ -8,7 +8,7 @@ Loading applies these methods from block to block, and then checks every wire.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from .signals import Field
 from .unit_algebra import ONE, times
@@ -26,8 +26,8 @@ class Quantity:
     def times(self, unit: Unit | None, power: int = 1) -> Quantity:
         """This quantity times a unit to a power; not checked if either of the two is not."""
         if self.unit is None or unit is None:
-            return replace(self, unit=None)
-        return replace(self, unit=times(self.unit, unit, power))
+            return Quantity(None, self.frame)
+        return Quantity(times(self.unit, unit, power), self.frame)
 
     def agrees(self, other: Quantity) -> bool:
         """Whether numbers of one may be used as numbers of the other."""

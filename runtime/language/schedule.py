@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import lcm
+from typing import NamedTuple
 
 from .errors import AloftError
 
@@ -64,8 +65,7 @@ class LoopError(AloftError):
         self.loops = tuple(loops)
 
 
-@dataclass(frozen=True)
-class _Edge:
+class _Edge(NamedTuple):
     """A wire between two Mealy blocks, by their index in the file."""
 
     source: int

@@ -87,6 +87,11 @@ WATCHDOG = 0.015
 """The default of ``LinkSettings.watchdog`` [s]. What damps the actuators looks every millisecond, so
 they are in damping within 20 ms."""
 
+LinkMode = Literal["lockstep", "free"]
+WhenLate = Literal["hold", "safe", "stop"]
+ClockKind = Literal["free", "paced", "robot"]
+Overrun = Literal["skip", "stop"]
+
 
 @dataclass(frozen=True)
 class LinkPolicy:
@@ -96,7 +101,7 @@ class LinkPolicy:
     """
 
     max_age: float | None = None
-    late: Literal["hold", "safe", "stop"] = "stop"
+    late: WhenLate = "stop"
     watch: bool = True
     """Whether the silence of the link counts where it brings commands to actuators."""
 
@@ -109,7 +114,7 @@ class LinkSettings:
     read the latest message. ``of`` has the policies of the links of single blocks.
     """
 
-    mode: Literal["lockstep", "free"] = "lockstep"
+    mode: LinkMode = "lockstep"
     policy: LinkPolicy = LinkPolicy()
     of: Mapping[str, LinkPolicy] = field(default_factory=dict)
     paths: Mapping[str, float] = field(default_factory=dict)
@@ -128,8 +133,8 @@ class ClockSpec:
     """How a run is paced: ``free`` (as fast as possible), ``paced`` (by wall time) or ``robot``
     (the robot says when a tick begins), and what an overrun of a paced run leads to."""
 
-    kind: Literal["free", "paced", "robot"] = "free"
-    overrun: Literal["skip", "stop"] = "skip"
+    kind: ClockKind = "free"
+    overrun: Overrun = "skip"
     stop_after: int = 1
     """The number of overruns in a row that end the run, if the overrun policy is ``stop``."""
     hangs_after: float = 10.0

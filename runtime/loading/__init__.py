@@ -7,7 +7,6 @@ Its stages have a folder each: ``reading`` (one file as it is written, with the 
 
 from ...files.problems import Code, LoadError, Problem, Report
 from .load import check, flatten, load, load_text
-from .schema import graph_schema, schema_text
 
 __all__ = [
     "Code",
@@ -16,8 +15,6 @@ __all__ = [
     "Report",
     "check",
     "flatten",
-    "graph_schema",
     "load",
     "load_text",
-    "schema_text",
 ]

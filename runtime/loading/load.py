@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ...files.problems import LoadError, Problems, Report
@@ -24,7 +27,8 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
         LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = check_graph(flatten_file(graph_path(path), overrides, problems), problems)
+    with _collector_paused():
+        graph = check_graph(flatten_file(graph_path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
@@ -35,14 +39,16 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
         LoadError: the graph is wrong; the error carries the report of all problems.
     """
     problems = Problems()
-    graph = check_graph(flatten_text(text, Path(path), overrides, problems), problems)
+    with _collector_paused():
+        graph = check_graph(flatten_text(text, Path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
 
 
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
     """The report on a graph file; ``ok`` when it may run."""
     problems = Problems()
-    check_graph(flatten_file(graph_path(path), overrides, problems), problems)
+    with _collector_paused():
+        check_graph(flatten_file(graph_path(path), overrides, problems), problems)
     return problems.report(str(path))
 
 
@@ -53,10 +59,27 @@ def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
         LoadError: some file cannot be read or expanded. Wires and values are not checked here.
     """
     problems = Problems()
-    graph = flatten_file(graph_path(path), overrides, problems)
+    with _collector_paused():
+        graph = flatten_file(graph_path(path), overrides, problems)
     if len(problems):
         raise LoadError(problems.report(str(path)))
     return graph
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """No garbage collection meanwhile.
+
+    Loading makes many objects and hardly any garbage, and each collection would look at all of them
+    again: a fifth of the time of a graph of 5,000 blocks.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _result(graph: CheckedGraph | None, problems: Problems, file: str) -> CheckedGraph:

@@ -6,7 +6,6 @@ import faulthandler
 import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 from contextlib import suppress
@@ -17,12 +16,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ...processes.child_process import ChildProcess
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
 from .memory import BoundGraph, nameless_memory
 
 BEATS = 4
 """Beats in every limit of time."""
+ENDING = 10.0
+"""Seconds that the process has to end after the run; it may be waiting for stacks."""
 
 
 class FreezeGuard:
@@ -39,15 +41,14 @@ class FreezeGuard:
         self._graph = graph
         limit = graph.clock.hangs_after
         program = Path(__file__).with_name("freeze_process.py")
-        command = [sys.executable, "-I", "-S", str(program), str(os.getpid()), str(limit)]
         shared, self._running = _shared_number()
-        self._process = subprocess.Popen(
-            [*command, str(int(as_json)), str(shared)], stdin=subprocess.PIPE,
-            pass_fds=[shared] if shared >= 0 else [],
+        self._process = ChildProcess(
+            "the process that watches for a hang", program,
+            [str(os.getpid()), str(limit), str(int(as_json)), str(shared)],
+            descriptors=[shared] if shared >= 0 else [],
         )  # fmt: skip
         if shared >= 0:
             os.close(shared)
-        assert self._process.stdin is not None
         self._pipe = self._process.stdin
         self._over = threading.Event()
         self._beats = threading.Thread(
@@ -60,7 +61,7 @@ class FreezeGuard:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-        self._process.wait()
+        self._process.stop(asked=ENDING)
 
     def open(self, bound: BoundGraph) -> None:
         """Let the process begin to watch: setting blocks up may have taken any time. From now on it

@@ -8,7 +8,7 @@ counts its own looks instead of reading a clock, so that a suspended process doe
 
 It knows nothing of aloft, so it starts fast, and nothing that the graph imports can fail in it::
 
-    python freeze_process.py PID LIMIT_IN_SECONDS AS_JSON FILE_NUMBER
+    python freeze_process.py SOCKET PID LIMIT_IN_SECONDS AS_JSON FILE_NUMBER
 
 The pipe on its standard input brings first the blocks, as a line of JSON, and then beats and stacks.
 A file in memory has the place in the order of the block that a chain runs: the stack shows only the
@@ -35,9 +35,8 @@ _FRAME = re.compile(r'^  File "(?P<file>[^"]*)", line (?P<line>\d+) in (?P<name>
 
 def main() -> int:
     """Watch until the pipe ends, or until the beats stop."""
-    pid, limit, as_json = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3] == "1"
-    for number in (signal.SIGINT, signal.SIGTERM):  # meant for the run
-        signal.signal(number, signal.SIG_IGN)
+    pid, limit, as_json = int(sys.argv[2]), float(sys.argv[3]), sys.argv[4] == "1"
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # meant for the run
     head = b""
     while not head.endswith(b"\n"):
         letter = os.read(0, 1)
@@ -137,7 +136,7 @@ def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) 
 
 def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
     """The path of the block that a chain runs, if the innermost frame is a chain's."""
-    order, shared = description["order"], int(sys.argv[4])
+    order, shared = description["order"], int(sys.argv[5])
     assert isinstance(order, list)
     if shared < 0 or not frames or frames[0][2] != "run" or "chain.py" not in frames[0][0]:
         return []

@@ -15,7 +15,9 @@ once more.
 
 The standard library's process pool fails as a whole when one of its processes is killed, and hangs
 when that happens while work is being cancelled. Here every process has its own pipe, so it is known
-which process died and which job it had. The process is replaced, and the job is tried again.
+which process died and which job it had. The process is replaced, and the job is tried again. These
+processes are started by ``multiprocessing`` and not as a ``ChildProcess``, because it lets them find
+functions of a script that is run, too.
 
 Jobs on a Dask cluster are sent by a client whose event loop has a thread of its own. A client can
 start such a thread itself, but it gives up with an assertion without a text if the thread has not
@@ -30,7 +32,6 @@ import multiprocessing
 import os
 import pickle
 import signal
-import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -45,6 +46,7 @@ from threading import Thread
 from time import monotonic
 from typing import Any
 
+from ...processes.child_process import end_with
 from ...runtime.language.errors import AloftError
 
 
@@ -245,7 +247,9 @@ def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
     global _stopping
     try:
         signal.signal(signal.SIGTERM, _on_terminate)
-        threading.Thread(target=_end_with_parent, daemon=True).start()
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            end_with(parent.sentinel, signal.SIGKILL)
         pipe.send(None)
         while not _stopping:
             index, job = pipe.recv()
@@ -270,14 +274,6 @@ def _on_terminate(number: int, frame: object) -> None:
     if not _stopping:
         _stopping = True
         raise _StoppedError
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that wants the results ends, whatever the cause."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def job_results(

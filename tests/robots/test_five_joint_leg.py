@@ -25,14 +25,14 @@ any_number = st.floats(allow_nan=False, allow_infinity=False)
 
 def forward(leg, angles):
     position, rotation = np.empty(3), np.empty((3, 3))
-    legs.forward(leg.hip, leg.plane, leg.signs, np.asarray(angles), position, rotation)
+    legs.forward(leg, np.asarray(angles), position, rotation)
     return position, rotation
 
 
 def inverse(leg, sole, line, kept_yaw=0.0, softness=0.0, level=legs.LEVEL):
     out = np.full(5, np.nan)
     inside, _ = legs.inverse(
-        leg.hip, leg.plane, leg.signs, leg.limits, np.asarray(sole), np.asarray(line),
+        leg, np.asarray(sole), np.asarray(line),
         softness, kept_yaw, level, out,
     )  # fmt: skip
     return out, inside
@@ -156,7 +156,7 @@ def test_a_soft_stretch_slows_the_knee_and_says_by_how_much():
                 leg.hip + leg.plane[2, 0] * np.array([1.0, 0.0, 0.0]) + [0, 0, -distance - 0.024]
             )
             inside, share = legs.inverse(
-                leg.hip, leg.plane, leg.signs, leg.limits, target, np.array([1.0, 0.0, 0.0]),
+                leg, target, np.array([1.0, 0.0, 0.0]),
                 softness, 0.0, legs.LEVEL, out,
             )  # fmt: skip
             assert inside == (share == 1.0)
@@ -232,7 +232,7 @@ def test_inverse_velocity_undoes_the_jacobian(side, fraction, rate):
     out = np.empty(5)
     inverse_velocity(
         sole_jacobian, rotation, twist[:3], np.cross(twist[3:], rotation[:, 0]), 0.3, 1e-5, 0.0, 0.0,
-        np.empty((6, 5)), np.empty((3, 5)), np.empty((5, 5)), out,
+        legs.velocity_scratch(), out,
     )  # fmt: skip
     assert np.abs(out - rate).max() < 1e-5
 

@@ -99,9 +99,9 @@ def test_agrees_with_the_closed_form_of_a_five_joint_leg(foot, fraction):
     leg, limb = five_joint_leg.read_leg(BRUCE, foot), read_limb(BRUCE, foot)
     angles = leg.limits[:, 0] + fraction * (leg.limits[:, 1] - leg.limits[:, 0])
     sole, rotation, closed = np.zeros(3), np.zeros((3, 3)), np.zeros(5)
-    five_joint_leg.forward(leg.hip, leg.plane, leg.signs, angles, sole, rotation)
+    five_joint_leg.forward(leg, angles, sole, rotation)
     inside, _ = five_joint_leg.inverse(
-        leg.hip, leg.plane, leg.signs, leg.limits, sole, rotation[:, 0], 0.0, angles[0],
+        leg, sole, rotation[:, 0], 0.0, angles[0],
         five_joint_leg.LEVEL, closed,
     )  # fmt: skip
     if not inside:

@@ -158,7 +158,7 @@ def test_every_model_of_a_robot_puts_it_in_the_same_place(name: str) -> None:
         close(base + turn @ pose[0], sole.translation)
         close(turn @ pose[1:], sole.rotation)
         if leg is not None:
-            forward(leg.hip, leg.plane, leg.signs, angles, pose[0], pose[1:])
+            forward(leg, angles, pose[0], pose[1:])
             close(base + turn @ pose[0], sole.translation)
             close(turn @ pose[1:], sole.rotation)
 

@@ -8,7 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.robots.description import find_robot
-from aloft.robots.transmission import TransmissionMap, motor_gains
+from aloft.robots.transmission import (
+    TransmissionMap,
+    _non_negative_least_squares,
+    motor_gains,
+)
 
 ROBOT = find_robot("bruce")
 NAMES = [joint.name for joint in ROBOT.joints]
@@ -85,3 +89,38 @@ def test_unequal_gains_of_the_differential_lose_their_difference() -> None:
     found = motor_gains(ROBOT, wanted, "N m/rad")
     assert len(found.losses) == 4 and found.joint[1, 1] == pytest.approx(found.joint[2, 2])
     assert (found.motor >= 0.0).all()
+
+
+@given(st.integers(0, 10_000), st.integers(1, 6))
+@settings(max_examples=60, deadline=None)
+def test_no_other_non_negative_gains_have_a_smaller_error(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = np.vstack([rng.normal(size=(2 * n, n)), np.eye(n)])
+    target = 2.0 * rng.normal(size=3 * n)
+    found = _non_negative_least_squares(columns, target)
+    slope = columns.T @ (columns @ found - target)  # the conditions of Karush, Kuhn and Tucker
+    assert (found >= 0.0).all() and (slope >= -1e-9).all()
+    np.testing.assert_allclose(found * slope, 0.0, atol=1e-9)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 6))
+@settings(max_examples=60, deadline=None)
+def test_non_negative_gains_that_fit_exactly_are_found(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = np.vstack([rng.normal(size=(n, n)), 2.0 * np.eye(n)])
+    expected = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(0.1, 100.0, n))
+    found = _non_negative_least_squares(columns, columns @ expected)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_motor_that_moves_no_joint_gets_no_gain() -> None:
+    columns = np.array([[2.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(_non_negative_least_squares(columns, np.array([6.0, 5.0])), [3, 0])
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_gains_grow_in_proportion_to_those_wanted(factor: float) -> None:
+    wanted = np.array([40.0, 80.0, 20.0, 60.0, 15.0] * 2)
+    found, scaled = (motor_gains(ROBOT, each, "N m/rad") for each in (wanted, factor * wanted))
+    np.testing.assert_allclose(scaled.motor, factor * found.motor, rtol=1e-9, atol=1e-12 * factor)
+    assert len(scaled.losses) == len(found.losses)

@@ -41,7 +41,8 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if graph.empty:
         where = Position(graph.file, 1, 1)
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
-    drafts = {flat.path: _draft(flat, graph, settings, problems) for flat in graph.blocks}
+    classes: dict[tuple[str, Path], type[Block]] = {}
+    drafts = {flat.path: _draft(flat, graph, settings, classes, problems) for flat in graph.blocks}
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
@@ -68,14 +69,24 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     return None if len(problems) else checked
 
 
-def _draft(flat: FlatBlock, graph: FlatGraph, settings: Settings, problems: Problems) -> BlockDraft:
+def _draft(
+    flat: FlatBlock,
+    graph: FlatGraph,
+    settings: Settings,
+    classes: dict[tuple[str, Path], type[Block]],
+    problems: Problems,
+) -> BlockDraft:
+    """The block with its class and parameters; ``classes`` holds those found for earlier blocks."""
     draft = BlockDraft(flat)
     if settings.base_rate is not None:
         draft.period_ticks = read_period(flat, settings.base_rate, problems)
         draft.offset_ticks = read_offset(flat, draft.period_ticks, problems)
-    draft.block_type = _find(flat, graph, problems) if flat.use else None
+    draft.block_type = classes.get((flat.use, flat.folder))
+    if draft.block_type is None and flat.use:
+        draft.block_type = _find(flat, graph, problems)
     if draft.block_type is None:
         return draft
+    classes[flat.use, flat.folder] = draft.block_type
     check_emit(draft, problems)
     draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions

@@ -12,20 +12,24 @@ from ...language.unit_algebra import over
 from .block_check import BlockDraft
 from .inserted import own_unit
 
+Answers = Mapping[str, Quantity | None]
+"""What a block says about its inferred outputs, by ``port.field``; ``None`` while it cannot."""
+
 
 def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
     """Fill in the quantities of all drafts, and report inputs that do not go together.
 
     A block is asked when all its wired inputs are known. Where blocks wait for each other in a
     ring, the first that can answer with what is known does; where none can, the first output that
-    is missing is taken for a plain number. Every block is asked again at the end, so that a ring
-    whose quantities contradict each other is found.
+    is missing is taken for a plain number. A block that answered before all its inputs were known
+    is asked again at the end, so that a ring whose quantities contradict each other is found.
     """
     inference = _QuantityInference(drafts)
     inference.run()
-    for draft in drafts.values():
+    for path, draft in drafts.items():
         if draft.block_type is not None and draft.params is not None:
-            _check(draft, inference.given(draft), problems)
+            inputs, answers = inference.final.get(path) or inference.ask(draft)
+            _check(draft, inputs, answers, problems)
 
 
 class _QuantityInference:
@@ -43,6 +47,8 @@ class _QuantityInference:
         self.waiting = {path: None for path, draft in drafts.items() if self._missing(draft)}
         self.unanswered: dict[str, None] = {}
         """Blocks that had no answer to what has arrived so far."""
+        self.final: dict[str, tuple[InputQuantities, Answers]] = {}
+        """What blocks answered when all their inputs were known, which no longer changes."""
 
     def run(self) -> None:
         """Ask all blocks until every output is known."""
@@ -68,13 +74,20 @@ class _QuantityInference:
             if next(self._missing(draft), None) is None:
                 del self.waiting[path]
                 queue.extend(self.readers.get(path, ()))
-            elif self._complete(draft) and self._ask(path):
+            elif self._complete(draft) and self._ask(path, complete=True):
                 queue.extend([path, *self.readers.get(path, ())])
 
-    def _ask(self, path: str) -> bool:
-        """Whether the block could say any further quantity."""
+    def ask(self, draft: BlockDraft) -> tuple[InputQuantities, Answers]:
+        """The quantities at a block's inputs, and what it says about its outputs."""
+        inputs = self._given(draft)
+        return inputs, inferred_outputs(draft, inputs)
+
+    def _ask(self, path: str, *, complete: bool = False) -> bool:
+        """Whether the block could say any further quantity; ``complete`` if all inputs are known."""
         draft = self.drafts[path]
-        answers = inferred_outputs(draft, self.given(draft)) or {}
+        inputs, answers = self.ask(draft)
+        if complete:
+            self.final[path] = inputs, answers
         found = False
         for name in list(self._missing(draft)):
             if answers.get(name) is not None:
@@ -114,7 +127,7 @@ class _QuantityInference:
                     return False
         return True
 
-    def given(self, draft: BlockDraft) -> InputQuantities:
+    def _given(self, draft: BlockDraft) -> InputQuantities:
         """The quantities at a block's inputs."""
         found = {}
         for name, port in draft.inputs.items():
@@ -179,10 +192,8 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
                     )
 
 
-def inferred_outputs(
-    draft: BlockDraft, inputs: InputQuantities
-) -> dict[str, Quantity | None] | None:
-    """What the block says about its inferred outputs, by ``port.field``; ``None`` if it fails."""
+def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
+    """What the block says about its inferred outputs; they are not checked where it fails."""
     block_type = draft.block_type
     inferred = [
         (name, field_name)
@@ -207,10 +218,11 @@ def inferred_outputs(
     }
 
 
-def _check(draft: BlockDraft, inputs: InputQuantities, problems: Problems) -> None:
+def _check(
+    draft: BlockDraft, inputs: InputQuantities, answers: Answers, problems: Problems
+) -> None:
     """Report where a block's inputs disagree, or an output contradicts what a ring said before."""
     flat = draft.flat
-    answers = inferred_outputs(draft, inputs) or {}
     for item in inputs.disagreements:
         name = item.port.partition(".")[0]
         wire = flat.wires.get(name)

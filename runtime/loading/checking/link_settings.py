@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
-from ....files.nodes import Entry, MapNode, kind, plain
+from ....files.nodes import Entry, MapNode
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings
 from ...placement.age import worst_age
 from ...placement.placed import PlacementError, command_sources, silence_limit
 from ..flattening.flat import FlatGraph
-from ..reading.written import read_quantity, unknown_key, wrong_kind
-
-POLICY_KEYS = ("max_age", "late", "watch")
-LINK_KEYS = ("mode", *POLICY_KEYS, "of", "paths", "watchdog")
-_WORDS = {"mode": ("lockstep", "free"), "late": ("hold", "safe", "stop")}
+from ..reading.graph_file import Links, Policy, keys_of, read_section
 
 
 def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> LinkSettings:
@@ -27,24 +22,14 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
     """
     if graph.links is None:
         return LinkSettings()
-    found = _read(graph.links, "links", LINK_KEYS, problems)
-    policy = LinkPolicy(**{key: found[key] for key in POLICY_KEYS if key in found})
-    mode = found.get("mode", "lockstep")
-    of: dict[str, LinkPolicy] = {}
-    given = graph.links.get("of")
-    if given is not None and not isinstance(given.value, MapNode):
-        wrong_kind(given.value, "'of'", "a mapping from blocks to settings", problems, at="links")
-    elif given is not None and isinstance(given.value, MapNode):
-        paths = [block.path for block in graph.blocks]
-        for entry in given.value:
-            if entry.key not in paths:
-                _report_unknown_block(entry, paths, problems)
-            elif not isinstance(entry.value, MapNode):
-                expected = "max_age and late of this block's links"
-                wrong_kind(entry.value, f"links.of.{entry.key}", expected, problems)
-            else:
-                own = _read(entry.value, f"links.of.{entry.key}", POLICY_KEYS, problems)
-                of[entry.key] = LinkPolicy(**{**vars(policy), **own})
+    given = read_section(graph.links, "links", Links, problems)
+    common = {key: given[key] for key in keys_of(Policy) if key in given}
+    policy, mode = LinkPolicy(**common), given.get("mode", "lockstep")
+    paths = [block.path for block in graph.blocks]
+    of = {path: LinkPolicy(**{**common, **own}) for path, own in given.get("of", {}).items()}
+    for entry in _entries(graph.links, "of"):
+        if entry.key not in paths:
+            _report_unknown_block(entry, paths, problems)
     free = graph.links.get("mode")
     if mode == "free" and free is not None:
         if clock == "free":
@@ -66,8 +51,17 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
                 expected="the age at which 'late' takes effect",
                 fix="max_age: 10 ms",
             )
-    allowed = _read_paths(graph.links, problems)
-    return LinkSettings(mode, policy, of, allowed, found.get("watchdog"))
+    for entry in _entries(graph.links, "paths"):
+        if entry.key.count("->") != 1:
+            problems.add(
+                Code.AGE,
+                f"{entry.key!r} is no path",
+                entry.key_where,
+                at="links.paths",
+                expected="block.output -> block.input",
+                found=entry.key,
+            )
+    return LinkSettings(mode, policy, of, given.get("paths", {}), given.get("watchdog"))
 
 
 def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:
@@ -99,8 +93,7 @@ def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) 
 
 def check_paths(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:
     """Report paths whose worst age, computed from the whole graph, exceeds what they allow."""
-    entry = graph.links.get("paths") if graph.links is not None else None
-    for item in entry.value if entry is not None and isinstance(entry.value, MapNode) else ():
+    for item in _entries(graph.links, "paths") if graph.links is not None else ():
         limit = checked.links.paths[item.key]
         source, _, target = (part.strip() for part in item.key.partition("->"))
         try:
@@ -122,74 +115,10 @@ def check_paths(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> 
         )
 
 
-def _read_paths(links: MapNode, problems: Problems) -> dict[str, float]:
-    """The allowed ages by path."""
-    entry = links.get("paths")
-    if entry is None:
-        return {}
-    if not isinstance(entry.value, MapNode):
-        example = "{robot.imu -> robot.command: 4 ms}"
-        wrong_kind(entry.value, "'paths'", example, problems, at="links.paths")
-        return {}
-    found: dict[str, float] = {}
-    for item in entry.value:
-        if item.key.count("->") != 1:
-            problems.add(
-                Code.AGE,
-                f"{item.key!r} is no path",
-                item.key_where,
-                at="links.paths",
-                expected="block.output -> block.input",
-                found=item.key,
-            )
-            continue
-        age = read_quantity(item.value, f"links.paths.{item.key}", "s", problems)
-        if age is not None:
-            found[item.key] = age
-    return found
-
-
-def _read(node: MapNode, at: str, keys: tuple[str, ...], problems: Problems) -> dict[str, Any]:
-    """The values of a mapping, without ``of``."""
-    found: dict[str, Any] = {}
-    for entry in node:
-        if entry.key not in keys:
-            unknown_key(entry, keys, f"of {at!r}", problems)
-        elif entry.key == "max_age":
-            age = read_quantity(entry.value, f"{at}.max_age", "s", problems)
-            if age is not None:
-                found["max_age"] = age
-        elif entry.key == "watchdog":
-            limit = read_quantity(entry.value, f"{at}.watchdog", "s", problems)
-            if limit is not None:
-                found["watchdog"] = limit
-        elif entry.key == "watch":
-            if isinstance(plain(entry.value), bool):
-                found["watch"] = plain(entry.value)
-            else:
-                wrong_kind(entry.value, f"{at}.watch", "true or false", problems)
-        elif entry.key in _WORDS:
-            value = plain(entry.value)
-            if value in _WORDS[entry.key]:
-                found[entry.key] = value
-            else:
-                _report_word(entry, at, _WORDS[entry.key], problems)
-    return found
-
-
-def _report_word(entry: Entry, at: str, words: Iterable[str], problems: Problems) -> None:
-    value = plain(entry.value)
-    similar = nearest(value, words) if isinstance(value, str) else ()
-    problems.add(
-        Code.BAD_VALUE,
-        f"{at}.{entry.key} cannot be {kind(entry.value)}",
-        entry.value.where,
-        at=f"{at}.{entry.key}",
-        expected=listing(words),
-        found=kind(entry.value),
-        nearest=similar,
-        fix=f"{entry.key}: {similar[0]}" if similar else "",
-    )
+def _entries(links: MapNode, key: str) -> Iterable[Entry]:
+    """The entries of a mapping inside ``links``."""
+    entry = links.get(key)
+    return entry.value if entry is not None and isinstance(entry.value, MapNode) else ()
 
 
 def _report_unknown_block(entry: Entry, paths: list[str], problems: Problems) -> None:

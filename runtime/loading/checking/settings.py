@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from ....files.nodes import Entry, ScalarNode, kind, plain
 from ....files.problems import Code, Position, Problems, listing, nearest
@@ -14,12 +13,8 @@ from ....robots.description import RobotDescription, RobotError, find_robot, rob
 from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
 from ..flattening.flat import ROBOT_FILES, FlatGraph
-from ..reading.written import CLOCK_KEYS, read_quantity, unknown_key
-
-_CLOCK_WORDS: Mapping[str, tuple[str, ...]] = {
-    "kind": ("free", "paced", "robot"),
-    "overrun": ("skip", "stop"),
-}
+from ..reading.graph_file import Clock, read_section
+from ..reading.written import read_quantity
 
 
 @dataclass(frozen=True)
@@ -102,39 +97,9 @@ def _read_dimensions(
 
 
 def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
-    values: dict[str, Any] = {}
-    for entry in graph.clock or ():
-        if entry.key not in CLOCK_KEYS:
-            unknown_key(entry, CLOCK_KEYS, "of 'clock'", problems)
-            continue
-        if entry.key == "hangs_after":
-            limit = read_quantity(entry.value, "clock.hangs_after", "s", problems)
-            values |= {} if limit is None else {entry.key: limit}
-            continue
-        value = plain(entry.value)
-        words = _CLOCK_WORDS.get(entry.key)
-        if words is not None and value not in words:
-            _bad_clock(entry, listing(words), words, problems)
-        elif words is None and (not isinstance(value, int) or isinstance(value, bool) or value < 1):
-            _bad_clock(entry, "overruns in a row, a whole number from 1", (), problems)
-        else:
-            values[entry.key] = value
-    return ClockSpec(**values)
-
-
-def _bad_clock(entry: Entry, expected: str, words: tuple[str, ...], problems: Problems) -> None:
-    value = plain(entry.value)
-    similar = nearest(value, words) if isinstance(value, str) else ()
-    problems.add(
-        Code.BAD_VALUE,
-        f"clock.{entry.key} cannot be {kind(entry.value)}",
-        entry.value.where,
-        at=f"clock.{entry.key}",
-        expected=expected,
-        found=kind(entry.value),
-        nearest=similar,
-        fix=f"{entry.key}: {similar[0]}" if similar else "",
-    )
+    if graph.clock is None:
+        return ClockSpec()
+    return ClockSpec(**read_section(graph.clock, "clock", Clock, problems))
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:

@@ -382,4 +382,9 @@ def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
 def _has_blocks(file: WrittenGraph) -> bool:
     """Whether anything is written under ``blocks``, even if it is wrong."""
     entry = file.tree.get("blocks")
-    return entry is not None and bool(plain(entry.value))
+    if entry is None:
+        return False
+    node = entry.value
+    if isinstance(node, ScalarNode):
+        return bool(node.value)
+    return bool(node.entries if isinstance(node, MapNode) else node.items)

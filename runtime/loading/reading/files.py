@@ -15,7 +15,8 @@ from typing import Any
 from ....files.document import read_file
 from ....files.nodes import MapNode, ScalarNode, plain, texts_of
 from ....files.problems import Code, LoadError, Position, Problems, listing, nearest
-from .written import COMMON_KEYS, GRAPH_KEYS, WrittenGraph, read_graph
+from .graph_file import COMMON_KEYS, GRAPH_KEYS
+from .written import WrittenGraph, read_graph
 
 Stack = tuple[tuple[Path, str], ...]
 """The files being read, outermost first; for each its real path and the name shown in messages."""

@@ -13,7 +13,7 @@ from typing import Any
 from ....files.document import read_value
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain, move, plain, text_of
 from ....files.problems import Code, Position, Problems
-from .written import GRAPH_KEYS
+from .graph_file import GRAPH_KEYS, SECTION_KEYS
 
 Overrides = Mapping[str, Any] | Iterable[str]
 """``{"landing.w_l": [0.03, 0.04]}`` or ``["landing.w_l=[0.03, 0.04]"]``.
@@ -137,15 +137,11 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-_MAPPINGS = ("clock", "dimensions", "machines", "place", "links")
-"""The keys of a graph whose values are mappings."""
-
-
 def is_graph_key(override: Override, names: Iterable[str]) -> bool:
     """Whether an override sets a key of the graph itself, such as ``rate`` or ``clock.kind``."""
     if not override.block:
         return True
-    return override.block in _MAPPINGS and override.block not in names
+    return override.block in SECTION_KEYS and override.block not in names
 
 
 def as_entry(override: Override) -> Entry:

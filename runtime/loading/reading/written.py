@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -12,27 +11,14 @@ from pathlib import Path
 from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
 from ...language.errors import UnitError
-from ...language.units import parse_quantity
-
-GRAPH_KEYS = (
-    "rate",
-    "duration",
-    "robot",
-    "actuators",
-    "dimensions",
-    "clock",
-    "machines",
-    "place",
-    "links",
+from .graph_file import (
+    BLOCK_KEYS,
+    COMMON_KEYS,
+    EXAMPLES,
+    GRAPH_KEYS,
+    SUBGRAPH_KEYS,
+    positive_quantity,
 )
-"""Keys that only a graph that is run, or a file it includes, may have."""
-SUBGRAPH_KEYS = ("inputs", "outputs", "parameters")
-"""Keys that only a sub-graph's file may have."""
-COMMON_KEYS = ("include", "blocks", "wires", "set")
-BLOCK_KEYS = ("use", "with", "in", "rate", "offset", "on")
-CLOCK_KEYS = ("kind", "overrun", "stop_after", "hangs_after")
-SOURCE_KEYS = ("from", "delay", "initial", "allow")
-WIRE_KEYS = (*SOURCE_KEYS, "value")
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*$")
 
@@ -233,25 +219,16 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
 
 def read_quantity(node: Node, what: str, unit: str, problems: Problems) -> float | None:
     """A positive quantity as a number, or text with a unit."""
-    value = node.value if isinstance(node, ScalarNode) else None
-    example = {"Hz": "500 Hz", "s": "4 s"}[unit]
-    number: float | None = None
-    reason = ""
-    if isinstance(value, str):
-        try:
-            number = parse_quantity(value, unit)
-        except UnitError as error:
-            reason = str(error)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool):
-        number = float(value) if abs(value) < 1e300 else math.inf
-    if number is not None and math.isfinite(number) and number > 0 and number < 1e12:
-        return number
+    try:
+        return positive_quantity(node.value if isinstance(node, ScalarNode) else None, unit)
+    except UnitError as error:
+        reason = str(error)
     problems.add(
         Code.BAD_VALUE,
         f"{what} cannot be {kind(node)}" + (f": {reason}" if reason else ""),
         node.where,
         at=what,
-        expected=f"a positive number in {unit}, such as {example}",
+        expected=f"a positive number in {unit}, such as {EXAMPLES[unit]}",
         found=kind(node),
     )
     return None

@@ -38,7 +38,7 @@ def feet_of(joints):
     positions, rotations = np.empty((2, 3)), np.empty((2, 3, 3))
     for leg, position, rotation in zip(LEGS, positions, rotations, strict=True):
         angles = joints[list(leg.joints)]
-        five_joint_leg.forward(leg.hip, leg.plane, leg.signs, angles, position, rotation)
+        five_joint_leg.forward(leg, angles, position, rotation)
     return positions, rotations
 
 

@@ -38,9 +38,8 @@ class Motion:
         for leg, foot in zip(LEGS, self.feet(time), strict=True):
             out = np.empty(5)
             sole = matrix.T @ (foot - self.position(time))
-            shape = leg.hip, leg.plane, leg.signs, leg.limits
             level = five_joint_leg.LEVEL
-            assert five_joint_leg.inverse(*shape, sole, line, 0.0, 0.0, level, out)[0]
+            assert five_joint_leg.inverse(leg, sole, line, 0.0, 0.0, level, out)[0]
             joints[list(leg.joints)] = out
         return joints
 

@@ -7,8 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.capture_step import CaptureStep, choose_foothold, swing_points
+from aloft.blocks.jumping.capture_step import (
+    CaptureStep,
+    choose_foothold,
+    find_capture_point,
+    swing_points,
+)
 from aloft.blocks.signals import Phase
+from aloft.mathematics.constants import GRAVITY
 from aloft.runtime.testing import BlockBench
 
 from ...kernel_samples import records
@@ -177,6 +183,44 @@ def foothold(capture, rate, left, beyond):
     out = np.zeros(3)
     choose_foothold(terms, params, constants, scratch, 1, rate, left, out)
     return out
+
+
+HEIGHTS = np.array([0.01, 0.02, 0.04, 0.08])
+
+
+@pytest.mark.parametrize(
+    ("stance", "ground"),
+    [
+        ([True] * 4, 0.0375),
+        ([False] * 4, 0.0375),
+        ([True, False, False, False], 0.01),
+        ([False, False, True, True], 0.06),
+        ([False, True, False, False], 0.02),
+    ],
+)
+@pytest.mark.parametrize(("mass", "counts"), [(5.5, 5.5), (0.0, 4.8)])
+@pytest.mark.parametrize("foot", [0, 2])
+def test_the_pendulum_stands_on_the_points_in_stance(stance, ground, mass, counts, foot):
+    points, matrix = SOLES.copy(), np.zeros((16, 16))
+    points[:, 2], matrix[0, 0] = HEIGHTS, mass
+    before, terms, params, constants, memory, scratch = records(
+        {"stance": stance},
+        {
+            "contact_position": points, "com": [0.02, -0.03, 0.31], "com_velocity": [-0.4, 0.2, 0.0],
+            "angular_momentum": [0.1, -0.3, 0.7], "mass_matrix": matrix,
+        },
+        {"turn": 0.6},
+        {"mass": 4.8},
+        {"foot": foot, "ground": 9.0},
+        {"capture": np.zeros(2)},
+    )  # fmt: skip
+    rate = find_capture_point(before, terms, params, constants, memory, scratch)
+    assert rate == pytest.approx(math.sqrt(GRAVITY / (0.31 - ground)), rel=1e-12)
+    arm = 0.6 * rate / (counts * GRAVITY)
+    expected = [0.02 - 0.4 / rate - 0.3 * arm, -0.03 + 0.2 / rate - 0.1 * arm]
+    assert scratch.capture == pytest.approx(expected, rel=1e-12)
+    # while a foot steps, the ground is where the feet stood before
+    assert float(memory.ground) == pytest.approx(9.0 if foot else ground, rel=1e-12)
 
 
 def test_the_foothold_is_where_the_capture_point_will_be():

@@ -16,7 +16,8 @@ import pytest
 
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.recording.recorder import Recorder
-from aloft.logs.recording.recorder_process import RecorderProcess, RecorderTask
+from aloft.logs.recording.recorder_process import RecorderProcess
+from aloft.logs.recording.recorder_protocol import RecorderTask
 from aloft.runtime.language.block import Block, Output, State
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec
@@ -167,7 +168,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     recorded = read(tmp_path / "a.part.rrd")
     count = len(recorded.ticks)
     warning = result.warnings[-1]
-    assert "is not whole: the recorder was killed by signal 9" in warning
+    assert "is not whole: the recorder was killed by SIGKILL" in warning
     # every tick is accounted for, also those that waited in the ring
     assert f"{count} ticks are in" in warning
     assert f"{5000 - count} were run but are not recorded" in warning
@@ -348,7 +349,7 @@ def test_what_a_killed_recorder_left_is_kept(tmp_path: Path) -> None:
 def test_a_slow_simulation_writes_larger_batches(filled: int, waited: float, due: bool) -> None:
     # half a second of the graph's time at 500 Hz is 250 ticks
     recorder = object.__new__(RecorderProcess)
-    recorder._task = RecorderTask(0, 0, "", 0, 0, flush_period=0.5, sync_period=5.0)
+    recorder._task = RecorderTask(0, "", 0, flush_period=0.5, sync_period=5.0)
     recorder._header = SimpleNamespace(base_rate=500.0)  # type: ignore[assignment]
     recorder._filled = filled
     assert recorder._flush_is_due(waited) is due

@@ -3,6 +3,8 @@
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -14,8 +16,9 @@ import pytest
 
 from aloft.logs import read
 from aloft.logs.recording import recorder as recorder_module
-from aloft.logs.recording.recorder import GIVE_UP_TIME, STALL_TIME, Recorder, RecorderLink
-from aloft.logs.recording.recorder_process import ROW
+from aloft.logs.recording.recorder import GIVE_UP_TIME, STALL_TIME, Recorder
+from aloft.logs.recording.recorder_link import RecorderLink
+from aloft.logs.recording.recorder_protocol import ROW
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import run
 
@@ -30,7 +33,7 @@ class SlowProcess:
         self.moved = 0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.sleep)
         monkeypatch.setattr(recorder_module, "time", clock)
-        monkeypatch.setattr("aloft.logs.recording.recorder.time", clock)
+        monkeypatch.setattr("aloft.logs.recording.recorder_link.time", clock)
         self.link: Any = object.__new__(RecorderLink)
         self.link.ring = SimpleNamespace(read_back=0)
         self.link._seen, self.link._since = (0, 0), 0.0
@@ -198,3 +201,28 @@ def test_a_recorder_that_ends_between_two_looks_is_not_stuck(
     result = run(graph(5), sinks=[recorder])
     assert result.warnings == ()
     assert recorder.report is not None and recorder.report.rows == 5
+
+
+def test_a_process_that_was_started_early_records_the_run(tmp_path: Path) -> None:
+    link = RecorderLink()
+    recorder = Recorder(tmp_path / "a.rrd", link=link)
+    result = run(graph(50), sinks=[recorder])
+    assert recorder.link is link
+    assert_whole(read(tmp_path / "a.rrd"), result)
+    link.close()  # which has nothing to end any more
+
+
+def test_a_process_that_was_started_early_for_nothing_ends() -> None:
+    link = RecorderLink()
+    assert link.is_alive()
+    link.close()
+    assert not link.is_alive()
+
+
+def test_a_process_ends_with_one_that_died_before_it_had_a_task() -> None:
+    code = "from aloft.logs.recording.recorder_link import RecorderLink; import os; "
+    code += "link = RecorderLink(); os._exit(0)"
+    command = [sys.executable, "-c", code]
+    # which returns when the standard error, that of the recorder too, is closed
+    done = subprocess.run(command, stderr=subprocess.PIPE, check=True, timeout=60.0)
+    assert done.stderr == b""

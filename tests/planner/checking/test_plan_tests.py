@@ -13,15 +13,16 @@ import pytest
 
 from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
-from aloft.planner.checking.evidence import Evidence
+from aloft.planner.checking.evidence import Evidence, body_heights
 from aloft.planner.checking.plan_tests import (
+    _impact,
     _short,
     _standing_knots,
     active_limits,
     allowed_motor_torque,
     interval_defects,
 )
-from aloft.planner.checking.replay import replay
+from aloft.planner.checking.replay import held_joints, replay
 from aloft.planner.checking.validity import PlanTest, check_plan
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.models.exact_dynamics import ExactDynamics
@@ -30,6 +31,7 @@ from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
 JOINTS = [joint.name for joint in ROBOT.joints]
+CONTACTS = [contact.name for contact in ROBOT.contacts]
 
 
 def found(plan: PlannedJump) -> dict[str, PlanTest]:
@@ -152,6 +154,58 @@ def test_the_impulse_at_touchdown_leads_to_the_velocities_behind_it() -> None:
         assert moved.value == pytest.approx(0.3, abs=2 * test.limit)
     place = found(shifted(plan, "position", 0.4, (knot + 1, 9)))["impact"]
     assert place.value == pytest.approx(0.4, abs=2 * test.limit)
+
+
+def test_the_impulse_of_motors_keeps_joints_still_that_do_not_yield() -> None:
+    plan = shipped("in_situ")
+    knot = int(np.flatnonzero(np.diff(plan.time) == 0.0)[0])
+    q, v = plan.position[knot], plan.velocity[knot]
+    dynamics, given = ExactDynamics(ROBOT), replay(plan, ROBOT)
+    held = held_joints(plan, knot)
+    behind, _ = dynamics.velocity_after_impact(q, v, plan.contact_force[knot], held)
+    pushed = dynamics.contact_jacobians(q)[1].T @ plan.contact_force[knot].ravel()
+    needed = (dynamics.mass_matrix(q) @ (behind - v) - pushed)[6:]
+    assert held.any() and np.abs(needed[held]).min() > 1e-6
+    error, kept = _impact(Evidence(plan, ROBOT, given), knot)
+    assert error == pytest.approx(np.abs(behind - plan.velocity[knot + 1]).max(), abs=1e-12)
+    np.testing.assert_allclose(kept, np.abs(ROBOT.torque_to_motor @ needed), atol=1e-8)
+    # Joints that the description holds yield: their motors' impulse counts as none.
+    yielding = JOINTS[int(np.flatnonzero(held)[0])]
+    robot = ROBOT.model_copy(update={"held": {yielding: 0.0}})
+    _, fewer = _impact(Evidence(plan, robot, given), knot)
+    without = np.where([name == yielding for name in JOINTS], 0.0, needed)
+    np.testing.assert_allclose(fewer, np.abs(ROBOT.torque_to_motor @ without), atol=1e-8)
+
+
+def test_there_is_no_impact_but_where_two_knots_have_one_time() -> None:
+    plan = shipped("in_situ")
+    evidence = Evidence(plan, ROBOT, replay(plan, ROBOT))
+    knots = np.arange(len(plan.time))
+    at = [k for k in knots if np.isfinite(_impact(evidence, int(k))[0])]
+    assert at == np.flatnonzero(np.diff(plan.time) == 0.0).tolist()
+    error, kept = _impact(evidence, int(knots[-1]))
+    assert error == np.inf and kept.tolist() == [0.0] * len(JOINTS)
+
+
+def test_the_lowest_point_of_feet_and_body_is_named_with_its_time(by_hand: PlannedJump) -> None:
+    sunk = shifted(by_hand, "position", -0.3, (slice(None), 2))
+    at = sunk.position.copy()
+    at[5, 7 + JOINTS.index("left_ankle")] += 0.2  # one foot turns about its ankle
+    sunk = replace(sunk, position=at)
+    e, tests = Evidence(sunk, ROBOT, replay(sunk, ROBOT)), found(sunk)
+    lowest = {name: float(e.point_height[:, i].min()) for i, name in enumerate(CONTACTS)}
+    point = min(lowest, key=lambda name: lowest[name])
+    assert tests["foot_below_ground"].value == pytest.approx(-lowest[point], abs=1e-12)
+    when = int(e.point_height[:, CONTACTS.index(point)].argmin())
+    assert tests["foot_below_ground"].where == f"{point} {e.moment(when)}"
+    heights = body_heights(ROBOT, sunk.task, e.poses, e.progress)
+    link, height = min(heights.items(), key=lambda item: float(item[1].min()))
+    assert height.min() < 0.0
+    assert tests["body_on_ground"].value == pytest.approx(-height.min(), abs=1e-12)
+    assert tests["body_on_ground"].where == f"{link} {e.moment(int(height.argmin()))}"
+    above = found(by_hand)["body_on_ground"].value
+    level = found(shifted(by_hand, "position", -0.3, (slice(None), 2)))["body_on_ground"].value
+    assert level - above == pytest.approx(0.3, abs=1e-3)
 
 
 def test_points_hit_the_ground_as_fast_as_found_by_pinocchio() -> None:

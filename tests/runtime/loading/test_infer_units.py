@@ -72,6 +72,20 @@ def test_units_and_frames_pass_through_a_gain(tmp_path: Path) -> None:
     assert problem.fix.endswith("1 mm is 0.001 m; blocks.Gain with {gain: 0.001, unit: m/mm}")
 
 
+def test_a_constant_has_its_own_unit_where_a_block_takes_any(tmp_path: Path) -> None:
+    written = "  g: {use: blocks.Gain, in: {u: {value: %s}}}\n"
+    read = "  r: {use: parts:Reader, in: {m: g.y}}\n"
+    problem = one(tmp_path, written % "[3 mm]" + read)
+    assert (problem.code, problem.expected, problem.found) == ("unit", "m", "mm")
+    assert not problems_of(tmp_path, written % "[3 m]" + read)
+    assert one(tmp_path, written % "[3.0]" + read).code == "unit"  # a plain number has no unit
+
+
+def test_a_constant_of_a_declared_field_has_the_fields_unit(tmp_path: Path) -> None:
+    assert not problems_of(tmp_path, "  r: {use: parts:Reader, in: {m: {value: [3 mm]}}}\n")
+    assert not problems_of(tmp_path, "  r: {use: parts:Reader, in: {m: {value: [3.0]}}}\n")
+
+
 def test_the_fix_of_another_scale_is_one(tmp_path: Path) -> None:
     blocks = (
         "  g: {use: blocks.Gain, with: {gain: 0.001, unit: m/mm}, in: {u: s.mm}}\n"

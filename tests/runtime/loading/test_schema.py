@@ -10,7 +10,7 @@ from jsonschema import Draft7Validator
 from aloft.files.document import read_file, read_value
 from aloft.files.nodes import plain
 from aloft.files.problems import Problems
-from aloft.runtime.loading import graph_schema, schema_text
+from aloft.runtime.loading.schema import graph_schema, schema_text
 
 ROOT = Path(__file__).parents[3]
 NO_GRAPHS = {ROOT / "graphs" / name for name in ("tasks", "studies", "hardware")}
