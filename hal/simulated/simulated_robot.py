@@ -18,12 +18,12 @@ from ..robot import Robot
 from ..sensors.sensor import MountedSensor
 from . import scenes
 from .battery import BatteryParameters
+from .body_effects import CableParameters, JointEffects, LinkEffects, SoleParameters
 from .drive_effects import EncoderEffects, MotorEffects
 from .gears import GearParameters, longest_step
 from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
 from .switch_effects import SwitchEffects
-from .variation import CableParameters, JointEffects, LinkEffects, SoleParameters
 
 
 class SimulatorParameters(DriveGains):

@@ -1,0 +1,47 @@
+"""How links, joints, soles and surroundings of a simulated robot differ from its description: parameters."""
+
+from __future__ import annotations
+
+from ...runtime.language.parameters import Parameters, parameter
+
+
+class LinkEffects(Parameters):
+    """How the links differ from the description, besides a common factor on all masses."""
+
+    mass_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor on the mass of every link"
+    )
+    com_spread: float = parameter(
+        0.0, unit="m", ge=0.0, text="spread of the offset of every link's CoM, per axis"
+    )
+    inertia_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of a further factor on the inertia of every link"
+    )
+
+
+class JointEffects(Parameters):
+    """How joints and rotors differ from the description, besides the common factor ``joint_friction``."""
+
+    friction_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor on friction and damping of every joint"
+    )
+    rotor_inertia: float = parameter(1.0, gt=0.0, text="factor on the inertia of all rotors")
+    rotor_inertia_spread: float = parameter(
+        0.0, ge=0.0, lt=1.0, text="spread of the factor, per motor"
+    )
+
+
+class SoleParameters(Parameters):
+    """Rubber under the contact points: contacts as soft and as bouncing as these say."""
+
+    time_constant: float = parameter(
+        0.008, unit="s", gt=0.0, le=0.1, text="in which a contact settles; stiff ones take 4 ms"
+    )
+    damping_ratio: float = parameter(1.0, gt=0.0, le=2.0, text="below 1 the soles bounce")
+
+
+class CableParameters(Parameters):
+    """A cable to the robot's base, which pulls from the first tick on."""
+
+    pull: float = parameter(unit="N", ge=0.0, text="its horizontal force, in a drawn direction")
+    weight: float = parameter(0.0, unit="N", ge=0.0, text="what hangs of it on the robot")
