@@ -7,12 +7,12 @@
 A child is a fresh interpreter, never a copy of this process: a copy would share its robot's ports, and
 in a process with several threads it may find a lock that another thread held.
 
-One socket joins both. Through it the child says that it is ready, and which exception ended it. Its
-end tells the parent at once that the child has died. It tells the child that the parent has died,
-whatever killed that: the kernel sends the child a signal, so it ends even where compiled code holds
-the interpreter. (``PR_SET_PDEATHSIG`` fires too early, namely when the *thread* ends that started
-the child.) A child that has work to do then, such as damping a robot or closing a file, turns that
-off with ``parent_death=None`` and reads the end of its standard input instead.
+A socket joins the two. Through it the child says that it is ready, and which exception ended it; and
+its end tells the parent at once that the child has died. When the parent has died, whatever killed
+it, the kernel sends the child a signal, which ends it even in the middle of compiled code.
+(``PR_SET_PDEATHSIG`` fires too early: when the *thread* that started the child ends.) A child that
+has a file to close first turns that off with ``parent_death=None`` and waits for the end of its
+standard input instead.
 """
 
 from __future__ import annotations
@@ -32,12 +32,10 @@ from importlib import import_module
 from pathlib import Path
 from select import select
 from time import monotonic
-from typing import IO, Any, Self
+from typing import IO, Self
 
 KILL_TIME = 5.0
 """Seconds that a killed process has to disappear; one that the kernel holds is left to it."""
-LAST_LINES = 5
-"""Lines of a child's standard error that an error quotes."""
 _PROGRAM = (
     "import gc, json, sys; gc.disable(); sys.path[:] = json.loads(sys.argv.pop(1)); "
     f"from {__name__} import main; main()"
@@ -46,21 +44,11 @@ _link = -1
 
 
 class ChildError(RuntimeError):
-    """Raised where a child does not start, or has died.
-
-    Attributes:
-        exit_code: its exit code, negative for a signal; ``None`` if it was still running.
-        exception: the type's name of the exception that ended it; empty if none did.
-    """
-
-    def __init__(self, text: str, exit_code: int | None, exception: str = "") -> None:
-        super().__init__(text)
-        self.exit_code = exit_code
-        self.exception = exception
+    """Raised where a child does not start, or has died."""
 
 
 class ChildProcess:
-    """A process that was started here.
+    """A process that this one has started. What it prints shows where this process prints, too.
 
     Args:
         name: what errors call it.
@@ -71,11 +59,10 @@ class ChildProcess:
         arguments: texts for it.
         descriptors: open files that it inherits under their numbers.
         stdout: whether its standard output is a pipe to here.
-        shows_output: whether it prints where this process does; otherwise nothing is seen of it, but
-            errors quote the end of its standard error.
+        quiet: whether nothing is seen of what it prints.
         environment: variables that it gets beside those of this process.
-        parent_death: the signal that ends it when this process has died; ``None`` if it sees to
-            that itself.
+        parent_death: the signal that ends a function when this process has died; ``None`` if the
+            function sees to that itself, as a program always does.
 
     Attributes:
         stdin: the pipe to its standard input.
@@ -93,14 +80,13 @@ class ChildProcess:
         *,
         descriptors: Sequence[int] = (),
         stdout: bool = False,
-        shows_output: bool = False,
+        quiet: bool = False,
         environment: Mapping[str, str] | None = None,
         parent_death: signal.Signals | None = signal.SIGKILL,
     ) -> None:
         self.name = name
         self._owner = os.getpid()
         self._said = b""
-        self._errors = None if shows_output else _file_without_name()
         self._socket, theirs = socket.socketpair()
         if isinstance(target, Path):
             command = ["-I", "-S", str(target), str(theirs.fileno())]
@@ -108,19 +94,19 @@ class ChildProcess:
             folders = json.dumps([str(Path(folder).absolute()) for folder in sys.path])
             number = str(int(parent_death or 0))
             command = ["-c", _PROGRAM, folders, str(theirs.fileno()), number, target]
-        output = None if shows_output else subprocess.DEVNULL
+        shown = subprocess.DEVNULL if quiet else None
         try:
             self._process = subprocess.Popen(
                 [sys.executable, *command, *arguments],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE if stdout else output,
-                stderr=self._errors,
+                stdout=subprocess.PIPE if stdout else shown,
+                stderr=shown,
                 pass_fds=[theirs.fileno(), *descriptors],
                 env={**os.environ, **(environment or {})},
                 start_new_session=True,  # Ctrl-C in the terminal is for this process
             )
         except BaseException:
-            self._close()
+            self._socket.close()
             raise
         finally:
             theirs.close()
@@ -139,18 +125,13 @@ class ChildProcess:
         """Its number."""
         return self._process.pid
 
-    @property
-    def is_own(self) -> bool:
-        """Whether it is a child of this process, which may be a copy of the one that started it."""
-        return self._owner == os.getpid()
-
-    def fileno(self) -> int:
-        """The socket, for ``select``: it can be read when the child has died."""
-        return self._socket.fileno()
-
     def is_alive(self) -> bool:
-        """Whether it is running."""
-        return self.is_own and self._process.poll() is None
+        """Whether it is running, as a child of this process and not of one that this is a copy of."""
+        return self._owner == os.getpid() and self._process.poll() is None
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, unless it has ended."""
+        self._process.send_signal(number)
 
     def wait(self, seconds: float) -> int | None:
         """Wait until it has ended. Returns its exit code, or ``None`` if it is still running."""
@@ -168,70 +149,44 @@ class ChildProcess:
         while READY not in self._said:
             left = end - monotonic()
             if left <= 0:
-                raise ChildError(f"{self.name} was not ready within {seconds:g} s", None)
+                raise ChildError(f"{self.name} was not ready within {seconds:g} s")
             if not self._listen(left):
                 raise self.failure()
 
     def failure(self) -> ChildError:
-        """Why it has died: its exception or exit code, and the last lines of its standard error."""
+        """Why it has died: its exception, or its exit code."""
         end = monotonic() + KILL_TIME
         while (left := end - monotonic()) > 0 and self._listen(left):
             pass
         code = self.wait(max(0.0, end - monotonic()))
-        message: dict[str, Any] = {}
         for line in self._said.splitlines():
             if line.startswith(b"{"):
                 message = json.loads(line)
-        if message:
-            how = f"failed with {message['type']}: {message['text']}"
-        elif code is None:
-            how = "does not answer"
-        elif code < 0:
-            how = f"was killed by {signal.Signals(-code).name}"
-        else:
-            how = f"ended with exit code {code}"
-        lines = [] if message else self.last_lines()
-        text = "; ".join([f"{self.name} {how}", *lines])
-        return ChildError(text, code, message.get("type", ""))
+                return ChildError(f"{self.name} failed with {message['type']}: {message['text']}")
+        if code is None:
+            return ChildError(f"{self.name} does not answer")
+        if code < 0:
+            return ChildError(f"{self.name} was killed by {signal.Signals(-code).name}")
+        return ChildError(f"{self.name} ended with exit code {code}")
 
-    def last_lines(self) -> list[str]:
-        """The end of what it wrote to its standard error, if that is kept."""
-        if self._errors is None:
-            return []
-        size = self._errors.seek(0, os.SEEK_END)
-        text = os.pread(self._errors.fileno(), 4096, max(0, size - 4096))
-        return [line for line in text.decode(errors="replace").splitlines() if line][-LAST_LINES:]
+    def stop(self, *, asked: float = 0.0) -> int | None:
+        """Close its standard input, and kill it if it has not ended by itself ``asked`` seconds later.
 
-    def stop(self, *, asked: float = 0.0, terminated: float = 0.0) -> int | None:
-        """End it: close its standard input, then SIGTERM, then SIGKILL. Returns its exit code.
-
-        Args:
-            asked: seconds it has to end by itself, once its standard input has ended.
-            terminated: seconds it has after SIGTERM; with zero it gets none.
+        Returns its exit code; ``None`` in a copy of the process that started it, and if the kernel
+        holds it.
         """
-        if not self.is_own:
-            self._close()
-            return None
         with suppress(OSError):
             self.stdin.close()
-        code = self.wait(asked)
-        if code is None and terminated:
-            self._process.terminate()
-            code = self.wait(terminated)
-        if code is None:
-            self._process.kill()
-            code = self.wait(KILL_TIME)
-        self._close()
-        return code
-
-    def _close(self) -> None:
+        code = None
+        if self._owner == os.getpid():
+            code = self.wait(asked)
+            if code is None:
+                self._process.kill()
+                code = self.wait(KILL_TIME)
         self._socket.close()
-        if self._errors is not None and not self._errors.closed:
-            self._errors.close()
-        if (process := getattr(self, "_process", None)) is not None:
-            for pipe in filter(None, (process.stdin, process.stdout)):
-                with suppress(OSError):
-                    pipe.close()
+        if self.stdout is not None:
+            self.stdout.close()
+        return code
 
     def _listen(self, seconds: float) -> bool:
         """Read what it says within that time. Returns false when it can say no more."""
@@ -245,12 +200,6 @@ class ChildProcess:
         return bool(part)
 
 
-def _file_without_name() -> IO[bytes]:
-    import tempfile  # it takes long, and most of who imports this module starts no child
-
-    return tempfile.TemporaryFile()
-
-
 READY = b"ready\n"
 """What a child writes into the socket when it is ready."""
 
@@ -262,8 +211,8 @@ def report_ready() -> None:
 
 
 def end_with(descriptor: int, number: int) -> None:
-    """End this process with a signal when the other end of a pipe or socket, from which nothing ever
-    comes, is closed."""
+    """Let a signal end this process when the other end of a pipe or socket is closed, from which
+    nothing else ever comes."""
     if hasattr(fcntl, "F_SETSIG"):
         fcntl.fcntl(descriptor, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(descriptor, fcntl.F_SETSIG, number)

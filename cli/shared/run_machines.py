@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...processes.child_process import ChildProcess
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.observer import StatusPublisher
@@ -146,75 +146,78 @@ def _run_processes(
     sets = [text for setting in settings for text in ("--set", setting)]
     with ExitStack() as stack:
         stack.enter_context(registered(path, settings))
-        running: dict[str, subprocess.Popen[str]] = {}
+        running: dict[str, ChildProcess] = {}
         for number, (machine, file) in enumerate(files.items()):
             # the first part answers for the run, which one in real time does by the graph's name
             params = "none" if number else options.params
-            command = [
-                sys.executable, "-m", "aloft", "run", str(path), *sets, "--machine", machine,
-                "--record", str(file), "--params", params, "--json", "--quiet",
+            arguments = [
+                "run", str(path), *sets, "--machine", machine, "--record", str(file),
+                "--params", params, "--json", "--quiet",
                 *(["--plain"] if options.plain else []), *([] if options.fuse else ["--no-fuse"]),
                 *(["--keys", str(options.keys)] if options.keys is not None else []),
             ]  # fmt: skip
-            # in a group of its own, so that Ctrl-C reaches it once, from here
-            process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, process_group=0)
-            running[machine] = stack.enter_context(process)
-        received = _wait_for_all(running)
+            part = ChildProcess(
+                f"the part on {machine!r}", f"{__name__}:main", arguments, stdout=True,
+                parent_death=signal.SIGTERM,  # its blocks come to rest before it ends
+            )  # fmt: skip
+            running[machine] = stack.enter_context(part)
+        outputs, received = _wait_for_all(running)
         part_reports = {}
-        for machine, process in running.items():
-            assert process.stdout is not None
-            lines = process.stdout.read().splitlines()
+        for machine, part in running.items():
             try:
-                part_reports[machine] = json.loads(lines[-1])
+                part_reports[machine] = json.loads(outputs[machine].splitlines()[-1])
             except (IndexError, ValueError):
                 if received:  # it had not come as far as a run
                     code, reason = ExitCode(128 + received[0]), f"stopped by {received[0].name}"
                     part_reports[machine] = {"exit_code": code, "reason": reason}
                     continue
                 raise AloftError(
-                    f"the part on {machine!r} ended with code {process.returncode} and no result"
+                    f"the part on {machine!r} ended with code {part.wait(GRACE)} and no result"
                 ) from None
     return part_reports
 
 
-def _wait_for_all(running: Mapping[str, subprocess.Popen[str]]) -> list[signal.Signals]:
+def main(*arguments: str) -> None:
+    """What the process of a part does: run the command line with these arguments."""
+    from .. import main as run_command_line
+
+    sys.argv = ["aloft", *arguments]
+    run_command_line()
+
+
+def _wait_for_all(
+    running: Mapping[str, ChildProcess],
+) -> tuple[dict[str, bytes], list[signal.Signals]]:
     """Wait until every process has ended; pass on SIGINT and SIGTERM, and end those that hang.
 
-    Returns the signals that were passed on.
+    Returns what each has printed, and the signals that were passed on.
     """
     received: list[signal.Signals] = []
 
-    def receive(number: int, _: object) -> None:
+    def pass_on(number: int, _: object) -> None:
         received.append(signal.Signals(number))
-        pass_on(number)
+        send(number)
 
-    def pass_on(number: int) -> None:
-        for process in running.values():
-            if process.poll() is None:
-                process.send_signal(number)
+    def send(number: int) -> None:
+        for part in running.values():
+            part.send_signal(number)
 
-    before = {n: signal.signal(n, receive) for n in (signal.SIGINT, signal.SIGTERM)}
-    first_end = 0.0
-    asked = False
+    before = {n: signal.signal(n, pass_on) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
-        while any(process.poll() is None for process in running.values()):
-            ended = any(process.poll() is not None for process in running.values())
-            first_end = first_end or (time.monotonic() if ended else 0.0)
-            late = time.monotonic() - first_end if first_end else 0.0
-            if late > 2 * GRACE:
-                for process in running.values():
-                    process.kill()
-            elif late > GRACE and not asked:
-                asked = True
-                pass_on(signal.SIGTERM)
-            time.sleep(0.02)
+        with ThreadPoolExecutor(len(running)) as readers:
+            outputs = {
+                machine: readers.submit(part.stdout.read)
+                for machine, part in running.items()
+                if part.stdout is not None
+            }
+            wait(outputs.values(), return_when=FIRST_COMPLETED)
+            for number in (signal.SIGTERM, signal.SIGKILL):
+                if wait(outputs.values(), timeout=GRACE).not_done:
+                    send(number)
+        return {machine: output.result() for machine, output in outputs.items()}, received
     finally:
-        for process in running.values():
-            if process.poll() is None:
-                process.kill()
         for number, handler in before.items():
             signal.signal(number, handler)
-    return received
 
 
 def _whole_result(

@@ -56,7 +56,6 @@ class RecorderLink:
                 [str(theirs.fileno())],
                 descriptors=[theirs.fileno()],
                 stdout=True,
-                shows_output=True,
                 # What fails, a viewer or the disk, this process says in a line of its own; Rerun's log
                 # would say it again several times, as raw lines. Who wants them sets RUST_LOG.
                 environment={"RUST_LOG": os.environ.get("RUST_LOG", "off")},

@@ -1,6 +1,7 @@
 """Runs the Rerun viewer as a process: in a window, in a browser, or without a screen for tests.
 
-It listens on free ports of 127.0.0.1 only.
+It listens on free ports of 127.0.0.1 only. Neither it nor the server of its page is a
+``ChildProcess``: they may outlive this process, and the viewer is not Python.
 """
 
 from __future__ import annotations

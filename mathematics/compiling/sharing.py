@@ -79,8 +79,8 @@ def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[ChildProces
         started: list[ChildProcess] = []
         for share in shares:
             with suppress(OSError):
-                process = stack.enter_context(ChildProcess("a compiler", f"{__name__}:main"))
-                started.append(process)
+                process = ChildProcess("a compiler", f"{__name__}:main", quiet=True)
+                started.append(stack.enter_context(process))
                 with suppress(BrokenPipeError), process.stdin as pipe:
                     pipe.write(pickle.dumps([_packed(job) for job in share]))
         yield started

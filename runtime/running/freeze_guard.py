@@ -45,7 +45,7 @@ class FreezeGuard:
         self._process = ChildProcess(
             "the process that watches for a hang", program,
             [str(os.getpid()), str(limit), str(int(as_json)), str(shared)],
-            descriptors=[shared] if shared >= 0 else [], shows_output=True,
+            descriptors=[shared] if shared >= 0 else [],
         )  # fmt: skip
         if shared >= 0:
             os.close(shared)

@@ -8,14 +8,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from aloft.cli.shared import run_machines
 from aloft.logs.file.reader import read
+from aloft.processes.child_process import ChildProcess
 
-from ..waiting import free_port
+from ..waiting import free_port, is_gone
 from .conftest import run_for_json, run_here
 
 BLOCKS = """
@@ -257,3 +260,45 @@ def test_an_interrupt_ends_all_parts_after_one_tick(
     ticks = dict.fromkeys(part["ticks"] for part in result["machines"].values())
     assert list(ticks) == [result["ticks"]]
     assert len((here / "damping.txt").read_text().split()) == 5
+
+
+@pytest.mark.long
+def test_parts_stop_when_the_command_is_killed(started: subprocess.Popen[str], here: Path) -> None:
+    parts = parts_of(started)
+    since = time.monotonic()
+    started.kill()
+    assert wait_for_damping(here, since, 60.0) < 30.0
+    assert all(is_gone(pid) for pid in parts.values())
+    assert len((here / "damping.txt").read_text().split()) == 5
+
+
+PARTS = """
+import signal, time
+from aloft.processes.child_process import report_ready
+
+def print_much():
+    print("x" * 1_000_000)
+
+def hang():
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    print("I hang", flush=True)
+    report_ready()
+    time.sleep(600)
+"""
+
+
+def test_a_part_that_prints_much_and_one_that_hangs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "parts_for_test.py").write_text(PARTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    with ExitStack() as stack:
+        running = {
+            name: stack.enter_context(ChildProcess(name, f"parts_for_test:{name}", stdout=True))
+            for name in ("print_much", "hang")
+        }
+        running["hang"].wait_until_ready(60.0)
+        monkeypatch.setattr(run_machines, "GRACE", 0.2)
+        outputs, received = run_machines._wait_for_all(running)
+        assert len(outputs["print_much"]) == 1_000_001 and outputs["hang"] == b"I hang\n"
+        assert running["hang"].wait(60.0) == -signal.SIGKILL and not received
