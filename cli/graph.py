@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.option_groups import expand_option_groups
-from .shared.options import CompletedOverrides
+from .shared.options import CompletedOverrides, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say, table
 from .shared.running_graphs import As, Keys, Local
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
-from .shared.option_groups import expand_option_groups
-from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet
+from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, graph_of, rehearsal
 from .shared.run_graph import OneRunOptions, run_many, run_once

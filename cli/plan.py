@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import ExitCode
-from .shared.option_groups import expand_option_groups
-from .shared.options import JsonBesideTables
+from .shared.options import JsonBesideTables, expand_option_groups
 from .shared.output import console, errors_reported, print_error, print_json, say
 from .shared.planning import (
     failure,

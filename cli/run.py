@@ -13,8 +13,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.option_groups import expand_option_groups
-from .shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
+from .shared.options import (
+    CompletedOverrides,
+    JsonBesideTables,
+    NoRecord,
+    Quiet,
+    expand_option_groups,
+)
 from .shared.output import (
     console,
     errors_reported,

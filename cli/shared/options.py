@@ -1,8 +1,24 @@
-"""The options that several verbs have, and what the shell offers for them when the tab key is pressed."""
+"""The options that several verbs have, and what the shell offers for them when the tab key is pressed.
+
+A verb of many options takes them in groups, so that what belongs together is one argument. A group is
+a data class whose fields are declared as options are::
+
+    @dataclass(frozen=True)
+    class PrintingOptions:
+        as_json: JsonBesideTables = False
+        quiet: Quiet = False
+
+    @expand_option_groups
+    def run(graph: ..., printing: PrintingOptions) -> None: ...
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -47,3 +63,33 @@ CompletedOverrides = Annotated[
 ]
 Workers = Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)]
 Cluster = Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")]
+
+
+def expand_option_groups(verb: Callable[..., None]) -> Callable[..., None]:
+    """The verb as typer reads it: each group of options replaced by its fields, in their place."""
+    kinds = get_type_hints(verb, include_extras=True)
+    groups: dict[str, Any] = {name: kind for name, kind in kinds.items() if is_dataclass(kind)}
+    options: list[Parameter] = []
+    for name, parameter in signature(verb).parameters.items():
+        if name in groups:
+            declared = get_type_hints(groups[name], include_extras=True)
+            options += [
+                _option(each.name, each.default, declared[each.name])
+                for each in fields(groups[name])
+            ]
+        else:
+            options.append(_option(name, parameter.default, kinds[name]))
+
+    @wraps(verb)
+    def command(**values: Any) -> None:
+        for name, group in groups.items():
+            values[name] = group(**{each.name: values.pop(each.name) for each in fields(group)})
+        verb(**values)
+
+    command.__annotations__ = {option.name: option.annotation for option in options}
+    setattr(command, "__signature__", Signature(options))  # noqa: B010  mypy: no such attribute
+    return command
+
+
+def _option(name: str, default: Any, annotation: Any) -> Parameter:
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

@@ -63,7 +63,7 @@ class LiveFeed:
 
     def note(self, note: Note) -> None:
         """Show a note."""
-        self._put(lambda run: run.write_note(note))
+        self._put(lambda run: run.write_notes([note]))
 
     def finish(self, outcome: dict[str, Any] | None) -> None:
         """Show how the run ended, and wait a little until the viewer has everything."""

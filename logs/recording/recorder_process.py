@@ -19,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,7 @@ from ..file.format import Header
 from .place import RecordingPlace, cause_of, split_name, take_place
 from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
-from .writer import RecordingWriter, warm_up
+from .writer import RecordingWriter
 
 if TYPE_CHECKING:
     from .live_feed import LiveFeed
@@ -312,7 +313,7 @@ def main(tasks: str) -> None:
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    warm_up()
+    import_module("rerun")  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)
     if not task:

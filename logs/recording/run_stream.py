@@ -126,12 +126,8 @@ class RunStream:
         if self._scene is not None:
             self._scene.write(batch)
 
-    def write_note(self, note: Note) -> None:
-        """Write a note twice: as data, and as text for the viewer."""
-        self.write_notes([note])
-
     def write_notes(self, notes: Sequence[Note]) -> None:
-        """Write notes, in order, at once."""
+        """Write notes, in order, as data and as text for the viewer."""
         import rerun as rr
 
         if not notes:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Note, parameter_note
-from ..file.format import BUS, KEYFRAMES, NOTE, PACKED, ROWS, STATE, Header, spans, time_columns
+from ..file.format import BUS, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
 from ..file.index import Index
 from ..file.messages import (
@@ -184,12 +184,9 @@ class RecordingWriter:
         self._stream.send_columns(KEYFRAMES, times, columns)
         self._put(Content.KEYFRAME, snapshot.tick, snapshot.tick)
 
-    def write_note(self, note: Note) -> None:
-        """Write a note twice: as data, and as text for the viewer."""
-        self.write_notes([note])
-
     def write_notes(self, notes: Sequence[Note]) -> None:
-        """Write notes, in order, at once: a run that is late in each tick has many."""
+        """Write notes, in order, as data and as text for the viewer; at once, as a run that is late in
+        each tick has many."""
         if notes:
             self._run.write_notes(notes)
             self._put(Content.NOTES, notes[0].tick, notes[-1].tick)
@@ -280,27 +277,6 @@ def _bytes(data: bytes) -> Any:
     import pyarrow as pa
 
     return pa.Array.from_buffers(pa.uint8(), len(data), [None, pa.py_buffer(data)])
-
-
-def warm_up() -> None:
-    """Have Rerun import what it imports when it is first used, which takes a third of a second."""
-    import rerun as rr
-
-    stream = rr.RecordingStream("warm-up", send_properties=False)
-    times = [rr.TimeColumn("tick", sequence=np.arange(2))]
-    points, turns = np.zeros((2, 3)), np.zeros((2, 3, 3))
-    for columns in (
-        rr.Scalars.columns(scalars=points),
-        rr.Transform3D.columns(translation=points, mat3x3=turns),
-        rr.Arrows3D.columns(origins=points, vectors=points),
-        rr.Points3D.columns(positions=points),
-        rr.LineStrips3D.columns(strips=[points, points]),
-        rr.StateChange.columns(state=["a", "b"]),
-        rr.TextLog.columns(text=["a", "b"], level=["INFO", "INFO"]),
-        rr.DynamicArchetype.columns("aloft", components={NOTE: ["a", "b"]}),
-    ):
-        stream.send_columns("warm-up", times, columns)
-    stream.disconnect()
 
 
 @dataclass(frozen=True)

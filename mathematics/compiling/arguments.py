@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .machine_code import ENTRY
-from .written_code import written_code
+from .machine_code import ENTRY, machine_code_of
 
 HEADER = 2
 """The number of words before the arguments."""
@@ -121,7 +120,7 @@ def error_record() -> NDArray[np.int64]:
 @cache
 def _error_words() -> tuple[int, int]:
     """The address of the function that reports an error, and that of its record."""
-    return written_code(_report_module()).address, int(error_record().ctypes.data)
+    return machine_code_of(_report_module()).address, int(error_record().ctypes.data)
 
 
 def _report_module() -> Any:

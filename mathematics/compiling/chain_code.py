@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import error_record
-from .machine_code import ENTRY
-from .written_code import written_code
+from .machine_code import ENTRY, machine_code_of
 
 ERROR_FLAG, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
 """The words at the beginning of a table: the address of the word in which kernels report an error;
@@ -46,7 +45,7 @@ def chain_function() -> Callable[[ctypes.c_size_t], int]:
     entries made so far, and goes on behind it when it is called again. A Python error that a call
     has set is raised; then ``NEXT`` is the entry that failed.
     """
-    code = written_code(_module())
+    code = machine_code_of(_module())
     function: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_size_t)(code.address)
     return function  # type: ignore[no-any-return]  # llvmlite is not typed
 

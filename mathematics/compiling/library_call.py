@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .machine_code import ENTRY
-from .written_code import written_code
+from .machine_code import ENTRY, machine_code_of
 
 MOST = 3
 """The largest number of arguments."""
@@ -91,4 +90,4 @@ def _caller(count: int) -> int:
     kind = ir.FunctionType(ir.VoidType(), [word] * count).as_pointer()
     builder.call(builder.inttoptr(values[0], kind), values[1:])
     builder.ret_void()
-    return written_code(module).address
+    return machine_code_of(module).address

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import os
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
 from itertools import count
 from typing import Any
+
+from . import store
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
@@ -122,3 +125,22 @@ def _linker() -> Any:
 
 
 _numbers = count()
+
+
+def machine_code_of(module: Any) -> MachineCode:
+    """The function ``ENTRY`` of a module in LLVM's language, from the cache or made now; it stays in memory.
+
+    Such modules do what kernels cannot: call functions by their addresses.
+    """
+    text = str(module)
+    name = hashlib.blake2b(f"{tools()}|{text}".encode(), digest_size=16).hexdigest()
+    kept = store.load(name)
+    if kept is None:
+        kept = assemble(text)
+        store.save(name, kept)
+    code = MachineCode(kept)
+    _alive.append(code)
+    return code
+
+
+_alive: list[MachineCode] = []

@@ -34,7 +34,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
         writer.write_rows(np.arange(first, first + BATCH), rows[first : first + BATCH])
         writer.draw()
     writer.write_keyframe(Snapshot(20, rows[20].tobytes(), bytes(header.state.size)))
-    writer.write_note(Note(0, "life", "running"))
+    writer.write_notes([Note(0, "life", "running")])
     writer.write_outcome({"success": True, "ticks": TICKS})
     writer.close()
     return path

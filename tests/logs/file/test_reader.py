@@ -68,7 +68,7 @@ def test_everything_comes_back_as_it_was(bound: BoundGraph, tmp_path: Path) -> N
     keyframe = Snapshot(5, rows[2].tobytes(), bytes(range(64)) * (header.state.size // 64))
     writer.write_rows(ticks[:2], rows[:2])
     for note in notes:
-        writer.write_note(note)
+        writer.write_notes([note])
     writer.write_keyframe(keyframe)
     writer.write_rows(ticks[2:], rows[2:])
     half = read(tmp_path / "a.part.rrd")  # while it is being written

@@ -79,7 +79,7 @@ def record(folder: Path, **settings: Any) -> RunResult:
     for snapshot in keyframes.snapshots.values():
         writer.write_keyframe(snapshot)
     for change in result.parameter_changes:
-        writer.write_note(parameter_note(change))
+        writer.write_notes([parameter_note(change)])
     writer.write_outcome(result.to_json())
     writer.close()
     return result

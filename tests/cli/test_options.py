@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 from typer.testing import CliRunner
 
-from aloft.cli.shared.option_groups import expand_option_groups
+from aloft.cli.shared.options import expand_option_groups
 
 FOUND: list[object] = []
 """What the verb was called with."""
