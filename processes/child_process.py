@@ -17,30 +17,27 @@ standard input instead.
 
 from __future__ import annotations
 
-import fcntl
-import gc
 import json
 import os
 import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from select import select
 from time import monotonic
 from typing import IO, Self
 
+from .child import READY, main
+
 KILL_TIME = 5.0
 """Seconds that a killed process has to disappear; one that the kernel holds is left to it."""
 _PROGRAM = (
     "import gc, json, sys; gc.disable(); sys.path[:] = json.loads(sys.argv.pop(1)); "
-    f"from {__name__} import main; main()"
+    f"from {main.__module__} import main; main()"
 )
-_link = -1
 
 
 class ChildError(RuntimeError):
@@ -198,52 +195,3 @@ class ChildProcess:
             part = b""
         self._said += part
         return bool(part)
-
-
-READY = b"ready\n"
-"""What a child writes into the socket when it is ready."""
-
-
-def report_ready() -> None:
-    """In the child: tell the parent that it is ready."""
-    with suppress(OSError):
-        os.write(_link, READY)
-
-
-def end_with(descriptor: int, number: int) -> None:
-    """Let a signal end this process when the other end of a pipe or socket is closed, from which
-    nothing else ever comes."""
-    if hasattr(fcntl, "F_SETSIG"):
-        fcntl.fcntl(descriptor, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(descriptor, fcntl.F_SETSIG, number)
-        flags = fcntl.fcntl(descriptor, fcntl.F_GETFL)
-        fcntl.fcntl(descriptor, fcntl.F_SETFL, flags | os.O_ASYNC)
-        if select([descriptor], [], [], 0)[0]:  # it was closed before
-            os.kill(os.getpid(), number)
-    else:  # a system whose kernel sends no signal of choice
-
-        def wait() -> None:
-            select([descriptor], [], [])
-            os.kill(os.getpid(), number)
-
-        threading.Thread(target=wait, daemon=True).start()
-
-
-def main() -> None:
-    """In the child: call the function, and tell the parent which exception ends it."""
-    global _link
-    _link, number, target = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
-    os.set_inheritable(_link, False)
-    if number:
-        end_with(_link, number)
-    module, function = target.split(":")
-    try:
-        work = getattr(import_module(module), function)
-        gc.freeze()  # what was imported stays, and is not looked through
-        gc.enable()
-        work(*sys.argv[4:])
-    except Exception as error:
-        message = {"type": type(error).__name__, "text": str(error)}
-        with suppress(OSError):
-            os.write(_link, b"\n" + json.dumps(message).encode() + b"\n")
-        raise

@@ -65,6 +65,7 @@ echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python
 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
     --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_check_graph.py \
+    tests/runtime/loading/test_graph_file.py tests/runtime/loading/test_schema.py tests/files \
     tests/blocks/general/test_pid.py tests/blocks/general/test_linear_systems.py \
     tests/blocks/control tests/blocks/jumping tests/test_kernels_compile.py tests/mathematics/compiling \
     tests/studies/batch/test_jobs.py tests/planner/solving \

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...processes.child_process import report_ready
+from ...processes.child import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note

@@ -46,7 +46,7 @@ from threading import Thread
 from time import monotonic
 from typing import Any
 
-from ...processes.child_process import end_with
+from ...processes.child import end_with
 from ...runtime.language.errors import AloftError
 
 

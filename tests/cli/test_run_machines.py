@@ -274,7 +274,7 @@ def test_parts_stop_when_the_command_is_killed(started: subprocess.Popen[str], h
 
 PARTS = """
 import signal, time
-from aloft.processes.child_process import report_ready
+from aloft.processes.child import report_ready
 
 def print_much():
     print("x" * 1_000_000)

@@ -19,7 +19,7 @@ SECONDS = 30.0
 """No wait of a test lasts longer."""
 PROGRAMS = """
 import builtins, os, signal, sys, time
-from aloft.processes.child_process import report_ready
+from aloft.processes.child import report_ready
 
 def fail(kind, text):
     raise getattr(builtins, kind)(text)

@@ -18,7 +18,7 @@ from ...language.parameters import Parameters
 from ...language.registry import find_block
 from ...language.requirements import unmet_requirements
 from ..flattening.flat import FlatBlock, FlatGraph
-from .parameters import check_parameters
+from .parameters import check_parameters, plain_parameters
 from .settings import Settings
 
 KEY = "from"
@@ -206,5 +206,5 @@ class _ReferenceResolver:
 
 def _own_values(params: Parameters) -> dict[str, tuple[Any, str]]:
     """The parameters of a block as plain data, with their units."""
-    data = params.model_dump(mode="json", round_trip=True)
+    data = plain_parameters(params)
     return {k: (data[k], unit_of(info)) for k, info in type(params).model_fields.items()}

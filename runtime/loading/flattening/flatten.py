@@ -14,7 +14,6 @@ from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
 from ..reading.overrides import (
     Override,
     Overrides,
-    as_entry,
     is_graph_key,
     merge,
     read_overrides,
@@ -97,7 +96,8 @@ class _Flattener:
     def run(self, path: Path, tree: MapNode | None, overrides: Overrides) -> FlatGraph:
         shown = str(path)
         commands = read_overrides(overrides, self.problems)
-        graph: dict[str, tuple[Entry, Path]] = {}
+        graph = MapNode((), Position(shown, 0, 0))
+        robot_folder = path.parent
         empty = False
         if tree is not None and is_another_kind(tree, shown, self.problems):
             tree = None
@@ -109,15 +109,24 @@ class _Flattener:
             empty = not any(_has_blocks(file) for file in files)
             names = [block.name for file in files for block in file.blocks]
             own = tuple(o for o in commands if not is_graph_key(o, names))
-            for file in files:
-                for entry in file.graph:
-                    merge(graph, entry, file.folder)
-            for command in commands:
-                if is_graph_key(command, names):
-                    merge(graph, as_entry(command), path.parent)
+            given: list[tuple[tuple[str, ...], Node, Position, Path]] = [
+                ((entry.key,), entry.value, entry.key_where, file.folder)
+                for file in files
+                for entry in file.graph
+            ]
+            given += [
+                (tuple(command.key.split(".")), command.value, command.where, path.parent)
+                for command in commands
+                if is_graph_key(command, names)
+            ]
+            for keys, value, where, folder in given:
+                graph = merge(graph, keys, value, where)
+                if keys == ("robot",):
+                    robot_folder = folder
             self._expand(files, replace(scope, sets=own))
         resolver = Resolver(self.instances, self.problems)
-        base_rate = graph["rate"][0].value if "rate" in graph else None
+        rate = graph.get("rate")
+        base_rate = rate.value if rate is not None else None
         blocks = tuple(
             wrap_offset(_finish(draft, resolver), base_rate)
             if draft.shifted
@@ -125,24 +134,21 @@ class _Flattener:
             for draft in self.drafts.values()
         )
 
-        def written(key: str) -> Entry | None:
-            return graph[key][0] if key in graph else None
-
-        blocks = placed(blocks, self._mapping(written("place")), self.instances, self.problems)
+        blocks = placed(blocks, self._mapping(graph, "place"), self.instances, self.problems)
         return FlatGraph(
             name=path.stem,
             file=shown,
             folder=path.parent,
             blocks=blocks,
-            rate=written("rate"),
-            duration=written("duration"),
-            robot=written("robot"),
-            actuators=written("actuators"),
-            robot_folder=graph["robot"][1] if "robot" in graph else path.parent,
-            dimensions=self._mapping(written("dimensions")),
-            clock=self._mapping(written("clock")),
-            machines=self._mapping(written("machines")),
-            links=self._mapping(written("links")),
+            rate=rate,
+            duration=graph.get("duration"),
+            robot=graph.get("robot"),
+            actuators=graph.get("actuators"),
+            robot_folder=robot_folder,
+            dimensions=self._mapping(graph, "dimensions"),
+            clock=self._mapping(graph, "clock"),
+            machines=self._mapping(graph, "machines"),
+            links=self._mapping(graph, "links"),
             overrides={command.key: plain(command.value) for command in commands},
             empty=empty and not self.files.incomplete,
             incomplete=self.files.incomplete,
@@ -151,10 +157,11 @@ class _Flattener:
             subgraph_inputs=Resolver(self.instances, Problems()).inputs(),
         )
 
-    def _mapping(self, entry: Entry | None) -> MapNode | None:
+    def _mapping(self, graph: MapNode, key: str) -> MapNode | None:
+        entry = graph.get(key)
         if entry is None or isinstance(entry.value, MapNode):
             return entry.value if entry else None  # type: ignore[return-value]  # a MapNode
-        wrong_kind(entry.value, repr(entry.key), "a mapping", self.problems)
+        wrong_kind(entry.value, repr(key), "a mapping", self.problems)
         return None
 
     def _expand(self, files: list[WrittenGraph], scope: _Scope) -> None:

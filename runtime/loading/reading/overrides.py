@@ -5,9 +5,8 @@ An override may also set a key of the graph itself, such as ``rate`` or ``clock.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from ....files.document import read_value
@@ -70,9 +69,19 @@ def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, 
                 pairs.append((key.strip(), node, where))
     found = []
     for key, node, where in pairs:
-        override = _split(key, node, where, problems)
+        override = _parameter_override(key, node, where)
         if override is not None:
             found.append(override)
+        elif key in GRAPH_KEYS:
+            found.append(Override(key, "", (key,), node, where))
+        else:
+            problems.add(
+                Code.OVERRIDE,
+                f"{key!r} does not name a block's parameter",
+                where,
+                expected="block.parameter=value, or rate, duration, robot",
+                found=key,
+            )
     return tuple(found)
 
 
@@ -80,10 +89,9 @@ def read_sets(entries: Iterable[Entry], prefix: str, problems: Problems) -> tupl
     """The entries of a file's ``set``; block paths get ``prefix`` in front."""
     found = []
     for entry in entries:
-        block, dot, rest = entry.key.partition(".")
-        if dot and block and all(rest.split(".")):
-            path = tuple(rest.split("."))
-            found.append(Override(entry.key, prefix + block, path, entry.value, entry.key_where))
+        override = _parameter_override(entry.key, entry.value, entry.key_where)
+        if override is not None:
+            found.append(replace(override, block=prefix + override.block))
             continue
         problems.add(
             Code.OVERRIDE,
@@ -96,19 +104,11 @@ def read_sets(entries: Iterable[Entry], prefix: str, problems: Problems) -> tupl
     return tuple(found)
 
 
-def _split(key: str, node: Node, where: Position, problems: Problems) -> Override | None:
-    block, dot, rest = key.partition(".")
-    if not dot and block in GRAPH_KEYS:
-        return Override(key, "", (block,), node, where)
-    if dot and block and all(rest.split(".")):
-        return Override(key, block, tuple(rest.split(".")), node, where)
-    problems.add(
-        Code.OVERRIDE,
-        f"{key!r} does not name a block's parameter",
-        where,
-        expected="block.parameter=value, or rate, duration, robot",
-        found=key,
-    )
+def _parameter_override(key: str, value: Node, where: Position) -> Override | None:
+    """The override that ``block.parameter`` names; ``None`` if the key has another form."""
+    block, *path = key.split(".")
+    if block and path and all(path):
+        return Override(key, block, tuple(path), value, where)
     return None
 
 
@@ -144,22 +144,15 @@ def is_graph_key(override: Override, names: Iterable[str]) -> bool:
     return override.block in SECTION_KEYS and override.block not in names
 
 
-def as_entry(override: Override) -> Entry:
-    """An override of the graph itself as an entry of its file."""
-    path = (override.block, *override.path) if override.block else override.path
-    if len(path) == 1:
-        return Entry(path[0], override.where, override.value)
-    value = MapNode((), override.where).assign(path[1:], override.value, override.where)
-    return Entry(path[0], override.where, value)
+def merge(graph: MapNode, path: Sequence[str], value: Node, where: Position) -> MapNode:
+    """The graph's keys with the value at ``path`` set; later mappings add to earlier ones.
 
-
-def merge(graph: dict[str, tuple[Entry, Path]], entry: Entry, folder: Path) -> None:
-    """Let a later entry win; mappings are merged key by key."""
-    old = graph.get(entry.key)
-    if old is not None and isinstance(entry.value, MapNode):
-        merged = old[0].value
-        if isinstance(merged, MapNode):
-            for item in entry.value:
-                merged = merged.assign((item.key,), item.value, item.key_where)
-            entry = replace(entry, value=merged)
-    graph[entry.key] = (entry, folder)
+    Included files and overrides of the graph both come here.
+    """
+    old = graph.get(path[0])
+    adds = len(path) == 1 and old is not None and isinstance(old.value, MapNode)
+    if not adds or not isinstance(value, MapNode):
+        return graph.assign(path, value, where)
+    for item in value:
+        graph = graph.assign((*path, item.key), item.value, item.key_where)
+    return graph

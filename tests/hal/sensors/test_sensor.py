@@ -165,3 +165,10 @@ def test_the_file_of_the_hardware_names_what_its_board_carries(tmp_path: Path) -
     file.write_text(text.replace("board:\n", "board:\n  sensors: [foot]\n"))
     with pytest.raises(HardwareError, match="bruce mounts no sensor 'foot': foot_imu"):
         Hardware.read(file, robot)
+
+
+def test_a_sensor_that_names_no_fields_for_its_packet_sends_all() -> None:
+    sole = {"kind": "force_torque", "link": "left_foot", "position": [0.0, 0.0, -0.02]}
+    (sensor,) = mounted_sensors(bruce_with(sole=sole))
+    data = sensor.to_packet(sensor.signal.allocate())
+    assert len(data) == sensor.packet_size() == 24

@@ -80,6 +80,7 @@ def fractions(x: float, y: float, out: Array) -> None:
     out[5] = math.floor(x) + math.ceil(y)
     out[6] = int(x)
     out[7] = math.copysign(1.0, x) * abs(y)
+    out[8] = max(x, 2) - min(-3, y)
 
 
 @given(st.integers(-60, 60), st.integers(-20, 20).filter(bool))

@@ -92,3 +92,35 @@ def test_what_has_no_fault_can_be_read() -> None:
 def test_what_is_no_mapping_describes_no_robot(data: object, found: str) -> None:
     (fault,) = find_faults(data)
     assert fault.message == "this describes no robot" and fault.found == found
+
+
+def with_mesh(link: str = "body", **values: list[float]) -> dict[str, Any]:
+    """The hopper, one link of which is drawn as a mesh."""
+    return hopper() | {"looks": {link: {"meshes": [{"file": "body.stl", **values}]}}}
+
+
+@pytest.mark.parametrize("place", range(4))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_mesh_may_be_turned_by_any_quaternion_but_zero(place: int, sign: float) -> None:
+    orientation = [0.0] * 4
+    (fault,) = find_faults(with_mesh(orientation=orientation))
+    assert fault.path == ("looks", "body", "meshes", 0, "orientation")
+    assert fault.fix == "orientation: [0, 0, 0, 1]"
+    orientation[place] = sign
+    assert find_faults(with_mesh(orientation=orientation)) == ()
+
+
+@pytest.mark.parametrize(("key", "size"), [("position", 3), ("orientation", 4), ("scale", 3)])
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_the_numbers_of_a_mesh_are_finite(key: str, size: int, value: float) -> None:
+    for place in range(size):
+        numbers = [1.0] * size
+        numbers[place] = value
+        (fault,) = find_faults(with_mesh(**{key: numbers}))
+        assert fault.path == ("looks", "body", "meshes", 0)
+
+
+def test_the_link_of_a_look_is_one_of_the_links() -> None:
+    (fault,) = find_faults(with_mesh("bodi"))
+    assert fault.path == ("looks", "bodi")
+    assert find_faults(with_mesh()) == ()

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.files.nodes import plain
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import LoadError, flatten, load, load_text
 
@@ -159,6 +160,18 @@ def test_overrides_of_the_graph_itself(tmp_path: Path) -> None:
     graph = load(path, ["rate=1 kHz", "duration=2", "clock.kind=paced", "dimensions.m=4"])
     assert (graph.base_rate, graph.ticks, graph.clock.kind) == (1000.0, 2000, "paced")
     assert graph.block("last").dimensions["m"] == 4
+
+
+def test_an_override_deep_inside_the_graph_keeps_the_rest(tmp_path: Path) -> None:
+    base = "links: {mode: free, of: {one: {max_age: 2}, two: {watch: true}}}\n"
+    graph = "include: base.yaml\nrate: 100 Hz\nlinks: {watchdog: 3}\nblocks: {}\n"
+    flat = flatten(write(tmp_path, base=base, graph=graph), ["links.of.one.late=zero"])
+    assert flat.links is not None
+    assert plain(flat.links) == {
+        "mode": "free",
+        "of": {"one": {"max_age": 2, "late": "zero"}, "two": {"watch": True}},
+        "watchdog": 3,
+    }
 
 
 def test_an_override_inside_a_nested_parameter(tmp_path: Path) -> None:
