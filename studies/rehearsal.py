@@ -45,8 +45,11 @@ def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
         raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
     defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
     found = {
-        key: defaults[key.partition(".")[2]] for file in files.values() for key in settings_of(file)
+        f"{block}.{name}": defaults[name]
+        for file in files.values()
+        for block, name in (key.split(".")[:2] for key in settings_of(file))
     }
+    # a group of parameters goes back as a whole, before what is set within it
     return found | settings_of(files[trial])
 
 

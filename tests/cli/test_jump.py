@@ -87,7 +87,7 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
     standard = load_jump(go2, settings_for({}, "standard"), 0).checked.block("robot").params
     assert standard.model_dump()["mass_spread"] == 0.0
     assert standard.model_dump()["gyro_noise"] == 0.02
-    with pytest.raises(AloftError, match="--trial windy: there is nominal, robust, standard"):
+    with pytest.raises(AloftError, match="--trial windy: there is nominal, real, robust, standard"):
         trial_settings("windy")
 
 
@@ -125,3 +125,13 @@ def test_one_line_plans_runs_and_records(folder: Path, call_json: CallJson) -> N
     assert found["plan"]["valid"] is True
     assert found["metrics"]["jump_distance_x_m"] == pytest.approx(0.2, abs=0.02)
     assert (folder / "recordings" / "jump.rrd").stat().st_size > 100_000
+
+
+def test_a_trial_takes_back_what_only_others_set() -> None:
+    """Groups of parameters as a whole, and before what the trial sets within them."""
+    robust, real = trial_settings("robust"), trial_settings("real")
+    assert robust["robot.imu"] == {**robust["robot.imu"], "bandwidth": None, "gyro_delay": 0.0}
+    assert robust["robot.battery"] is None
+    names = list(real)
+    assert real["robot.imu.bandwidth"] == "100 Hz"
+    assert names.index("robot.imu") < names.index("robot.imu.bandwidth")
