@@ -22,7 +22,7 @@ class SensorAlignmentParameters(Parameters):
     velocity: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of joint velocities")
 
 
-class SensorMemory(Signal):
+class AlignmentMemory(Signal):
     """The last samples, each at its tick's place in a ring."""
 
     rate = Field((SAMPLES, 3), unit="rad/s", text="of the gyroscope")
@@ -51,7 +51,7 @@ class SensorAlignment(Block):
     measured_joints = Input(JointState, text="readings of the joints")
     imu = Output(ImuReading, text="at the common time")
     joints = Output(JointState, text="at the common time; torques as measured")
-    memory = State(SensorMemory, text="the last samples")
+    memory = State(AlignmentMemory, text="the last samples")
 
     @kernel
     @staticmethod
@@ -60,7 +60,7 @@ class SensorAlignment(Block):
         measured_joints: JointState,
         imu: ImuReading,
         joints: JointState,
-        memory: SensorMemory,
+        memory: AlignmentMemory,
         params: SensorAlignmentParameters,
         period: float,
     ) -> None:

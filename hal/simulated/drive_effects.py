@@ -153,7 +153,7 @@ class MotorModel(NamedTuple):
     friction: float
 
 
-class MotorScratch(NamedTuple):
+class TorqueScratch(NamedTuple):
     """Of the motors in a physics step: angle, speed, and the torque that is gained; of the joints the torque."""
 
     angle: Array1D
@@ -165,7 +165,7 @@ class MotorScratch(NamedTuple):
 @kernel
 def produce_torque(
     position: Array1D, velocity: Array1D, requested: Array1D, model: MotorModel,
-    scratch: MotorScratch, memory: PhysicsState, torque: Array1D,
+    scratch: TorqueScratch, memory: PhysicsState, torque: Array1D,
 ) -> None:  # fmt: skip
     """Change the joint ``torque`` [N m] from what the motors are asked for to what they give.
 
@@ -261,7 +261,7 @@ class DriveEffects:
         self, position: Array, velocity: Array, requested: Array, torque: Array
     ) -> KernelCall:
         """Makes of what is asked of the motors what they give; arguments as for ``produce_torque``."""
-        scratch = MotorScratch(*(np.zeros(self._count) for _ in MotorScratch._fields))
+        scratch = TorqueScratch(*(np.zeros(self._count) for _ in TorqueScratch._fields))
         return signal_call(
             produce_torque, position, velocity, requested, self._motors, scratch, self._memory,
             torque,

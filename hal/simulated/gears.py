@@ -102,7 +102,7 @@ def sense_rotors(
     multiply_vector(train.motion_to_joint, memory.rotor_speed, velocity)
 
 
-class Gears:
+class YieldingGears:
     """The gears of a simulated robot.
 
     Args:

@@ -93,16 +93,17 @@ class ImuEffects(Parameters):
 
 
 class ImuPlace(NamedTuple):
-    """Where the unit is: ``position`` [m, base frame], and the ``rotation`` vector to its axes [rad]."""
+    """Where the unit is: its ``place`` [m, base frame], and the rotation vector ``to_axes`` [rad] from the
+    base's axes to its own."""
 
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    to_axes: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def quaternion(self) -> Array:
         """From the unit's axes to the base's: x, y, z, w."""
         out = np.empty(4)
-        exponential(np.array(self.rotation), out)
+        exponential(np.array(self.to_axes), out)
         return out
 
 

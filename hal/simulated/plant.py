@@ -41,7 +41,7 @@ from .base import BASES
 from .battery import Battery, spread_voltage
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
-from .gears import Gears
+from .gears import YieldingGears
 from .imu_effects import ImuModel
 from .mujoco_model import body_name, build_world
 from .sensors import SimulatedSensors
@@ -275,7 +275,7 @@ class Plant:
         self.gears = None
         if params.gears is not None:
             rotors = self.variation.rotors(robot)
-            self.gears = Gears(params.gears, robot, rotors, params.timestep, physics)
+            self.gears = YieldingGears(params.gears, robot, rotors, params.timestep, physics)
         whole = self.model
         if params.gears is not None:
             whole = build_world(params, robot, replace(self.variation, rotor_share=1.0))

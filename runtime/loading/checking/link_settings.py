@@ -10,7 +10,7 @@ from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings
 from ...placement.age import worst_age
 from ...placement.placed import PlacementError, command_sources, silence_limit
 from ..flattening.flat import FlatGraph
-from ..reading.graph_file import Links, Policy, keys_of, read_section
+from ..reading.graph_file import LinkKeys, Links, keys_of, read_section
 
 
 def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> LinkSettings:
@@ -23,7 +23,7 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
     if graph.links is None:
         return LinkSettings()
     given = read_section(graph.links, "links", Links, problems)
-    common = {key: given[key] for key in keys_of(Policy) if key in given}
+    common = {key: given[key] for key in keys_of(LinkKeys) if key in given}
     policy, mode = LinkPolicy(**common), given.get("mode", "lockstep")
     paths = [block.path for block in graph.blocks]
     of = {path: LinkPolicy(**{**common, **own}) for path, own in given.get("of", {}).items()}

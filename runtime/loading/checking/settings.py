@@ -13,7 +13,7 @@ from ....robots.description import RobotDescription, RobotError, find_robot, rob
 from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
 from ..flattening.flat import ROBOT_FILES, FlatGraph
-from ..reading.graph_file import Clock, read_section
+from ..reading.graph_file import ClockKeys, read_section
 from ..reading.written import read_quantity
 
 
@@ -99,7 +99,7 @@ def _read_dimensions(
 def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
     if graph.clock is None:
         return ClockSpec()
-    return ClockSpec(**read_section(graph.clock, "clock", Clock, problems))
+    return ClockSpec(**read_section(graph.clock, "clock", ClockKeys, problems))
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:

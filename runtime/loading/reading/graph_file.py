@@ -146,7 +146,7 @@ class BlockEntry(_Keys):
     machine: str = _key("the machine that the block runs on", "on")
 
 
-class Clock(_Keys):
+class ClockKeys(_Keys):
     """How a run is paced."""
 
     kind: ClockKind = _key("as fast as possible, by wall time, or by the robot")
@@ -157,7 +157,7 @@ class Clock(_Keys):
     hangs_after: Seconds = _key("the time after which a call of a block is taken to hang")
 
 
-class Policy(_Keys):
+class LinkKeys(_Keys):
     """How late messages are treated."""
 
     max_age: Seconds = _key("the age at which 'late' takes effect")
@@ -165,11 +165,11 @@ class Policy(_Keys):
     watch: Annotated[bool, Field(strict=True)] = _key("whether its silence counts for 'watchdog'")
 
 
-class Links(Policy):
+class Links(LinkKeys):
     """How the machines keep together."""
 
     mode: LinkMode = _key("wait for each other, or run free")
-    of: dict[str, Policy] = _key("the links of single blocks, by block")
+    of: dict[str, LinkKeys] = _key("the links of single blocks, by block")
     paths: dict[str, Seconds] = _key("the largest age by path: robot.imu -> robot.command: 4 ms")
     watchdog: Seconds = _key("how long a link that brings commands may be silent: 15 ms")
 
@@ -187,7 +187,7 @@ class GraphSections(_Keys):
     """The keys of the graph that is run which are mappings; files and overrides add to them."""
 
     dimensions: dict[str, Annotated[int, Field(ge=1)]] = _key("sizes by name")
-    clock: Clock = _key("how the run is paced")
+    clock: ClockKeys = _key("how the run is paced")
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")

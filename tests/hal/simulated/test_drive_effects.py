@@ -12,7 +12,7 @@ import pytest
 from aloft.hal.simulated.battery import Battery, BatteryParameters
 from aloft.hal.simulated.drive_effects import DriveEffects, EncoderEffects, MotorEffects
 from aloft.hal.simulated.drives import MotorLimits
-from aloft.hal.simulated.gears import GearParameters, Gears, longest_step
+from aloft.hal.simulated.gears import GearParameters, YieldingGears, longest_step
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.robots.description import find_robot
 
@@ -139,10 +139,10 @@ def test_load_friction_opposes_the_motion_and_takes_its_share(velocity: float) -
     np.testing.assert_allclose(give(4.0)[moving], (4.0 - 0.2 * turning)[moving], rtol=1e-6)
 
 
-def gears(inertia: float, step: float, **params: Any) -> tuple[Gears, PhysicsState]:
+def gears(inertia: float, step: float, **params: Any) -> tuple[YieldingGears, PhysicsState]:
     chosen = GearParameters.model_validate(params)
     memory = PhysicsState.allocate({**SIZES, "n_rotors": N})
-    return Gears(chosen, ROBOT, np.full(N, inertia), step, memory), memory
+    return YieldingGears(chosen, ROBOT, np.full(N, inertia), step, memory), memory
 
 
 def test_two_bodies_swing_with_the_period_of_the_closed_form() -> None:

@@ -9,13 +9,13 @@ from aloft.files.problems import Code, Problems
 from aloft.runtime.loading.reading.graph_file import (
     BLOCK_KEYS,
     WIRE_KEYS,
-    Clock,
+    ClockKeys,
     Links,
     read_section,
 )
 
 
-def read(text: str, model: type[Clock] | type[Links]) -> tuple[dict[str, Any], Problems]:
+def read(text: str, model: type[ClockKeys] | type[Links]) -> tuple[dict[str, Any], Problems]:
     problems = Problems()
     node = read_mapping(text, "graph.yaml", problems)
     assert node is not None
@@ -29,7 +29,7 @@ def test_keys_are_those_that_are_written() -> None:
 
 def test_all_mistakes_of_a_section_are_reported_and_the_rest_is_kept() -> None:
     text = "kind: paced\noverun: stop\nstop_after: true\nhangs_after: 3 Hz\n"
-    given, problems = read(text, Clock)
+    given, problems = read(text, ClockKeys)
     found = problems.report("graph.yaml").problems
     assert given == {"kind": "paced"}
     assert [(p.code, p.where.line) for p in found] == [
