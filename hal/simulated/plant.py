@@ -395,6 +395,7 @@ class Plant:
     def _begin_sensing(self) -> None:
         """Let encoders and IMU begin anew."""
         self.physics.encoder_taken[0] = self.physics.imu_taken[0] = 0
+        self.physics.encoder_play.fill(0.0)
         if self.battery is not None:
             self.battery.begin()
         if self.gears is not None:

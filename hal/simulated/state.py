@@ -33,6 +33,7 @@ class PhysicsState(Signal):
     imu_reading = Field("n_imu_axes", text="what it reads: rate and force")
     encoder_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint angles")
     speed_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint velocities")
+    encoder_play = Field("n_sensed_joints", unit="rad", text="where rotors are within their play")
     encoder_taken = Field(1, dtype="int64", text="how many samples the encoders have taken")
     encoder_position = Field("n_sensed_joints", unit="rad", text="what the encoders read")
     encoder_velocity = Field("n_sensed_joints", unit="rad/s", text="what they make of it")
