@@ -123,12 +123,13 @@ def run_jump(changes=None, duration=None):
     assert result.error is None, result.error
 
 
-def run_alone(name, robot):
-    """Some ticks of a block on a bench, with its example parameters and inputs."""
+def run_alone(name, robot, **parameters):
+    """Some ticks of a block on a bench, with its example parameters, these others, and inputs."""
     block = find_block(name)
     if unmet_messages(block, robot=robot):
         return
-    bench = BlockBench(block, block.example_parameters(), robot=robot, plain=True)
+    chosen = {**block.example_parameters(), **parameters}
+    bench = BlockBench(block, chosen, robot=robot, plain=True)
     random = np.random.default_rng(0)
     for _ in range(4):
         inputs = random_inputs(type(bench.block), bench.block.context.dimensions, random)
@@ -197,6 +198,8 @@ def calls():
         run_jump(weak, duration=0.1)
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
+        gears = {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}
+        run_alone("hal.MujocoRobot", find_robot("bruce"), gears=gears)
         for name in known_names():  # blocks that none of these graphs has
             own = [name_of[id(f)] for f in find_block(name).named_steps.values() if is_kernel(f)]
             if not all(samples[each] for each in own):

@@ -15,38 +15,10 @@ import numpy as np
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.steps import signal_call
+from .body_effects import BatteryParameters
 from .drives import DriveTrain, MotorLimits, MotorScratch
 from .state import PhysicsState
-
-
-class BatteryParameters(Parameters):
-    """A pack; the defaults are estimates for four lithium-polymer cells of 2.2 A h."""
-
-    open_voltage: float = parameter(16.0, unit="V", gt=0.0, text="without load, at the start")
-    resistance: float = parameter(0.03, unit="ohm", ge=0.0, text="what a load sees at once")
-    recovery_resistance: float = parameter(
-        0.01, unit="ohm", ge=0.0, text="what builds up under load and recovers after it"
-    )
-    recovery_time: float = parameter(
-        10.0, unit="s", gt=0.0, text="time constant of building up and recovering"
-    )
-    capacity: float = parameter(7920.0, unit="A s", gt=0.0, text="charge of the full pack")
-    fall: float = parameter(
-        2.4, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
-    )
-    board_power: float = parameter(15.0, unit="W", ge=0.0, text="what computer and boards draw")
-    rated_voltage: float = parameter(
-        14.8, unit="V", gt=0.0,
-        text="voltage at which the motors reach the speeds of the robot's description",
-    )  # fmt: skip
-    winding_resistance: float = parameter(
-        0.2, unit="ohm", ge=0.0, text="of a motor, as its torque current sees it"
-    )
-    torque_constant: float = parameter(
-        0.35, unit="N m/A", gt=0.0, text="torque at the output for each ampere"
-    )
 
 
 class Pack(NamedTuple):

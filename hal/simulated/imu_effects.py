@@ -208,7 +208,7 @@ class ImuModel:
         self._chain = ImuChain(
             draw_place(effects, seed).quaternion, 1.0 + scale,
             effects.acceleration_sensitivity * sensitivity, filters,
-            np.repeat([_steps(delay, timestep) for delay in self.delays], 3),
+            np.repeat([round(delay / timestep) for delay in self.delays], 3),
         )  # fmt: skip
 
     @staticmethod
@@ -217,7 +217,7 @@ class ImuModel:
         longest = max(effects.gyro_delay, effects.accelerometer_delay) + effects.delay_spread
         return {
             "n_imu_filters": _AXES * effects.filters,
-            "n_imu_slots": 0 if effects.ideal else _steps(longest, timestep) + 1,
+            "n_imu_slots": 0 if effects.ideal else round(longest / timestep) + 1,
             "n_imu_axes": 0 if effects.ideal else _AXES,
         }
 
@@ -236,7 +236,3 @@ def draw_delays(effects: ImuEffects, seed: int) -> tuple[float, float]:
     """The delays of gyroscope and accelerometer [s], by the seed."""
     more = effects.delay_spread * float(stream(seed, Purpose.IMU_DELAY).uniform(-1.0, 1.0))
     return max(0.0, effects.gyro_delay + more), max(0.0, effects.accelerometer_delay + more)
-
-
-def _steps(delay: float, timestep: float) -> int:
-    return round(delay / timestep)

@@ -17,8 +17,13 @@ from ..drive_control import DriveGains
 from ..robot import Robot
 from ..sensors.sensor import MountedSensor
 from . import scenes
-from .battery import BatteryParameters
-from .body_effects import CableParameters, JointEffects, LinkEffects, SoleParameters
+from .body_effects import (
+    BatteryParameters,
+    CableParameters,
+    JointEffects,
+    LinkEffects,
+    SoleParameters,
+)
 from .drive_effects import EncoderEffects, MotorEffects
 from .gears import GearParameters, longest_step
 from .imu_effects import ImuEffects
@@ -188,6 +193,10 @@ class SimulatorParameters(DriveGains):
         return scenes.flat()
 
 
+_STEPS = (5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 1e-6)
+"""Steps of the physics that divide a millisecond [s]."""
+
+
 def too_fast_effects(
     params: SimulatorParameters, robot: RobotDescription
 ) -> Iterator[UnmetRequirement]:
@@ -211,13 +220,8 @@ def too_fast_effects(
                 f"gears of {params.gears.stiffness:g} N m/rad move faster than physics steps of "
                 f"{step:g} s follow",
                 parameter="timestep", expected=f"up to {longest:.3g} s",
-                found=f"{step:g} s", fix=f"timestep: {_below(longest):g} s",
+                found=f"{step:g} s", fix=f"timestep: {next(each for each in _STEPS if each <= longest):g} s",
             )  # fmt: skip
-
-
-def _below(step: float) -> float:
-    """A fraction of a millisecond that is a physics step up to this one [s]."""
-    return next(each for each in (5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 1e-6) if each <= step)
 
 
 class SimulatedRobot(Robot, ABC):

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.hal.simulated.battery import Battery, BatteryParameters
+from aloft.hal.simulated.battery import Battery
+from aloft.hal.simulated.body_effects import BatteryParameters
 from aloft.hal.simulated.drive_effects import DriveEffects, EncoderEffects, MotorEffects
 from aloft.hal.simulated.drives import MotorLimits
 from aloft.hal.simulated.gears import GearParameters, YieldingGears, longest_step
