@@ -113,14 +113,15 @@ NOMINAL = ImuPlace()
 
 def draw_place(effects: ImuEffects, seed: int) -> ImuPlace:
     """Where the unit is, by the seed."""
-    place = _spread(effects.position, effects.position_spread, seed, Purpose.IMU_POSITION)
-    angle = _spread(effects.rotation, effects.rotation_spread, seed, Purpose.IMU_ROTATION)
+    place = draw_spread(effects.position, effects.position_spread, seed, Purpose.IMU_POSITION)
+    angle = draw_spread(effects.rotation, effects.rotation_spread, seed, Purpose.IMU_ROTATION)
     return ImuPlace((place[0], place[1], place[2]), (angle[0], angle[1], angle[2]))
 
 
-def _spread(
+def draw_spread(
     nominal: tuple[float, ...], spread: float, seed: int, purpose: Purpose
 ) -> tuple[float, ...]:
+    """The ``nominal`` numbers, each with a draw of up to the ``spread`` to either side."""
     draws = stream(seed, purpose).uniform(-1.0, 1.0, len(nominal))
     return tuple(float(a + spread * b) for a, b in zip(nominal, draws, strict=True))
 

@@ -12,7 +12,7 @@ from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
 from .body_effects import CableParameters
-from .imu_effects import NOMINAL, ImuPlace, draw_place
+from .imu_effects import NOMINAL, ImuPlace, draw_place, draw_spread
 from .simulated_robot import SimulatorParameters
 
 
@@ -89,10 +89,8 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
     stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
         Purpose.CONTACT_STIFFNESS
     )
-    offsets = stream(params.seed, Purpose.BASE_COM).uniform(-1.0, 1.0, 3)
-    x, y, z = (
-        nominal + params.base_com_spread * float(draw)
-        for nominal, draw in zip(params.base_com_offset, offsets, strict=True)
+    x, y, z = draw_spread(
+        tuple(params.base_com_offset), params.base_com_spread, params.seed, Purpose.BASE_COM
     )
     mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
     links, joints, n = params.links, params.joints, len(robot.joints)
