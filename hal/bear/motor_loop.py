@@ -53,7 +53,8 @@ class MotorLoop:
         cycles: how many there were.
         late_cycles: how many of them began too late.
         lost_answers: how many answers were lost or damaged.
-        link_lost: whether the port has failed, so that nothing can be sent any more.
+        link_lost: whether the drives' port has failed, so that nothing can be sent any more.
+        board_lost: whether the board's port has failed.
         clock: the time since the driver was opened [s]; by default that of the exchanges.
         stamp: when something was measured last, by this clock.
     """
@@ -77,7 +78,7 @@ class MotorLoop:
         self.phase = DrivePhase.OFF
         self.fault = ""
         self.cycles = self.late_cycles = 0
-        self.link_lost = False
+        self.link_lost = self.board_lost = False
         self.clock: Callable[[], float] = lambda: self.cycles * hardware.bus.period
         self.stamp = 0.0
         self.lock = Lock()
@@ -116,7 +117,6 @@ class MotorLoop:
                 bulk = self._prepare()
                 self._switch_to(bulk)
             answered = bulk.exchange()
-            fresh = self.board.poll()
         except BusError as error:
             self.fail(str(error))
             return 0
@@ -127,6 +127,7 @@ class MotorLoop:
                 "watchdog"
             )
             return 0
+        fresh = self._poll_board()
         with self.lock:
             self.lost_answers += len(bulk.ages) - answered
             self.measured.take_drives(bulk)
@@ -140,6 +141,17 @@ class MotorLoop:
         if fault and driving:
             self.fail(fault)
         return answered
+
+    def _poll_board(self) -> int:
+        """The number of new packets of the board. Its port is not the drives': without it they are damped."""
+        if self.board_lost:
+            return 0
+        try:
+            return self.board.poll()
+        except Exception as error:  # noqa: BLE001  # whatever a serial port raises
+            self.board_lost = True
+            self.fail(f"the port of the sensor board failed ({type(error).__name__}: {error})")
+            return 0
 
     def follow(self, command: JointCommand) -> None:
         """From the next cycle on follow this command, if the drives are on."""
@@ -187,7 +199,7 @@ class MotorLoop:
         """What changes in a run: objects, and the names of their attributes."""
         found: list[tuple[object, tuple[str, ...]]] = [
             (self, ("phase", "cycles", "late_cycles", "lost_answers", "target", "current_limit",
-                    "link_lost", "stamp", "exchange_in_use")),
+                    "link_lost", "board_lost", "stamp", "exchange_in_use")),
             (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
                                 "saturated", "imu_silent", "imu_valid")),
             *self.measured.parts(),

@@ -184,6 +184,15 @@ def test_the_cable_is_pulled(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_the_boards_cable_is_pulled_and_the_drives_are_damped_at_once(tmp_path: Path) -> None:
+    fault = InjectedFault(kind="pulled_board", start=0.5)
+    with make_bench(tmp_path, fault) as server:
+        found = result(Bench(server, tmp_path).start())
+        assert "the port of the sensor board failed" in found["reason"], found
+        assert Bench(server, tmp_path).states() == {3}, "not by their own watchdog, after 5 s"
+
+
+@pytest.mark.long
 def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
     with make_bench(tmp_path) as server:
         bench = Bench(server, tmp_path)
