@@ -35,7 +35,7 @@ class BearParameters(DriveParameters):
         0.02, unit="s", gt=0, le=1.0, text="without a command for so long the drives are damped"
     )
     graph_timeout: float = parameter(
-        0.04, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
+        0.025, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
     )
     latency: float = parameter(
         0.0, unit="s", ge=0, le=0.1, text="with virtual time: delay from sensing to the exchange"
@@ -84,6 +84,14 @@ class BearRobot(DrivenRobot):
             yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
             return
         yield from missing_sensors(hardware, context.robot)
+        if params.armed and params.time == "virtual" and not hardware.bus.is_virtual:
+            yield UnmetRequirement(
+                f"in virtual time nothing guards the drives at {hardware.bus.port}: only a twin may be "
+                "armed so",
+                parameter="time",
+                expected="real, or the file that `aloft twin --virtual --write` writes",
+                found="virtual",
+            )
         ratio = context.period / hardware.bus.period
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             yield UnmetRequirement(
@@ -201,6 +209,7 @@ class BearRobot(DrivenRobot):
             self._watchdog.close()
         self._switch.close()
         if self.driver is not None:
+            self.waits_for_others = True  # no hang: it has a limit of its own
             self.driver.close()
 
     def _stop_reason(self) -> str:

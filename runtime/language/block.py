@@ -171,7 +171,7 @@ class Block:
     is run again; the real world (a robot, another machine) does not, so a replay takes its outputs
     from the recording."""
 
-    waits_for_others: ClassVar[bool] = False
+    waits_for_others: bool = False
     """Whether a call waits for another process, with a limit of its own. Then the watchdog, which
     ends the run when a call takes longer than ``clock.hangs_after``, does not watch the block."""
 

@@ -393,6 +393,30 @@ def test_the_control_period_is_a_whole_number_of_the_buss(period: float, fits: b
     assert fits or "does not divide the control period" in str(found[0])
 
 
+@pytest.mark.parametrize(
+    ("armed", "port", "marked", "refused"),
+    [
+        (True, "/dev/ttyUSB0", False, True),
+        (True, "/dev/ttyUSB0", True, True),  # the file of a twin, with a real port written over
+        (True, "/dev/pts/7", False, True),
+        (True, "/dev/pts/7", True, False),
+        (False, "/dev/ttyUSB0", False, False),
+    ],
+)
+def test_only_a_twin_may_be_armed_in_virtual_time(
+    tmp_path: Path, armed: bool, port: str, marked: bool, refused: bool
+) -> None:
+    data = Hardware.for_twin(ROBOT).model_dump(mode="json")
+    data["bus"] |= {"port": port, "time": "virtual" if marked else "real"}
+    (tmp_path / "bench.yaml").write_text(yaml.safe_dump(data))
+    params = BearRobot.Params(hardware="bench.yaml", time="virtual", armed=armed)
+    context = SimpleNamespace(robot=ROBOT, period=0.002, folder=tmp_path, graph_folder=tmp_path)
+    found = list(BearRobot.requires(params, context))  # type: ignore[arg-type]
+    assert [each.parameter for each in found] == (["time"] if refused else [])
+    if refused:
+        assert f"in virtual time nothing guards the drives at {port}" in found[0].message
+
+
 @pytest.mark.parametrize("fault", ["", "drive left_knee_motor has not answered"])
 def test_a_fault_of_the_drives_is_no_success(fault: str) -> None:
     loop = SimpleNamespace(phase=DrivePhase.DAMPED, lost_answers=3, cycles=17, fault=fault)

@@ -108,7 +108,7 @@ def test_a_stuck_encoder_is_noticed_while_the_others_move() -> None:
         robot.step(1)
         if loop.fault:
             break
-    assert "drive left_knee_motor (address 9): its encoder has not changed in 50 exch" in loop.fault
+    assert "drive left_knee_motor (address 9): its encoder has not changed in 25 exch" in loop.fault
     assert twin.exchanges - twin.zero - round(START / 0.001) < 120
 
 
