@@ -377,6 +377,7 @@ class Follower:
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""
         if self._first > 0:  # at the beginning blocks are as they start
+            self._change_parameters(self._first)  # before: runs under way had those of their ticks
             self._restore(self._recorded.keyframe(self._first))
         self._prepare(self._first)
 
@@ -406,13 +407,21 @@ class Follower:
         ticks, rows = zip(*self._kept, strict=True)
         return np.concatenate(ticks), np.concatenate(rows)
 
-    def _prepare(self, tick: int) -> None:
+    def _change_parameters(self, tick: int) -> None:
+        """Make the recorded changes up to a tick, each in its own."""
+        clock, parameters = self._bound.clock, self._bound.parameters
+        present = clock.tick
         while self._changes and self._changes[0].tick <= tick:
             change = self._changes.pop(0)
             block = self._bound.blocks.get(change.path.partition(".")[0])
             if block is not None and not isinstance(block, PlaybackBlock):
-                parameters = self._bound.parameters
-                parameters.apply(adjust(self._bound.blocks, {change.path: change.new}), tick)
+                clock.tick = change.tick
+                adjustment = adjust(self._bound.blocks, {change.path: change.new})
+                parameters.apply(adjustment, change.tick)
+        clock.tick = present
+
+    def _prepare(self, tick: int) -> None:
+        self._change_parameters(tick)
         if self._feed.paths:
             row = self._cursor.at(tick)
             if row is not None:

@@ -37,6 +37,7 @@ from .job_memory import Copies, copies, copy, record_size
 from .worker import views
 from .worker_link import WorkerLink
 
+STILL_COMPUTING = "its worker was still computing when the run had ended; it has no metrics"
 END_TIME = 2.0
 """Seconds that a worker has to end a run in real time."""
 
@@ -334,7 +335,7 @@ class BackgroundBlock(Block):
                 worker.memory.ask(slot, -1, self.tick)
             elif self._sampled[slot] >= 0:
                 seconds += self._hangs_after
-        self._metrics, self._warnings = worker.end(seconds)
+        self._metrics, self._warnings = worker.end(seconds) or ({}, (STILL_COMPUTING,))
 
     def metrics(self) -> Mapping[str, Metric]:
         """Those of the block, and in real time how many results were late."""

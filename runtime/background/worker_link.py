@@ -18,7 +18,7 @@ from ..language.context import Clock, Context
 from ..language.errors import AloftError
 from ..language.parameters import Parameters
 from .job_memory import JobMemory
-from .worker import CHANGE, MESSAGE, RESTORE, RUN, WorkerTask, main
+from .worker import BELL, CHANGE, MESSAGE, RESTORE, RUN, WorkerTask, main
 
 START_TIME = 120.0
 """Seconds that a worker may take to be ready: it may have to compile its block's kernels first."""
@@ -136,32 +136,32 @@ class WorkerLink:
     def _sampled(self, slot: int) -> str:
         return f"tick {self.memory.tick_of(slot)}"
 
-    def end(self, seconds: float) -> tuple[Mapping[str, Metric], Sequence[str]]:
-        """Let the worker close its block and end. Returns the block's metrics and warnings.
+    def end(self, seconds: float) -> tuple[Mapping[str, Metric], Sequence[str]] | None:
+        """Let the worker close its block and end.
+
+        Returns:
+            The block's metrics and warnings; none where the worker computes for longer than that, and
+            is killed.
 
         Raises:
-            WorkerError: it fails, or takes longer.
+            WorkerError: it fails.
         """
         with suppress(OSError):
             self._process.stdin.close()
-        end, said = monotonic() + seconds, b""
-        while (left := end - monotonic()) > 0.0 and select([self._answers], [], [], left)[0]:
-            piece = os.read(self._answers, 1 << 16)
-            if not piece:
-                break
-            said += piece
-        text = said[said.find(b"{") :] if b"{" in said else b""
+        end, said, has_ended = monotonic() + seconds, b"", False
+        while not has_ended and (left := end - monotonic()) > 0.0:
+            if select([self._answers], [], [], left)[0]:
+                piece = os.read(self._answers, 1 << 16)
+                said += piece
+                has_ended = not piece
+        answer: dict[str, Any] | None = None
         with suppress(ValueError):
-            answer: dict[str, Any] = json.loads(text)
-            self._process.stop(asked=1.0)
-            os.close(self._answers)
-            return answer["metrics"], answer["warnings"]
-        if left <= 0.0:
-            self.kill()
-            raise WorkerError(f"{self._process.name} did not end within {seconds:g} s")
-        error = WorkerError(str(self._process.failure()))
+            answer = json.loads(said.lstrip(BELL))
+        failure = self._process.failure() if has_ended and answer is None else None
         self.kill()
-        raise error
+        if failure is not None:
+            raise WorkerError(str(failure))
+        return (answer["metrics"], answer["warnings"]) if answer is not None else None
 
     def kill(self) -> None:
         """End the process, whatever it does."""
