@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.logs.replay.replay import KeptRun, Keyframes, replay
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.running.executor import run
@@ -107,3 +108,16 @@ def test_a_crash_is_noticed_when_its_result_is_late(tmp_path: Path) -> None:
         r"its worker \(process \d+\) was killed by SIGKILL, in the run of", result.reason
     )
     assert file.read_text().splitlines() == ["rests"] * 5
+
+
+def test_a_replay_takes_late_outputs_from_the_recording() -> None:
+    background, _ = both(
+        "Slow", 3, params={"sleep_at": 10, "sleep": "80 ms"}, ticks=60,
+        background={"late": "hold"}, clock=PACED,
+    )  # fmt: skip
+    keyframes = Keyframes(20)
+    kept = KeptRun.of(run(background, sinks=[keyframes]), keyframes)
+    assert kept.late == ("block",)
+    replayed = replay(kept, first_tick=20)
+    assert replayed.identical, (replayed.first, replayed.notes)
+    assert replayed.ran == ("wave", "sum", "motor")
