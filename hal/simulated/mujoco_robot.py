@@ -51,8 +51,9 @@ class MujocoRobot(SimulatedRobot):
     For a joint that slides, metres and newtons stand for radians and newton metres in every parameter
     and signal.
 
-    All random numbers follow from ``seed``. Every disturbance has a stream of its own, so setting
-    one to zero changes no other. Snapshots are exact: a restored run continues bit for bit.
+    All random numbers follow from ``seed``, or with ``noise_seed`` those that differ between two runs of
+    one robot from that. Every disturbance has a stream of its own, so setting one to zero changes no
+    other. Snapshots are exact: a restored run continues bit for bit.
 
     A real robot differs from its description in what ``imu``, ``encoders``, ``motors``, ``gears``,
     ``battery``, ``switches``, ``soles``, ``links``, ``joints``, ``cable`` and ``floor_tilt`` say; by default

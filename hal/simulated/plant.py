@@ -257,7 +257,7 @@ class Plant:
         self.variation = draw_variation(params, robot)
         self.model = build_world(params, robot, self.variation)
         self._robot, self._params, self._period = robot, params, period
-        self.streams = RandomStreams(params.seed, _noisy_fields(robot))
+        self.streams = RandomStreams(params.seed_of_noise, _noisy_fields(robot))
         self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
         self._samples_per_tick = samples_per_tick
         self.imu = None
@@ -296,7 +296,7 @@ class Plant:
         everything = mujoco.mjtState.mjSTATE_INTEGRATION
         return {
             "n_integration": mujoco.mj_stateSize(model, everything),
-            "n_random": RandomStreams(params.seed, _noisy_fields(robot)).words,
+            "n_random": RandomStreams(params.seed_of_noise, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
             **ImuModel.dimensions(params.imu, params.timestep),
             **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
@@ -360,7 +360,7 @@ class Plant:
 
         step.prepare()
         params = self._params
-        attitude = stream(params.seed, Purpose.ATTITUDE).standard_normal(3)
+        attitude = stream(params.seed_of_noise, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
         place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
@@ -371,7 +371,7 @@ class Plant:
         hold(self.position + self.sensors.encoder_offset, torque)
         phase = 0.0
         if params.random_start_phase:
-            phase = float(stream(params.seed, Purpose.START_PHASE).random()) * self._period
+            phase = float(stream(params.seed_of_noise, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
         self.start_delay = phase - early * params.timestep
         self._step1.run()

@@ -40,6 +40,11 @@ class SimulatorParameters(DriveGains):
     """
 
     seed: int = parameter(0, ge=0, text="the seed of all random numbers")
+    noise_seed: int | None = parameter(
+        None, ge=0,
+        text="that of noise, jitter, and the attitude and clock at the start, for another run of the "
+        "robot that `seed` draws; none: as `seed`",
+    )  # fmt: skip
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )
@@ -179,6 +184,11 @@ class SimulatorParameters(DriveGains):
             if value is not None and not 0.0 < value[0] <= value[1]:
                 raise ValueError(f"{name} must be two positive numbers in rising order: {value}")
         return self
+
+    @property
+    def seed_of_noise(self) -> int:
+        """The seed of what differs from run to run of one robot."""
+        return self.seed if self.noise_seed is None else self.noise_seed
 
     def build_scene(self) -> Terrain:
         """The ground these parameters describe."""

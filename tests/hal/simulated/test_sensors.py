@@ -42,6 +42,28 @@ def test_biases_of_many_seeds_fill_their_range() -> None:
     assert np.mean(spread) == pytest.approx(0.0015, abs=0.0002)
 
 
+def test_another_noise_seed_is_another_run_of_the_same_robot() -> None:
+    errors = {"encoder_offset": 0.003, "gyro_noise": 0.02, "gyro_bias": 0.01, "mass_spread": 0.05}
+    attitude = {"initial_attitude_error": 0.01, "random_start_phase": True}
+    first, second, same = (
+        bench(seed=4, noise_seed=noise, **errors, **attitude) for noise in (1, 2, 4)
+    )
+    plain = bench(seed=4, **errors, **attitude)
+    robots = [first, second, same, plain]
+    assert len({robot.block.plant.variation for robot in robots}) == 1  # type: ignore[attr-defined]
+    offsets = [robot.block.plant.sensors.encoder_offset for robot in robots]  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(offsets, [offsets[0]] * 4)
+    for robot in robots:
+        hold(robot)
+        robot.step(20)
+    rates = [robot.get("imu").angular_velocity for robot in robots]
+    np.testing.assert_array_equal(rates[2], rates[3])
+    assert not np.array_equal(rates[0], rates[1])
+    assert not np.array_equal(
+        first.get("truth").base_orientation, second.get("truth").base_orientation
+    )
+
+
 def test_switching_one_noise_off_leaves_the_others_as_they_were() -> None:
     noise = {"gyro_noise": 0.02, "joint_velocity_noise": 0.05, "encoder_offset": 0.003,
              "jitter": 0.0005, "gyro_bias": 0.01}  # fmt: skip
