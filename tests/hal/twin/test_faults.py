@@ -112,6 +112,7 @@ def test_a_stuck_encoder_is_noticed_while_the_others_move() -> None:
     assert twin.exchanges - twin.zero - round(START / 0.001) < 120
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["lost", "truncated", "corrupted", "late", "corrupted_request"])
 def test_some_spoilt_answers_do_no_harm(kind: str) -> None:
     robot = bench({"kind": kind, "share": 0.05})
