@@ -95,14 +95,14 @@ class JobMemory:
 
     def next_job(self, last: int) -> tuple[int, int]:
         """The first job after ``last`` that is asked for, and its slot; zeros if there is none."""
-        found = slot = 0
-        for each in range(self.slots):
-            job = int(self._asked[each, _JOB])
-            if job > last and (not found or job < found):
-                found, slot = job, each
+        jobs = np.asarray(self._asked)[: self.slots, _JOB]
+        later = jobs[jobs > last]
+        if not later.size:
+            return 0, 0
         with self._fence:
             pass
-        return found, slot
+        job = int(later.min())
+        return job, int(np.argmax(jobs == job))
 
     def is_asked(self, slot: int, job: int) -> bool:
         """Whether the slot still holds that job."""
