@@ -174,7 +174,7 @@ class Block:
     delay_runs: ClassVar[int] = 1
     """After how many runs the outputs of a Moore block depend on what it reads."""
 
-    waits_for_others: ClassVar[bool] = False
+    waits_for_others: bool = False
     """Whether a call waits for another process, with a limit of its own. Then the watchdog, which
     ends the run when a call takes longer than ``clock.hangs_after``, does not watch the block."""
 
