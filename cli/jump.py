@@ -107,7 +107,9 @@ def jump(
     quiet: Quiet = False,
 ) -> None:
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
+    from ..runtime.loading import flatten
     from ..studies.batch.seeds import parse_seeds
+    from ..studies.rehearsal import corrected_parameters
 
     seeds, seed = running.seeds, running.seed
     out = console(to_stderr=as_json, quiet=quiet)
@@ -127,6 +129,7 @@ def jump(
                     "--learn: a robot learns from one recorded jump after the other, so leave out "
                     "--seeds, --no-record and --rehearse"
                 )
+            corrected_parameters(flatten(path, settings))  # refuses a graph without them
             record = recording.record or Path("recordings") / "jump.rrd"
             rise = changes.get("rise") or usual_rise(path) or 0.0
             prepare = planner_of(path, running, planning.nearest, console(quiet=True))

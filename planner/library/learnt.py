@@ -6,7 +6,8 @@ follows the correction of velocity and angular momentum at lift-off that this ju
 process through all lessons, over what the jump is to do at lift-off, its ``Launch``. So a jump profits
 most from the last ones like it, and a new one from all that are near it::
 
-    c = k' (K + N)^-1 C,   k(a, b) = exp(-|a - b|^2 / (2 LIKENESS^2)),   N = NOISE^2 diag(FORGETTING^-age)
+    c = k' (K + N)^-1 C,   N = NOISE^2 diag(FORGETTING^-age)
+    k(a, b) = SHARED g(a - b, FAR) + (1 - SHARED) g(a - b, NEAR),   g(d, r) = exp(-|d|^2 / (2 r^2))
 
 with the needed corrections C, one row a lesson, and ages in jumps.
 """
@@ -30,9 +31,11 @@ from ..task.task import JumpTask
 from .rehearsed import ZERO, Vector, read_vector
 
 FORMAT = 1
-LIKENESS = 1.0
-"""Launches that differ by this [m/s] need much the same correction."""
-NOISE = 0.4
+SHARED = 0.7
+"""The share of a correction that is much the same for jumps that are only alike."""
+NEAR, FAR = 0.25, 1.5
+"""Launches that differ by less than this [m/s] are the same jump, and are alike."""
+NOISE = 0.5
 """How much one lesson scatters, as a share of what robots need."""
 FORGETTING = 0.9
 """With each further jump a lesson counts as if its noise had grown by this share's inverse."""
@@ -99,7 +102,8 @@ class LearntJumps:
 
 def likeness(differences: Any) -> Any:
     """How much launches with these differences (..., 4) have in common, from 0 to 1."""
-    return np.exp(-0.5 * (differences**2).sum(axis=-1) / LIKENESS**2)
+    square = -0.5 * (differences**2).sum(axis=-1)
+    return SHARED * np.exp(square / FAR**2) + (1.0 - SHARED) * np.exp(square / NEAR**2)
 
 
 def launch_of(task: JumpTask) -> Launch | None:

@@ -69,15 +69,16 @@ def test_the_truth_is_not_looked_at(run: RunResult, plan: PlannedJump) -> None:
 
 
 def test_corrections_act_against_the_errors_and_add_up(run: RunResult, plan: PlannedJump) -> None:
-    none = lesson_of(Shifted(run, 0.0, 0.0), plan, MASS, (ZERO, ZERO))
-    far = lesson_of(Shifted(run, 0.03, -0.1), plan, MASS, (ZERO, ZERO))
-    had = lesson_of(Shifted(run, 0.03, -0.1), plan, MASS, ((-0.02, 0.0, 0.0), (0.0, 0.01, 0.0)))
-    assert none is not None and far is not None and had is not None
-    assert far.place[0] - none.place[0] == pytest.approx(0.03, abs=1e-4)
-    assert far.velocity[0] < none.velocity[0]
-    assert far.momentum[1] > none.momentum[1]
-    assert had.velocity[0] == pytest.approx(far.velocity[0] - 0.02, abs=1e-4)
+    near = lesson_of(Shifted(run, 0.0, -0.01), plan, MASS, (ZERO, ZERO))
+    far = lesson_of(Shifted(run, 0.03, -0.01), plan, MASS, (ZERO, ZERO))
+    had = lesson_of(Shifted(run, 0.03, -0.01), plan, MASS, ((-0.02, 0.0, 0.0), (0.0, 0.01, 0.0)))
+    level = lesson_of(Shifted(run, 0.0, 0.01), plan, MASS, (ZERO, ZERO))
+    assert near is not None and far is not None and had is not None and level is not None
+    assert far.place[0] - near.place[0] == pytest.approx(0.03, abs=1e-4)
+    assert far.velocity[0] < near.velocity[0]
+    assert near.momentum[1] > level.momentum[1]
     assert had.momentum[1] == pytest.approx(far.momentum[1] + 0.01, abs=1e-4)
+    assert had.velocity[0] == pytest.approx(max(far.velocity[0] - 0.02, -LARGEST), abs=1e-4)
 
 
 def test_a_measured_place_comes_before_the_estimate(run: RunResult, plan: PlannedJump) -> None:
