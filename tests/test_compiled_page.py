@@ -51,6 +51,7 @@ def test_the_controller_is_fused_and_gives_the_same_bytes_in_python(folder: Path
     assert set(fused.blocks) == {"wave", "pid"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [

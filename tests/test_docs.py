@@ -150,6 +150,7 @@ def test_the_reference_of_blocks_is_up_to_date() -> None:
     )
 
 
+@pytest.mark.long
 def test_the_readme_runs_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (code,) = [c for c in PYTHON.findall((ROOT / "README.md").read_text()) if "aloft.load" in c]
     monkeypatch.chdir(tmp_path)

@@ -15,6 +15,7 @@ pytest.importorskip("pythonfmu3")
 PAGE = (Path(__file__).parent.parent / "docs" / "fmi.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_the_page_runs(tmp_path: Path) -> None:
     found = dict(re.findall(r"```(?:yaml|sh) (\w+)\n(.*?)```", PAGE, re.DOTALL))
     assert set(found) == {"controller", "rail", "export", "rail_with_fmu"}

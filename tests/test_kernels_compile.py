@@ -332,6 +332,7 @@ def test_a_mark_leaves_the_function_alone():
     assert double in kernels().values()
 
 
+@pytest.mark.long
 def test_nothing_of_ours_needs_a_compiler_to_run():
     modules = [".".join(("aloft", *p.relative_to(ROOT).with_suffix("").parts)) for p in HOT]
     modules = [name.removesuffix(".__init__") for name in modules]

@@ -52,6 +52,7 @@ def test_the_wheel_holds_nothing_else(wheel: Path) -> None:
     assert shipped.isdisjoint(NOT_SHIPPED)
 
 
+@pytest.mark.long
 def test_without_the_source_bench_says_how_to_get_the_benchmarks(
     wheel: Path, tmp_path: Path
 ) -> None:
@@ -76,6 +77,7 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
         assert f"    {command}\n" in done.stderr
 
 
+@pytest.mark.long
 def test_the_source_distribution_has_what_the_benchmarks_need(
     source_distribution: Path, wheel: Path
 ) -> None:

@@ -92,6 +92,7 @@ def test_a_graph_runs_the_block_of_an_installed_package(installed: Path) -> None
     assert result["metrics"]["last_force_N"] == -1500.0
 
 
+@pytest.mark.long
 def test_its_mistakes_are_reported_as_those_of_our_own_blocks(installed: Path) -> None:
     graph = (installed.parent / "graph.yaml").read_text()
     wrong = graph.replace("30 N/cm", "30 kg")

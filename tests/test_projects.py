@@ -79,6 +79,7 @@ def test_the_page_lists_every_file(project: Path) -> None:
         assert path.name in text or path.name == "README.md"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "graph", "metric", "most"),
     [("arm", "reach", "target_error_rad", 0.01),

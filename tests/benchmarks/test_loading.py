@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from aloft.benchmarks.loading import chain, loading
 from aloft.runtime.loading import load_text
 
@@ -11,6 +13,7 @@ def test_the_chain_has_its_source_and_as_many_gains() -> None:
     assert graph.order == ("g0", "g1", "g2", "g3")
 
 
+@pytest.mark.long
 def test_the_rows_are_complete() -> None:
     rows = loading(rounds=1)
     assert [row.goal for row in rows] == [None, 1.0, 1.3, None]

@@ -9,6 +9,7 @@ import pytest
 from aloft.benchmarks.startup import startup, time_process
 
 
+@pytest.mark.long
 def test_a_process_is_timed_as_often_as_asked(tmp_path: Path) -> None:
     found = time_process(["--version"], tmp_path, 2)
     assert found.output.startswith("aloft ")
@@ -16,6 +17,7 @@ def test_a_process_is_timed_as_often_as_asked(tmp_path: Path) -> None:
     assert list((tmp_path / "bytecode").rglob("*.pyc"))
 
 
+@pytest.mark.long
 def test_a_process_that_fails_is_no_measurement(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="aloft check ended with 2"):
         time_process(["check", "nothing.yaml"], tmp_path, 1, warm=False)

@@ -72,6 +72,7 @@ def test_code_that_keeps_the_interpreter(
     assert result["error"]["where"] == f"{Path.cwd()}/hanging.py:{line_of('self._wait(')}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("options", [[], ["--no-fuse"]])
 def test_a_kernel_that_does_not_end(
     graph: Callable[[bool], str], start: Start, options: list[str]
@@ -90,6 +91,7 @@ def test_a_kernel_that_does_not_end(
     assert found[1] == ("'arm'" if not options else "'leg' or 'arm' or 'hand'")
 
 
+@pytest.mark.long
 def test_a_run_that_is_slow_to_close_is_not_killed(
     graph: Callable[[bool], str], start: Start
 ) -> None:

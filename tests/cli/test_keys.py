@@ -18,6 +18,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_a_run_over_tls_gives_the_bytes_of_one_process(here: Path) -> None:
     made = run_for_json("keys", "graph.yaml", "-o", "keys", "--observer", "viewer")
     assert made["made"] == ["onboard", "ground", "viewer"]

@@ -56,6 +56,7 @@ def unavailable(width: int, height: int) -> Any:
     raise strip.NoRendererError(f"no OpenGL without a screen (none here); {strip.REMEDY}")
 
 
+@pytest.mark.long
 def test_curves_are_drawn_and_frames_left_out_where_nothing_renders(
     drawn: tuple[Path, dict[str, Any]],
 ) -> None:

@@ -26,6 +26,7 @@ CallJson = Callable[..., dict[str, Any]]
 TASKS = SHIPPED.parent / "tasks"
 
 
+@pytest.mark.long
 def test_a_kept_plan_is_shown_pictured_and_recorded(folder: Path, call: Call) -> None:
     done = call("plan", str(TASKS / "forward_10cm.yaml"), "--out", "pictures")
     for words in ("forward_10cm: the plan", "take_off_speed_m_s", "flight_position", "solver"):

@@ -47,6 +47,7 @@ def wait_for(condition: Callable[[], Any]) -> Any:
     return found
 
 
+@pytest.mark.long
 def test_any_number_of_workers_makes_the_same_bytes(folder: Path, call_json: CallJson) -> None:
     write_grid(folder)
     for workers in ("1", "2"):
@@ -94,6 +95,7 @@ def test_nothing_is_lost_when_workers_and_the_whole_are_killed(
     assert len(contents(kept)) == MANY
 
 
+@pytest.mark.long
 def test_a_signal_stops_a_grid_and_says_what_is_done(folder: Path, start: Start) -> None:
     write_grid(folder, count=10 * MANY)
     whole = start("plan", "--library", "grid.yaml", "--keep", "kept", "--workers", "1", "--json")

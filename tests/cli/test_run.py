@@ -43,6 +43,7 @@ def test_run_json_has_the_promised_keys(folder: Path, call_json: CallJson) -> No
     assert (folder / "here.rrd").is_file()
 
 
+@pytest.mark.long
 def test_the_hash_is_the_same_everywhere(folder: Path, call_json: CallJson, start: Start) -> None:
     here = {
         call_json("run", "count.yaml", "--set", "double.seed=5", *options)["run_hash"]
@@ -193,6 +194,7 @@ def wait_for_the_sign(folder: Path) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.long
 def test_a_signal_stops_all_seeds(folder: Path, start: Start) -> None:
     graph = (folder / "count.yaml").read_text()
     graph = graph.replace("duration: 1 s\n", "clock: {kind: paced}\n")
@@ -207,6 +209,7 @@ def test_a_signal_stops_all_seeds(folder: Path, start: Start) -> None:
     assert "Traceback" not in errors
 
 
+@pytest.mark.long
 def test_a_signal_between_two_runs_stops_all_seeds(folder: Path, start: Start) -> None:
     """Short runs: a worker is then most of the time waiting for work, loading or setting up."""
     leave_a_sign(folder)

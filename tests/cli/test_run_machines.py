@@ -115,6 +115,7 @@ def test_one_result_and_one_recording_with_the_bytes_of_one_process(here: Path) 
     assert "identical" in run_here("replay", "--check", "recordings/graph.rrd").stdout
 
 
+@pytest.mark.long
 def test_the_verdict_of_any_part_is_the_verdict(here: Path) -> None:
     result = run_for_json(
         "run", "graph.yaml", "--local", "--no-record", "--set", "controller.good=false",
@@ -124,6 +125,7 @@ def test_the_verdict_of_any_part_is_the_verdict(here: Path) -> None:
     assert result["recording"] is None
 
 
+@pytest.mark.long
 def test_the_fault_of_a_part_is_the_reason(here: Path) -> None:
     settings = ("--set", "controller.fail_at=20")
     result = run_for_json("run", "graph.yaml", "--local", *settings, code=3)
@@ -144,6 +146,7 @@ def test_what_cannot_be_asked_for(here: Path) -> None:
         assert reason in run_for_json("run", *arguments, code=2)["reason"]
 
 
+@pytest.mark.long
 def test_parts_that_are_started_one_by_one_and_their_recordings_merged(here: Path) -> None:
     ports = [f"--set=machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("onboard", "ground")]
     command = [sys.executable, "-m", "aloft", "run", "graph.yaml", *ports, "--json", "--machine"]

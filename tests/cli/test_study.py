@@ -63,6 +63,7 @@ def test_rows_goals_and_table(study: Path, folder: Path, call_json: CallJson) ->
     assert rows[0]["counter.last_count"] == 1051.0 and len(rows[0]["run_hash"]) == 32
 
 
+@pytest.mark.long
 def test_a_missed_goal_a_broken_run_and_tuning_seeds(
     study: Path, call: Call, call_json: CallJson
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_wrong_study_is_refused_before_anything_runs(
     assert not (folder / "results").exists()
 
 
+@pytest.mark.long
 def test_killed_and_resumed_with_nothing_lost_or_made_twice(
     study: Path, folder: Path, call_json: CallJson, start: Start
 ) -> None:
@@ -122,6 +124,7 @@ def test_killed_and_resumed_with_nothing_lost_or_made_twice(
     assert table_bytes(first, folder) != table_bytes(first, folder)[:-1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_it_cleanly(
     study: Path, folder: Path, start: Start, number: signal.Signals, code: int
@@ -157,6 +160,7 @@ tune: {seeds: 5:7, draws: 6, where: {stop: 1 s}, set: {counter.goal: 108}}
 """
 
 
+@pytest.mark.long
 def test_tuning_writes_a_file_that_the_runs_take(
     study: Path, folder: Path, call: Call, call_json: CallJson
 ) -> None:
@@ -182,6 +186,7 @@ def test_tuning_writes_a_file_that_the_runs_take(
     assert result["tuned"] == {arm: found["set"] for arm, found in said["arms"].items()}
 
 
+@pytest.mark.long
 def test_optuna_proposes_and_a_lost_part_is_made_again(
     study: Path, folder: Path, call: Call, call_json: CallJson
 ) -> None:
@@ -223,6 +228,7 @@ def test_part_of_a_study_and_plots_that_cannot_be_drawn(
     assert "axis 'arm' has no hgih" in call("study", "grid.yaml", "--where=arm=hgih", code=2).stderr
 
 
+@pytest.mark.long
 def test_the_worst_runs_are_listed_and_any_can_be_recorded(
     study: Path, folder: Path, call_json: CallJson, call: Call
 ) -> None:

@@ -53,6 +53,7 @@ class Dog(Block):
 """
 
 
+@pytest.mark.long
 def test_a_recording_becomes_a_test_that_pytest_runs(
     folder: Path, call: Call, call_json: CallJson, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -46,6 +46,7 @@ def running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         part.communicate()
 
 
+@pytest.mark.long
 def test_machines_and_links_are_shown(running: Path) -> None:
     found = run_for_json("top", "graph.yaml", "--once", "--wait", "60")
     assert found["success"] and list(found["machines"]) == ["onboard", "ground"]
@@ -84,6 +85,7 @@ def sockets_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
 
 
+@pytest.mark.long
 def test_the_parts_of_a_local_run_are_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_at_a_signal_while_nobody_reads_its_packets(
     tmp_path: Path, number: signal.Signals

@@ -172,6 +172,7 @@ def complete(start: Start, words: str) -> list[str]:
     return process.communicate(timeout=240)[0].split()
 
 
+@pytest.mark.long
 def test_the_tab_key_completes(folder: Path, start: Start) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")

@@ -69,6 +69,7 @@ def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:
     assert code == 2 and "is not a recording: it does not begin like" in text
 
 
+@pytest.mark.long
 def test_two_runs_become_one_file(tmp_path: Path) -> None:
     runner = CliRunner()
     paths = [tmp_path / name for name in ("a.rrd", "b.rrd")]

@@ -54,6 +54,7 @@ def test_restored_in_place_and_in_a_new_graph(graph: CheckedGraph) -> None:
     assert trace(other) == expected
 
 
+@pytest.mark.long
 def test_no_tick_allocates_more_arrays_than_its_blocks_declare(graph: CheckedGraph) -> None:
     compiled, executor = (
         started(graph),

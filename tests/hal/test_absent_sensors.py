@@ -41,6 +41,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.long
 def test_a_robot_without_feet_runs_is_recorded_and_replayed(folder: Path) -> None:
     (folder / "graph.yaml").write_text(GRAPH)
     done = subprocess.run(

@@ -126,6 +126,7 @@ def test_points_that_are_not_there_do_not_move():
     assert reach[12:15, :3].any()
 
 
+@pytest.mark.long
 def test_the_covariance_is_that_of_a_swarm():
     """2000 estimates with biases and noise of their own, 80 ms of tumbling."""
     random, count, bias = np.random.default_rng(7), 2000, SIZE

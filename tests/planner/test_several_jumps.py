@@ -47,6 +47,7 @@ def failed(plan: PlannedJump) -> set[str]:
     return {test.name for test in check_plan(plan, ROBOT).failed}
 
 
+@pytest.mark.long
 def test_up_a_step_and_down_again_without_standing_still() -> None:
     plan = steps()
     assert check_plan(plan, ROBOT).explain() == ""
@@ -72,6 +73,7 @@ def test_every_flight_is_checked() -> None:
     assert [test.where for test in found] == [" jump 2"]
 
 
+@pytest.mark.long
 def test_a_file_of_several_jumps(tmp_path: Path) -> None:
     path = write_plan(tmp_path / "steps.npz", steps())
     assert read_plan(path).flights == steps().flights
@@ -157,6 +159,7 @@ def test_equations_are_independent_at_the_guess(task: dict[str, Any]) -> None:
     assert smallest_singular_value(problem, guess) > 1e-7
 
 
+@pytest.mark.long
 def test_free_times_out_of_the_plane_are_those_straight_ahead() -> None:
     free = {"rise": 0.1, "squat_time": "free", "thrust_time": "free"}
     ahead, aside = (

@@ -28,6 +28,7 @@ blocks:
 """
 
 
+@pytest.mark.long
 def test_there_and_back_and_replayed(
     router: tuple[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,6 +33,7 @@ def jump() -> RecordedJump:
     return record_jump(60)
 
 
+@pytest.mark.long
 def test_rows_are_complete_and_say_what_is_missing() -> None:
     rows = {row.name: row for row in tick(rounds=1, ticks=60, process=False)}
     for name in (PLAIN, COMPILED, FUSED, HAND, BARE, OSQP, WHOLE_BODY, "block wbc", "block legs"):

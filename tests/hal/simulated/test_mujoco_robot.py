@@ -244,6 +244,7 @@ def digest(seed: int) -> str:
     return value.hexdigest()
 
 
+@pytest.mark.long
 def test_same_seed_same_bytes_in_every_process_on_every_cpu() -> None:
     code = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"

@@ -197,6 +197,7 @@ def test_what_cannot_be_compared_is_said(runs: list[RecordedRun]) -> None:
         compare_runs(runs[0], slow)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
 def test_an_export_never_has_all_rows_in_memory(
     runs: list[RecordedRun], kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -71,6 +71,7 @@ def expect_found(whole: Path, folder: Path, places: np.ndarray, bits: np.ndarray
         assert rest.rows.tobytes() == rows[rest.ticks].tobytes(), place
 
 
+@pytest.mark.long
 def test_a_changed_byte_anywhere_is_found(whole: Path, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     size = whole.stat().st_size

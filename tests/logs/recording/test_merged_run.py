@@ -51,6 +51,7 @@ def same(one: RecordedRun, other: RecordedRun) -> None:
         assert one.snapshot(tick) == other.snapshot(tick)
 
 
+@pytest.mark.long
 def test_the_merged_recording_is_that_of_one_process(made: Made, tmp_path: Path) -> None:
     placed, paths, alone = made
     parts = read_parts(placed, paths)

@@ -46,6 +46,7 @@ def aloft(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
     return call
 
 
+@pytest.mark.long
 def test_what_there_is_room_for_is_kept(aloft: Any, tmp_path: Path) -> None:
     done = aloft(600_000, "run", "noise.yaml", "--record", "new.rrd", "--json")
     result = json.loads(done.stdout.splitlines()[-1])
@@ -64,6 +65,7 @@ def test_what_there_is_room_for_is_kept(aloft: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "new.part.rrd").exists()
 
 
+@pytest.mark.long
 def test_where_nothing_can_be_kept_the_earlier_recording_stays(aloft: Any, tmp_path: Path) -> None:
     for most in (4096, 30_000):  # no ring, and no file
         done = aloft(most, "run", "noise.yaml", "--record", "old.rrd")
@@ -105,6 +107,7 @@ def test_a_full_disk(aloft: Any, tmp_path: Path) -> None:
     assert count > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
 def test_an_export_is_whole_or_not_there(aloft: Any, tmp_path: Path, kind: str) -> None:
     if kind == "mcap":

@@ -131,6 +131,7 @@ def test_no_tick_allocates(tmp_path: Path) -> None:
     recorder.finish(run(graph(1)))
 
 
+@pytest.mark.long
 def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, keyframe_period=0.1)
     result = run(graph(20_000), sinks=[recorder])
@@ -286,6 +287,7 @@ def test_overruns_and_faults_are_noted(tmp_path: Path) -> None:
     assert fault.level == "ERROR" and "the spring broke" in fault.text and fault.tick == 40
 
 
+@pytest.mark.long
 def test_two_runs_into_one_file_spoil_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     second = Recorder(path)
@@ -316,6 +318,7 @@ def test_a_file_that_somebody_removes_is_written_again(tmp_path: Path) -> None:
     assert run_again.whole and run_again.rows.tobytes() == result.log.rows().tobytes()
 
 
+@pytest.mark.long
 def test_earlier_recordings_are_kept_if_that_is_wished(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     for ticks in (10, 20, 30):
@@ -330,6 +333,7 @@ def test_earlier_recordings_are_kept_if_that_is_wished(tmp_path: Path) -> None:
     assert len(read(path).ticks) == 5
 
 
+@pytest.mark.long
 def test_what_a_killed_recorder_left_is_kept(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
     wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.part.rrd")) >= 1000))
@@ -355,6 +359,7 @@ def test_a_slow_simulation_writes_larger_batches(filled: int, waited: float, due
     assert recorder._flush_is_due(waited) is due
 
 
+@pytest.mark.long
 def test_a_symbolic_link_stays_and_its_file_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     link = tmp_path / "a.rrd"

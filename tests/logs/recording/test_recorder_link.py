@@ -114,6 +114,7 @@ def test_the_bytes_of_a_process_are_counted() -> None:
     assert link._bytes_moved() == 0
 
 
+@pytest.mark.long
 def test_virtual_time_waits_for_a_recorder_that_is_stuck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -137,6 +138,7 @@ def test_virtual_time_waits_for_a_recorder_that_is_stuck(
     assert_whole(read(tmp_path / "a.rrd"), result)
 
 
+@pytest.mark.long
 def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,6 +159,7 @@ def test_a_recorder_that_is_stuck_for_very_long_is_given_up(
     assert f"{recorder.missing} were run but are not recorded" in stuck
 
 
+@pytest.mark.long
 def test_a_recorder_that_is_slow_is_no_hang(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01)
     go_on = Timer(1.5, lambda: os.kill(process_of(recorder), signal.SIGCONT))

@@ -71,6 +71,7 @@ def test_every_tick_is_in_one_of_the_files(tmp_path: Path) -> None:
     assert parts[2].outcome is not None and parts[2].outcome["run_hash"] == result.run_hash
 
 
+@pytest.mark.long
 def test_each_file_can_be_replayed_by_itself(tmp_path: Path) -> None:
     recorder, _ = recorded(tmp_path, split=5.0)
     for file, first in zip(recorder.files, (0, 500, 1000), strict=True):

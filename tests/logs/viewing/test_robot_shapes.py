@@ -133,6 +133,7 @@ def test_a_published_robot_takes_little_of_a_recording(name: str) -> None:
     assert bytes_ < 600_000
 
 
+@pytest.mark.long
 @needs_robots
 def test_a_recording_names_the_meshes_that_were_not_there(tmp_path: Path) -> None:
     """The run goes on, says so at its end, and its recording has the robot as capsules."""

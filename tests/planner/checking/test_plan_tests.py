@@ -59,6 +59,7 @@ def evidence(by_hand: PlannedJump) -> Evidence:
     return Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "array", "amount", "index", "where"),
     [
@@ -80,6 +81,7 @@ def test_a_shift_of_the_plan_is_the_error_that_is_found(
     assert where in test.where
 
 
+@pytest.mark.long
 def test_another_task_is_missed_by_the_difference(by_hand: PlannedJump, evidence: Evidence) -> None:
     flight_time = by_hand.touchdown_time - by_hand.lift_off_time
     tests = found(asked(by_hand, rise=0.09, distance_x=0.03, twist=0.6, flight_time=0.3))

@@ -22,6 +22,7 @@ from aloft.robots.description import find_robot
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+@pytest.mark.long
 def test_a_plans_picture(by_hand: PlannedJump, tmp_path: Path) -> None:
     robot = find_robot("bruce")
     path = write_picture(tmp_path / "a" / "p.svg", by_hand, robot)

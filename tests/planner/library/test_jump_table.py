@@ -211,6 +211,7 @@ def test_backwards_the_rate_is_positive_and_the_direction_is_not() -> None:
     assert rotation.rate.min() > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["forward_38cm", "turn_180deg", "hops_10"])
 def test_no_other_jump_has_one(name: str) -> None:
     assert flight_rotation(*table_of(name)) is None

@@ -70,6 +70,7 @@ def test_only_the_results_used_last_are_kept():
     assert kept.get(once.KEPT, lambda: -1) == once.KEPT
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("task", ["in_situ_12cm", "hops_forward_10"])
 def test_a_later_process_finds_the_very_table(task, monkeypatch):
     plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))

@@ -60,6 +60,7 @@ def test_every_formulation_of_a_task_is_there() -> None:
     assert set(FORMULATIONS) == set(names.__args__)  # type: ignore[union-attr]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("formulation", "jump"), REDUCED)
 def test_a_plan_fulfils_its_own_equations_by_pinocchio(formulation: str, jump: str) -> None:
     plan = planned(formulation, jump)

@@ -26,6 +26,7 @@ ROBOT = find_robot("bruce")
 FEW = {"squat": 4, "thrust": 6, "flight": 8, "landing": 6}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "task",
     [
@@ -55,6 +56,7 @@ print(hashlib.sha256(b"".join(getattr(plan, name).tobytes() for name in ARRAYS))
 """
 
 
+@pytest.mark.long
 def test_a_plan_does_not_depend_on_the_number_of_threads() -> None:
     found = {
         subprocess.run(
@@ -108,6 +110,7 @@ def test_a_somersault_without_angular_momentum_is_refused() -> None:
         solve_jump(task, ROBOT, solver="fatrop")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["in_situ", "forward_10cm", "back_10cm", "step_down_5cm"])
 def test_halving_the_intervals_changes_no_peak(name: str) -> None:
     task = read_task(SHIPPED.parent / "tasks" / f"{name}.yaml")

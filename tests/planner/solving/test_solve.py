@@ -168,6 +168,7 @@ def test_equations_are_independent_at_the_guess() -> None:
     assert smallest_singular_value(problem, ballistic_guess(problem)) > 1e-7
 
 
+@pytest.mark.long
 def test_a_quick_solve_aside_starts_from_the_jump_ahead_not_from_a_plan_in_the_plane() -> None:
     here = solve_jump(make_task({"recipe": "paper", "name": "here", "rise": 0.1}), ROBOT)
     aside = make_task({"recipe": "paper", "name": "aside", "rise": 0.1, "distance_y": 0.05})

@@ -109,6 +109,7 @@ def test_a_process_that_died_is_started_again(thread: None) -> None:
     assert call_bounded(solver, arguments(0.0), 20)[0]
 
 
+@pytest.mark.long
 def test_a_call_that_takes_too_long_is_given_up(thread: None) -> None:
     x = ca.SX.sym("x", 5000)  # Rosenbrock's function, in a chain: thousands of iterations
     chain = ca.sumsqr(1.0 - x[:-1]) + 100.0 * ca.sumsqr(x[1:] - x[:-1] ** 2)

@@ -114,6 +114,7 @@ def made(folder: Path, limit: float, interfere: Any = None) -> tuple[Any, Any]:
     return placed, read_parts(placed, files)
 
 
+@pytest.mark.long
 def test_recordings_of_parts_are_judged_when_they_are_merged(tmp_path: Path) -> None:
     # Half of the run, because on a busy machine parts begin some tenths of a second apart.
     quiet: Iterable[Any] = Quiet("data/far/onboard/last", 120)  # type: ignore[assignment]

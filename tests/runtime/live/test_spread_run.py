@@ -93,6 +93,7 @@ def test_before_anybody_is_heard(run: SpreadRun) -> None:
         run.set(["twice.gain=3"])
 
 
+@pytest.mark.long
 def test_the_whole_graph_with_values_and_times_of_both_parts(
     run: SpreadRun, parts: dict[str, subprocess.Popen[bytes]]
 ) -> None:
@@ -152,6 +153,7 @@ def test_a_part_of_another_graph_or_version_is_not_guessed_at(run: SpreadRun) ->
     assert found["state"] == "unheard" and found["values"] == {}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(PROGRAM is None, reason="Chromium is not installed")
 def test_the_page_marks_the_part_that_is_gone(
     run: SpreadRun, parts: dict[str, subprocess.Popen[bytes]], tmp_path: Path

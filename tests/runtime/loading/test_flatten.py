@@ -336,6 +336,7 @@ def test_flatten_raises_what_it_cannot_expand(tmp_path: Path) -> None:
         flatten(write(tmp_path, graph="rate: 1 Hz\ninclude: nowhere.yaml"))
 
 
+@pytest.mark.long
 def test_too_many_blocks_are_refused(tmp_path: Path) -> None:
     files = {"level0": "blocks: {a: {use: blocks.SineWave}}"}
     for i in range(1, 15):

@@ -103,6 +103,7 @@ def mutated(draw: st.DrawFn, text: str) -> str:
     return text
 
 
+@pytest.mark.long
 @settings(max_examples=200, deadline=None)
 @given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
 def test_mutated_files(graph: str, leg: str, more: str) -> None:

@@ -45,6 +45,7 @@ def reference() -> str:
     return run_program("0", "log")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "log"), [("0", "none"), ("1", "log"), ("random", "none")])
 def test_equal_hash_and_order_in_every_process(reference: str, seed: str, log: str) -> None:
     assert run_program(seed, log) == reference

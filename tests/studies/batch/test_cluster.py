@@ -83,6 +83,7 @@ def test_it_runs_in_a_thread_of_its_own_and_is_made_once() -> None:
     assert running_loop() is loop
 
 
+@pytest.mark.long
 def test_a_thread_that_does_not_come_to_run_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threading.Thread, "start", lambda thread: None)
     with pytest.raises(AloftError, match=r"did not run within 0.01 s: the machine is overloaded"):
