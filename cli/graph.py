@@ -206,7 +206,10 @@ def print_table(out: Console, graph: CheckedGraph) -> None:
         inputs = "\n".join(item.text() for item in row.inputs)
         offset = f" + {row.offset_ticks}" if row.offset_ticks else ""
         rate = f"{row.rate_hz:g} Hz{offset}"
-        rows.append((str(row.order), row.path, row.use, rate, row.machine, inputs))
+        machine = (
+            f"{row.machine}, in the background, {row.background}" if row.background else row.machine
+        )
+        rows.append((str(row.order), row.path, row.use, rate, machine, inputs))
     out.print(table("", (">order", "block", "is", ">rate", "machine", "inputs"), rows))
     if graph.links.paths:
         print_ages(out, graph)

@@ -95,6 +95,7 @@ def _tables(observer: Observer) -> Group:
                 f"{found['rate_hz']:.1f} of {found['base_rate_hz']:g}" if known else "",
                 str(found["overruns"]) if known else "",
                 str(found["skipped_periods"]) if known else "",
+                str(found.get("late_results", "")),
                 "" if found["silent_s"] is None else f"{found['silent_s']:.1f}",
             )
         )
@@ -118,6 +119,7 @@ def _tables(observer: Observer) -> Group:
         ">rate [Hz]",
         ">overruns",
         ">skipped",
+        ">late results",
         ">heard [s ago]",
     )
     parts = [table(observer.placed.graph.name, columns, machines)]

@@ -69,7 +69,7 @@ def twin(
             data["board"] |= {"port": server.board_path}
             data["dead_man"] = {"kind": "none"}
             if virtual:
-                data["bus"] |= {"reply_time": 5.0}
+                data["bus"] |= {"time": "virtual", "reply_time": 5.0}
             write.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
             if as_json:
                 print_json({"bus": server.bus_path, "board": server.board_path, "file": str(write)})

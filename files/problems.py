@@ -68,6 +68,7 @@ class Code(StrEnum):
     LOOP = "loop"
     RATE = "rate"
     OFFSET = "offset"
+    BACKGROUND = "background"
     DIMENSION = "dimension"
     ROBOT = "robot"
     MACHINE = "machine"

@@ -75,6 +75,7 @@ class GraphBuilder:
         rate: Any = None,
         offset: int | None = None,
         on: str | None = None,
+        background: Mapping[str, Any] | None = None,
         **parameters: Any,
     ) -> Source:
         """Add a block, or with a file's name a sub-graph. Returns the source of its outputs.
@@ -88,9 +89,8 @@ class GraphBuilder:
         if parameters:
             block["with"] = _plain(parameters)
         block["in"] = _plain(inputs or {})
-        for key, value in (("rate", rate), ("offset", offset), ("on", on)):
-            if value is not None:
-                block[key] = value
+        given = {"rate": rate, "offset": offset, "on": on, "background": background}
+        block |= {key: _plain(value) for key, value in given.items() if value is not None}
         self._blocks[name] = block
         return Source(name)
 

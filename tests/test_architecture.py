@@ -29,8 +29,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "processes", "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
     "runtime/loading": (
-        "files", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
+        "files", "runtime/background", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
     ),
+    "runtime/background": ("processes", "runtime/language", "runtime/running", "robots", "mathematics/compiling"),
     "runtime/placement": ("runtime/language", "robots"),
     "runtime/transports": ("runtime/language", "runtime/placement", "robots"),
     "runtime/links": (

@@ -35,7 +35,7 @@ class BearParameters(DriveParameters):
         0.02, unit="s", gt=0, le=1.0, text="without a command for so long the drives are damped"
     )
     graph_timeout: float = parameter(
-        0.04, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
+        0.025, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
     )
     latency: float = parameter(
         0.0, unit="s", ge=0, le=0.1, text="with virtual time: delay from sensing to the exchange"
@@ -60,8 +60,8 @@ class BearRobot(DrivenRobot):
     * in the motor thread: a drive or the board is silent, reports an error, is too hot, has too low
       a voltage; a stuck encoder, a frozen IMU, a saturated gyroscope; a second writer on the bus; a
       command older than ``command_age``; the dead man's switch let go;
-    * in a process of its own: the graph hangs for ``graph_timeout`` or has died, or a link that
-      brings commands from another machine was silent for ``links.watchdog``, by default 15 ms;
+    * in a process of its own: ``aloft robot estop`` is called; the graph hangs for ``graph_timeout`` or
+      has died, or a link that brings commands from another machine was silent for ``links.watchdog``, by default 15 ms;
     * in the drives: nothing written for the hardware's ``drives.watchdog``.
 
     It was never run on a real robot; against the twin every shipped jump was (``aloft twin``).
@@ -84,6 +84,14 @@ class BearRobot(DrivenRobot):
             yield UnmetRequirement(str(error), parameter="hardware", found=params.hardware)
             return
         yield from missing_sensors(hardware, context.robot)
+        if params.armed and params.time == "virtual" and not hardware.bus.is_virtual:
+            yield UnmetRequirement(
+                f"in virtual time nothing guards the drives at {hardware.bus.port}: only a twin may be "
+                "armed so",
+                parameter="time",
+                expected="real, or the file that `aloft twin --virtual --write` writes",
+                found="virtual",
+            )
         ratio = context.period / hardware.bus.period
         if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
             yield UnmetRequirement(
@@ -130,7 +138,9 @@ class BearRobot(DrivenRobot):
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
-                self._watchdog = DriveWatchdog(descriptor, devices, params.graph_timeout, silence)
+                self._watchdog = DriveWatchdog(
+                    descriptor, devices, params.graph_timeout, silence, hardware.bus.port
+                )
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
@@ -201,10 +211,13 @@ class BearRobot(DrivenRobot):
             self._watchdog.close()
         self._switch.close()
         if self.driver is not None:
+            self.waits_for_others = True  # no hang: it has a limit of its own
             self.driver.close()
 
     def _stop_reason(self) -> str:
         """Why the motor thread must not go on; empty if it may."""
+        if self._watchdog is not None and self._watchdog.asked:
+            return "`aloft robot estop` has damped the drives"
         if self._watchdog is not None and self._watchdog.tripped:
             limit, silence = 1e3 * self.params.graph_timeout, 1e3 * self.context.clock.command_limit
             links = f", or no commands came over the links for {silence:g} ms" if silence else ""
@@ -222,4 +235,7 @@ class BearRobot(DrivenRobot):
             time.sleep(rest)
         else:
             self._cycle -= rest
+        if self._watchdog is not None and self._watchdog.asked:
+            self._driver.loop.fail(self._stop_reason())
+            return False
         return self._switch.held()

@@ -157,12 +157,11 @@ def jog(
     reply = bus.ping(motor.id)
     if is_critical(reply.error_byte):
         raise BusError(f"drive {name}: {describe_conditions(reply.error_byte)}")
-    start = motor.sign * bus.read(motor.id, "present_position")["present_position"] - motor.offset
+    start = motor.sign * bus.read(motor.id, "present_position")["present_position"] - motor.zero
     for end in (start, start + angle):
-        if not motor.low <= end <= motor.high:
-            raise BusError(
-                f"{name} would be at {end:.3f} rad, beyond {motor.low:g} to {motor.high:g}"
-            )
+        low, high = motor.range
+        if not low <= end <= high:
+            raise BusError(f"{name} would be at {end:.3f} rad, beyond {low:g} to {high:g}")
     stiffness = current / abs(angle)  # A/rad: the whole current if it did not move at all
     bus.verify(
         motor.id,
@@ -178,12 +177,12 @@ def jog(
     bulk = BulkExchange(bus, [motor.id], ("present_position",), WRITE)
     count = max(2, math.ceil(seconds / hardware.bus.period))
     try:
-        bulk.goals[0, 1] = motor.sign * (start + motor.offset)
+        bulk.goals[0, 1] = motor.sign * (start + motor.zero)
         bulk.exchange()
         bus.write(motor.id, {"torque_enable": Torque.ON})
         for k in range(1, count + 1):
             goal = start + angle * 0.5 * (1.0 - math.cos(2.0 * math.pi * k / count))
-            bulk.goals[0, 1] = motor.sign * (goal + motor.offset)
+            bulk.goals[0, 1] = motor.sign * (goal + motor.zero)
             bulk.exchange()
             if bulk.ages.item(0) >= hardware.bus.lost_cycles:
                 raise BusError(f"drive {name} does not answer any more")
@@ -192,7 +191,7 @@ def jog(
                 raise BusError(f"drive {name}: {describe_conditions(condition)}")
             if not next_cycle():
                 raise BusError("the dead man's switch was let go")
-            yield goal, motor.sign * bulk.values.item(0) - motor.offset
+            yield goal, motor.sign * bulk.values.item(0) - motor.zero
     finally:
         for _ in range(_STOPS):
             bus.write(motor.id, {"torque_enable": Torque.DAMPING})

@@ -6,6 +6,7 @@ It belongs to one robot on one bench: its ports, addresses, directions and offse
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -17,7 +18,10 @@ from ...runtime.language.parameters import Parameters, parameter
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from .bus import BAUDRATE
 from .protocol import LAST_DEVICE
-from .sense_board import SWITCHES
+from .sense_board import MAX_COOLING, SWITCHES
+
+_TURNS = 25.0
+"""An angle that no motor of a robot reaches [rad]."""
 
 
 class HardwareError(LoadError):
@@ -43,6 +47,15 @@ class BusSettings(Parameters):
     lost_cycles: int = parameter(
         5, ge=1, le=100, text="exchanges in a row that a drive may miss before all are damped"
     )
+    time: Literal["real", "virtual"] = parameter(
+        "real",
+        text="virtual: `aloft twin --virtual` serves it, and time goes on with the exchanges",
+    )
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether the port is that of a twin in virtual time: the file says so, and it is a pseudo-terminal."""
+        return self.time == "virtual" and os.path.realpath(self.port).startswith("/dev/pts/")
 
 
 class BoardSettings(Parameters):
@@ -66,7 +79,17 @@ class BoardSettings(Parameters):
         8.726, unit="rad/s", gt=0, text="the gyroscope saturates here: 500 deg/s as shipped"
     )
     saturated_packets: int = parameter(
-        100, ge=1, le=10000, text="packets in a row at the gyroscope's range before all are damped"
+        25, ge=1, le=10000, text="packets in a row at the gyroscope's range before all are damped"
+    )
+
+    cooling: int = parameter(
+        5, ge=0, le=MAX_COOLING, text="strength of pump and fan while the drives are armed"
+    )
+    cool_down: float = parameter(
+        60.0, unit="s", ge=0, le=600.0, text="for how long they go on at most after the end"
+    )
+    cooled: float = parameter(
+        45.0, ge=0, le=125.0, text="hottest winding [deg C] at which they go off after the end"
     )
 
     def mounted(self, robot: RobotDescription) -> tuple[MountedSensor, ...]:
@@ -94,7 +117,7 @@ class DriveSettings(Parameters):
         text="exchanges in a row with a voltage or temperature out of range before all are damped",
     )
     stuck_cycles: int = parameter(
-        50,
+        25,
         ge=2,
         le=1000,
         text="equal positions in a row, under current and while others move, of a stuck encoder",
@@ -106,7 +129,7 @@ class DriveSettings(Parameters):
         [0.277, 0.061, 0.0], min_length=3, max_length=3, text="gains of the current loops, P I D"
     )
     watchdog: float = parameter(
-        0.1, unit="s", ge=0, le=10.0, text="register watchdog_timeout; zero: off"
+        0.025, unit="s", ge=0, le=10.0, text="register watchdog_timeout; zero: off"
     )
     lowest_voltage: float = parameter(13.0, unit="V", gt=0, text="below it all drives are damped")
     highest_voltage: float = parameter(18.0, unit="V", gt=0, text="above it nothing is enabled")
@@ -120,9 +143,22 @@ class MotorSettings(Parameters):
 
     id: int = parameter(..., ge=0, le=LAST_DEVICE, text="its address on the bus")
     sign: Literal[1, -1] = parameter(1, text="1 if the drive turns as the description's motor does")
-    offset: float = parameter(0.0, unit="rad", text="sign * present_position at the zero pose")
-    low: float = parameter(-25.0, unit="rad", text="lowest angle the drive may have")
-    high: float = parameter(25.0, unit="rad", text="highest angle the drive may have")
+    offset: float | None = parameter(
+        None, unit="rad", text="sign * present_position at the zero pose; none: not calibrated"
+    )
+    low: float | None = parameter(None, unit="rad", text="lowest angle the drive may have")
+    high: float | None = parameter(None, unit="rad", text="highest angle the drive may have")
+
+    @property
+    def zero(self) -> float:
+        """The offset [rad]; zero before it was calibrated."""
+        return self.offset or 0.0
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The lowest and the highest angle [rad]; the drive's own before they were measured."""
+        low, high = self.low, self.high
+        return -_TURNS if low is None else low, _TURNS if high is None else high
 
 
 class SoftStart(Parameters):
@@ -137,6 +173,10 @@ class SoftStart(Parameters):
     current: float = parameter(
         8.0, unit="A", gt=0, text="the current's limit meanwhile, at the end of its ramp"
     )
+    ramp: float = parameter(
+        0.2, unit="s", ge=0, le=10.0,
+        text="from the first command on the limit rises so long from there to the drives' own",
+    )  # fmt: skip
 
 
 class DeadMan(Parameters):
@@ -198,8 +238,9 @@ class Hardware(Parameters):
                         expected="an address of its own",
                     )
                 )
-            if motor.low >= motor.high:
-                text = f"{name}: low {motor.low:g} is not below high {motor.high:g}"
+            low, high = motor.range
+            if low >= high:
+                text = f"{name}: low {low:g} is not below high {high:g}"
                 found.append(UnmetRequirement(text, f"motors.{name}.low"))
         drives = self.drives
         if drives.current_margin >= drives.current_limit:
@@ -211,6 +252,24 @@ class Hardware(Parameters):
         if robot is not None:
             found += self._faults_with(robot)
         return found
+
+    def missing_calibration(self) -> list[str]:
+        """What a motor lacks before the drives may be switched on, with the step that finds it."""
+        motors = self.motors.items()
+        parts = (
+            ("an `offset`", "step 3", [name for name, motor in motors if motor.offset is None]),
+            (
+                "`low` and `high`",
+                "step 4",
+                [n for n, m in motors if m.low is None or m.high is None],
+            ),
+        )
+        return [
+            f"{'no motor has' if len(names) == len(motors) else f'{listing(names)}: not calibrated,'} "
+            f"{what}: do {step} of docs/bring_up.md"
+            for what, step, names in parts
+            if names
+        ]
 
     def _faults_with(self, robot: RobotDescription) -> list[UnmetRequirement]:
         found: list[UnmetRequirement] = []
@@ -270,7 +329,10 @@ class Hardware(Parameters):
                     "torque_constant": float(robot.motors.peak_torque.max()) / 30.0,
                     "current_limit": 30.5,
                 },
-                "motors": {name: {"id": k + 1} for k, name in enumerate(robot.transmission.motors)},
+                "motors": {
+                    name: {"id": k + 1, "offset": 0.0, "low": -_TURNS, "high": _TURNS}
+                    for k, name in enumerate(robot.transmission.motors)
+                },
                 "soft_start": {"duration": 0.3},
                 "dead_man": {"kind": "none"},
             }

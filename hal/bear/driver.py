@@ -8,7 +8,9 @@ the rate of the bus, or the graph itself where the robot is a twin in virtual ti
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 import numpy as np
 
@@ -178,6 +180,7 @@ def enable(loop: MotorLoop, names: tuple[str, ...]) -> None:
     for name in names:
         bus.write(hardware.motors[name].id, {"torque_enable": Torque.ON})
     for name in names:
+        loop.repeat_goals()  # the drives' watchdogs run from here on
         device = hardware.motors[name].id
         if bus.read(device, "torque_enable")["torque_enable"] != Torque.ON:
             off.append(f"{name}: {bus.ping(device).problem or 'it does not say why'}")
@@ -219,6 +222,8 @@ def soft_start(loop: MotorLoop, standing: Array, next_cycle: Callable[[], bool])
 
 STOP_CYCLES = 5
 """How often damping is commanded at least, since an instruction may be lost."""
+_LOOK = 0.1
+"""The time between two looks at the windings that cool down [s]."""
 _BOARD_CYCLES = 1000
 """The exchanges within which the sensor board must have sent something."""
 
@@ -231,6 +236,9 @@ class Driver:
         hardware: how they are connected and what they may do.
         bus_port, board_port: open serial ports.
         law: the drives' gains, and how commands become their goals.
+
+    Attributes:
+        cooling: the strength of pump and fan that the board was told.
     """
 
     def __init__(
@@ -246,6 +254,7 @@ class Driver:
             dict(zip(names, law.motor_damping.tolist(), strict=True)),
         )
         self.loop = MotorLoop(robot, hardware, self.bus, self.board, law.goals, law.motor_stiffness)
+        self.cooling = 0
         self._standing = np.zeros(len(names))
         TransmissionMap(robot).motor_motion(robot.standing_position, self._standing)
 
@@ -267,14 +276,21 @@ class Driver:
     def arm(self, next_cycle: Callable[[], bool]) -> None:
         """Clear errors, configure, enable, and go to the standing pose; then the drives hold it.
 
+        The board is told to cool from here on.
+
         Args:
             next_cycle: waits for the next cycle, and says whether to go on.
 
         Raises:
             BusError: the text says which drive does not do what; nothing is left switched on.
         """
+        missing = self.hardware.missing_calibration()
+        if missing:
+            raise BusError(f"the drives are not enabled: {'; '.join(missing)}")
         try:
             # From here on a drive may be on, so whatever goes wrong ends in damping.
+            self.cooling = self.hardware.board.cooling
+            self.board.send(BoardMode.NOMINAL, self.cooling)
             clear_errors(self.bus, self.hardware)
             configure(self.bus, self.hardware, *self._gains)
             self.loop.cycle()
@@ -294,9 +310,26 @@ class Driver:
         for _ in range(cycles):
             self.loop.cycle()
 
+    def _cool_down(self) -> None:
+        """Wait until the windings have cooled, then switch pump and fan off."""
+        board, loop = self.hardware.board, self.loop
+        if not self.cooling:
+            return
+        end = time.monotonic() + board.cool_down
+        try:
+            while loop.measured.temperature.max() > board.cooled and time.monotonic() < end:
+                loop.cycle()
+                if loop.link_lost:
+                    break
+                time.sleep(_LOOK)
+        finally:
+            self.cooling = 0
+            with suppress(OSError):  # its cable was pulled
+                self.board.send(BoardMode.NOMINAL)
+
     def close(self) -> None:
-        """Give the ports back, with the drives in damping if they were on."""
-        for close in (self.bus.close, self.board.port.close):
+        """Cool down, and give the ports back, with the drives in damping if they were on."""
+        for close in (self._cool_down, self.bus.close, self.board.port.close):
             try:
                 close()
             except OSError:

@@ -52,7 +52,7 @@ class Measurement:
         n = len(robot.joints)
         motors = [hardware.motors[name] for name in robot.transmission.motors]
         self.sign = np.array([float(motor.sign) for motor in motors])
-        self.offset = np.array([motor.offset for motor in motors])
+        self.offset = np.array([motor.zero for motor in motors])
         self.torque_constant = hardware.drives.torque_constant
         self.position, self.velocity, self.current = (np.zeros(n) for _ in range(3))
         self.voltage, self.temperature, self._torque = (np.zeros(n) for _ in range(3))

@@ -48,12 +48,14 @@ class MotorLoop:
         phase: what the drives do.
         command: what DRIVING follows.
         target: the motor angles of STARTING and HOLDING [rad], (n_joints,).
-        current_limit: the current [A] that STARTING may use.
+        current_limit: the current [A] that may be used: little in STARTING, and with the first
+            command it rises to that of the drives.
         fault: the first fault; empty where there was none.
         cycles: how many there were.
         late_cycles: how many of them began too late.
         lost_answers: how many answers were lost or damaged.
-        link_lost: whether the port has failed, so that nothing can be sent any more.
+        link_lost: whether the drives' port has failed, so that nothing can be sent any more.
+        board_lost: whether the board's port has failed.
         clock: the time since the driver was opened [s]; by default that of the exchanges.
         stamp: when something was measured last, by this clock.
     """
@@ -77,7 +79,7 @@ class MotorLoop:
         self.phase = DrivePhase.OFF
         self.fault = ""
         self.cycles = self.late_cycles = 0
-        self.link_lost = False
+        self.link_lost = self.board_lost = False
         self.clock: Callable[[], float] = lambda: self.cycles * hardware.bus.period
         self.stamp = 0.0
         self.lock = Lock()
@@ -89,6 +91,9 @@ class MotorLoop:
         drives = hardware.drives
         self.current_limit = drives.current_limit
         self._highest_current = drives.current_limit - drives.current_margin
+        soft = hardware.soft_start
+        ramp = max(1, round(soft.ramp / hardware.bus.period))
+        self._rise = max(0.0, self._highest_current - soft.current) / ramp
         self._stiffness = np.maximum(motor_stiffness, 1e-9)
         self._watch = BulkExchange(bus, devices, READ, ())
         self._drive = BulkExchange(bus, devices, READ, WRITE)
@@ -99,8 +104,8 @@ class MotorLoop:
             exchange.largest_step[0] = LARGEST_STEP + FASTEST * hardware.bus.period
         self._released = JointCommand.allocate(robot.dimensions)
         self._reach, self._scratch = np.zeros(n), np.zeros(n)
-        self._low = np.array([hardware.motors[name].low for name in names])
-        self._high = np.array([hardware.motors[name].high for name in names])
+        ranges = np.array([hardware.motors[name].range for name in names])
+        self._low, self._high = ranges[:, 0].copy(), ranges[:, 1].copy()
         self._last = self._watch
 
     def cycle(self) -> int:
@@ -116,7 +121,6 @@ class MotorLoop:
                 bulk = self._prepare()
                 self._switch_to(bulk)
             answered = bulk.exchange()
-            fresh = self.board.poll()
         except BusError as error:
             self.fail(str(error))
             return 0
@@ -127,6 +131,7 @@ class MotorLoop:
                 "watchdog"
             )
             return 0
+        fresh = self._poll_board()
         with self.lock:
             self.lost_answers += len(bulk.ages) - answered
             self.measured.take_drives(bulk)
@@ -140,6 +145,17 @@ class MotorLoop:
         if fault and driving:
             self.fail(fault)
         return answered
+
+    def _poll_board(self) -> int:
+        """The number of new packets of the board. Its port is not the drives': without it they are damped."""
+        if self.board_lost:
+            return 0
+        try:
+            return self.board.poll()
+        except Exception as error:  # noqa: BLE001  # whatever a serial port raises
+            self.board_lost = True
+            self.fail(f"the port of the sensor board failed ({type(error).__name__}: {error})")
+            return 0
 
     def follow(self, command: JointCommand) -> None:
         """From the next cycle on follow this command, if the drives are on."""
@@ -164,6 +180,10 @@ class MotorLoop:
         self._drive.exchange()
         self.measured.take_drives(self._drive)
 
+    def repeat_goals(self) -> None:
+        """Send the same goals again."""
+        self._drive.exchange()
+
     def report(self, health: RobotHealth) -> None:
         """Write how everything is."""
         measured, bulk, period = self.measured, self._last, self.hardware.bus.period
@@ -187,7 +207,7 @@ class MotorLoop:
         """What changes in a run: objects, and the names of their attributes."""
         found: list[tuple[object, tuple[str, ...]]] = [
             (self, ("phase", "cycles", "late_cycles", "lost_answers", "target", "current_limit",
-                    "link_lost", "stamp", "exchange_in_use")),
+                    "link_lost", "board_lost", "stamp", "exchange_in_use")),
             (self.supervision, ("low", "hot", "still", "last", "moved", "numbers", "frozen",
                                 "saturated", "imu_silent", "imu_valid")),
             *self.measured.parts(),
@@ -239,6 +259,8 @@ class MotorLoop:
                 self.command if active else self._released, measured.position, measured.velocity,
                 measured.joint_position, measured.joint_velocity,
             )  # fmt: skip
+            if self.current_limit < self._highest_current:
+                self._limit_current()
         else:
             self._approach()
         self._fill(self.goals.position)
@@ -253,6 +275,25 @@ class MotorLoop:
         np.maximum(self.goals.position, self._scratch, out=self.goals.position)
         np.add(measured.position, self._reach, out=self._scratch)
         np.minimum(self.goals.position, self._scratch, out=self.goals.position)
+
+    def _limit_current(self) -> None:
+        """Keep the torques within a limit that rises from that of the soft start.
+
+        The drives add their own feedback to a goal, so the two together are limited.
+        """
+        self.current_limit = min(self._highest_current, self.current_limit + self._rise)
+        goals, measured, gears = self.goals, self.measured, self.goals.gears
+        largest = self.current_limit * measured.torque_constant
+        feedback, scratch = self._reach, self._scratch
+        np.subtract(goals.position, measured.position, out=feedback)
+        np.multiply(feedback, gears.motor_stiffness, out=feedback)
+        np.subtract(goals.velocity, measured.velocity, out=scratch)
+        np.multiply(scratch, gears.motor_damping, out=scratch)
+        np.add(feedback, scratch, out=feedback)
+        np.add(goals.torque, feedback, out=scratch)
+        np.minimum(scratch, largest, out=scratch)
+        np.maximum(scratch, -largest, out=scratch)
+        np.subtract(scratch, feedback, out=goals.torque)
 
     def _fill(self, position: Array) -> None:
         """The goals in the drives' units and directions, clamped to what they do not ignore."""

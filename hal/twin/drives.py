@@ -61,7 +61,7 @@ class EmulatedDrives:
         settings = [hardware.motors[name] for name in robot.transmission.motors]
         self.sign = np.array([float(motor.sign) for motor in settings])
         """1 where a drive turns as the description's motor does, -1 where it does not."""
-        self._offset = np.array([motor.offset for motor in settings])
+        self._offset = np.array([motor.zero for motor in settings])
         self._constant = hardware.drives.torque_constant
         self._braking = braking
         self.current = np.zeros(n)

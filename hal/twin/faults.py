@@ -14,7 +14,7 @@ from ...runtime.language.parameters import Parameters, parameter
 
 Kind = Literal[
     "lost", "truncated", "corrupted", "late", "corrupted_request", "dead", "stuck_encoder", "low_voltage",
-    "hot", "second_writer", "pulled_cable", "silent_board", "frozen_imu", "saturated_gyro", "stuck_switch",
+    "hot", "second_writer", "pulled_cable", "pulled_board", "silent_board", "frozen_imu", "saturated_gyro", "stuck_switch",
     "open_switch", "bouncing_switch",
 ]  # fmt: skip
 

@@ -128,6 +128,7 @@ class TwinServer:
         self._bus = PseudoTerminal(self._to_bus)
         self.bus_path, self.board_path = self._bus.path, self._board.path
         self.behind = 0.0
+        self._pulled: list[PseudoTerminal] = []
         self._clock: threading.Thread | None = None
         if not virtual:
             self._clock = threading.Thread(target=self._run, name="twin's clock", daemon=True)
@@ -170,7 +171,7 @@ class TwinServer:
                 try:
                     answer = self.twin.write_bus(instruction)
                 except PulledCableError:
-                    self._pull()
+                    self._pull(self._bus)
                     return b""
                 self._send_packets()
                 answers += answer
@@ -199,13 +200,19 @@ class TwinServer:
             del pending[:end]
 
     def _send_packets(self) -> None:
-        packets = self.twin.read_board()
+        try:
+            packets = self.twin.read_board()
+        except PulledCableError:
+            self._pull(self._board)
+            return
         if packets:
             self._board.send(packets)
 
-    def _pull(self) -> None:
-        """The cable of the drives is pulled: their port is gone, from a thread of its own."""
-        threading.Thread(target=self._bus.close, daemon=True).start()
+    def _pull(self, terminal: PseudoTerminal) -> None:
+        """A cable is pulled: its port is gone, from a thread of its own."""
+        if terminal not in self._pulled:
+            self._pulled.append(terminal)
+            threading.Thread(target=terminal.close, daemon=True).start()
 
     def _run(self) -> None:
         following = time.monotonic()

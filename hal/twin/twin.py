@@ -180,7 +180,13 @@ class Twin:
         return data
 
     def read_board(self) -> bytes:
-        """What the sensor board has sent since it was read last."""
+        """What the sensor board has sent since it was read last.
+
+        Raises:
+            PulledCableError: its cable is pulled.
+        """
+        if self.faults.active("pulled_board"):
+            raise PulledCableError("the cable of the sensor board is pulled")
         data, self._to_board = self._to_board, b""
         return data
 

@@ -33,6 +33,7 @@ from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
 from ..file.surroundings import digests, files_read, named_file, other_files, unpacked
+from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
 _ROBOT = re.compile(r"^robot: .*$", re.MULTILINE)
@@ -205,6 +206,11 @@ class OpenedRun:
     def changes(self) -> Sequence[ParameterChange]:
         """The parameters that were changed during the run."""
         return self.file.parameter_changes
+
+    @property
+    def late(self) -> Sequence[str]:
+        """The background blocks of which a result was late."""
+        return late_blocks(self.file.notes)
 
     @property
     def failed(self) -> bool:

@@ -3,7 +3,8 @@
 There are three kinds of replay. They differ in the blocks that run; the outputs of all other blocks
 are fed from the recording:
 
-* all blocks run: a simulation repeats itself from its seed;
+* all blocks run: a simulation repeats itself from its seed. A background block whose results came
+  late in real time does not run: its outputs do not follow from its inputs alone;
 * all blocks run except those whose outputs come from outside the graph: the run of a real robot is
   repeated on its recorded sensor readings;
 * only some changed blocks run. This shows what they would have done in the recorded situation; their
@@ -13,7 +14,7 @@ are fed from the recording:
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -30,7 +31,7 @@ from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
 from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import Sink
+from ...runtime.running.sinks import Note, Sink
 
 
 class Replayable(Protocol):
@@ -43,6 +44,7 @@ class Replayable(Protocol):
         keyframes: ticks before which everything the graph remembers was kept, increasing.
         changes: parameters changed while it ran, in order.
         failed: whether a block failed in the tick after the last row.
+        late: the background blocks of which a result was late.
     """
 
     @property
@@ -59,6 +61,8 @@ class Replayable(Protocol):
     def changes(self) -> Sequence[ParameterChange]: ...
     @property
     def failed(self) -> bool: ...
+    @property
+    def late(self) -> Sequence[str]: ...
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
         """The recorded ticks from ``first`` up to, without, ``last``, and their rows."""
@@ -79,6 +83,7 @@ class KeptRun:
     snapshots: dict[int, Snapshot]
     changes: tuple[ParameterChange, ...] = ()
     failed: bool = False
+    late: Sequence[str] = ()
 
     @classmethod
     def of(cls, result: RunResult, keyframes: Keyframes) -> KeptRun:
@@ -90,6 +95,7 @@ class KeptRun:
             np.array(result.log.ticks, np.int64), result.log.rows(), keyframes.snapshots,
             result.parameter_changes,
             result.error is not None and result.error.tick not in result.log.ticks[-1:],
+            late_blocks(result.log.notes),
         )  # fmt: skip
 
     @property
@@ -129,6 +135,11 @@ class Keyframes:
 
     def close(self) -> None:
         """Nothing to do."""
+
+
+def late_blocks(notes: Iterable[Note]) -> tuple[str, ...]:
+    """The background blocks of which a result was late, by the notes of a run."""
+    return tuple(dict.fromkeys(str(note.data["block"]) for note in notes if note.kind == "late"))
 
 
 def nearest_keyframe(recorded: Replayable, tick: int) -> int | None:
@@ -240,7 +251,7 @@ def replay(
     graph = graph or recorded.graph
     if not len(recorded.ticks):
         raise ReplayError("the recording holds no tick")
-    fed = _fed(graph, inputs or default_inputs(graph), run)
+    fed = _fed(graph, inputs or default_inputs(graph), run, recorded.late)
     start = _start(recorded, first_tick)
     end = int(recorded.ticks[-1]) + 1
     if last_tick is not None:
@@ -273,7 +284,9 @@ def default_inputs(graph: CheckedGraph) -> Inputs:
     return "recorded" if real else "seed"
 
 
-def _fed(graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None) -> list[str]:
+def _fed(
+    graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None, late: Sequence[str]
+) -> list[str]:
     """The blocks that do not run."""
     paths = [spec.path for spec in graph.blocks]
     if run is not None:
@@ -281,9 +294,12 @@ def _fed(graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None) -> list
             if path not in paths:
                 raise ReplayError(f"there is no block {path!r}; there is {', '.join(paths)}")
         return [path for path in paths if path not in run]
-    if inputs == "seed":
-        return []
-    return [spec.path for spec in graph.blocks if spec.block_type.outside != "no"]
+    recorded = inputs == "recorded"
+    return [
+        spec.path
+        for spec in graph.blocks
+        if spec.path in late or (recorded and spec.block_type.outside != "no")
+    ]
 
 
 def _start(recorded: Replayable, first_tick: int | None) -> int:
@@ -377,6 +393,7 @@ class Follower:
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""
         if self._first > 0:  # at the beginning blocks are as they start
+            self._change_parameters(self._first)  # before: runs under way had those of their ticks
             self._restore(self._recorded.keyframe(self._first))
         self._prepare(self._first)
 
@@ -406,13 +423,21 @@ class Follower:
         ticks, rows = zip(*self._kept, strict=True)
         return np.concatenate(ticks), np.concatenate(rows)
 
-    def _prepare(self, tick: int) -> None:
+    def _change_parameters(self, tick: int) -> None:
+        """Make the recorded changes up to a tick, each in its own."""
+        clock, parameters = self._bound.clock, self._bound.parameters
+        present = clock.tick
         while self._changes and self._changes[0].tick <= tick:
             change = self._changes.pop(0)
             block = self._bound.blocks.get(change.path.partition(".")[0])
             if block is not None and not isinstance(block, PlaybackBlock):
-                parameters = self._bound.parameters
-                parameters.apply(adjust(self._bound.blocks, {change.path: change.new}), tick)
+                clock.tick = change.tick
+                adjustment = adjust(self._bound.blocks, {change.path: change.new})
+                parameters.apply(adjustment, change.tick)
+        clock.tick = present
+
+    def _prepare(self, tick: int) -> None:
+        self._change_parameters(tick)
         if self._feed.paths:
             row = self._cursor.at(tick)
             if row is not None:

@@ -134,7 +134,7 @@ def _block(row: BlockRow, title: str, machine: str) -> DiagramNode:
     return DiagramNode(
         row.path,
         title,
-        row.use,
+        f"{row.use}, {row.background} behind" if row.background else row.use,
         row.rate_hz,
         row.machine == "Moore",
         machine,

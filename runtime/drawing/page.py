@@ -254,11 +254,12 @@ def details(graph: CheckedGraph) -> dict[str, dict[str, Any]]:
 def _of(row: BlockRow, spec: BlockSpec) -> dict[str, Any]:
     reference = block_reference(row.use, spec.block_type)
     values = spec.params.model_dump(mode="json")
-    offset = f", from tick {row.offset_ticks}" if row.offset_ticks else ""
+    when = f", from tick {row.offset_ticks}" if row.offset_ticks else ""
+    when += f", in the background with a latency of {row.background}" if row.background else ""
     return {
         "use": row.use,
         "place": str(spec.where) if spec.where is not None else "",
-        "rate": f"{row.rate_hz:g} Hz{offset}",
+        "rate": f"{row.rate_hz:g} Hz{when}",
         "order": row.order,
         "machine": spec.machine,
         "summary": reference.summary,

@@ -171,7 +171,10 @@ class Block:
     is run again; the real world (a robot, another machine) does not, so a replay takes its outputs
     from the recording."""
 
-    waits_for_others: ClassVar[bool] = False
+    delay_runs: ClassVar[int] = 1
+    """After how many runs the outputs of a Moore block depend on what it reads."""
+
+    waits_for_others: bool = False
     """Whether a call waits for another process, with a limit of its own. Then the watchdog, which
     ends the run when a call takes longer than ``clock.hangs_after``, does not watch the block."""
 

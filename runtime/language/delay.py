@@ -116,13 +116,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
         raise ValueError(f"a delay is at least 1 run, not {k}")
     if (signal, k) in _TYPES:
         return _TYPES[signal, k]
-    entries = {
-        name: Field((k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text)
-        for name, field in signal.fields.items()
-    }
-    past = type(
-        f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
-    )
+    past = ring_signal(signal, k)
     kind = type(
         f"WireDelay{signal.__name__}{k}",
         (WireDelay,),
@@ -131,7 +125,19 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
             "u": Input(signal, text="what is delayed"),
             "y": Output(signal, text=f"the input {k} runs ago"),
             "past": State(past, text="the last inputs"),
+            "delay_runs": k,
         },
     )
     _TYPES[signal, k] = kind
     return kind
+
+
+def ring_signal(signal: type[Signal], k: int) -> type[Signal]:
+    """A signal with room for ``k`` values of every field of ``signal``."""
+    entries = {
+        name: Field((k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text)
+        for name, field in signal.fields.items()
+    }
+    return type(
+        f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
+    )

@@ -54,7 +54,7 @@ class StatusPublisher:
         self._receivers = receivers
         self._ended = threading.Event()
         self._tick = -1
-        self._overruns = self._skipped = 0
+        self._overruns = self._skipped = self._late = 0
         self._shown = 0
         self._fresh = False
 
@@ -79,10 +79,12 @@ class StatusPublisher:
             self._fresh = True
 
     def note(self, note: Note) -> None:
-        """Count overruns."""
+        """Count overruns and late results of background blocks."""
         if note.kind == "overrun":
             self._overruns += 1
             self._skipped = int(note.data.get("skipped_periods", 0))
+        elif note.kind == "late":
+            self._late += 1
 
     def close(self) -> None:
         """End showing."""
@@ -100,6 +102,7 @@ class StatusPublisher:
             "base_rate_hz": self._rate,
             "overruns": self._overruns,
             "skipped_periods": self._skipped,
+            "late_results": self._late,
             "phase": peers.phase.name.lower(),
             "links": [link_status(box) for box in self._receivers],
             "clocks": {

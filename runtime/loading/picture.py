@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from itertools import cycle
 from typing import Any
 
+from ..background.background_block import BackgroundBlock
 from ..language.block import Block
 from ..language.delay import WireDelay
 from ..language.quantities import Quantity
@@ -66,6 +67,8 @@ class BlockRow:
     """The outputs with their signals: ``imu: ImuReading``."""
     on: str = ""
     """The machine that runs the block, in a graph that names machines."""
+    background: str = ""
+    """After how long outputs appear, of a block that works in the background: ``60 ms``."""
 
 
 def table(graph: CheckedGraph) -> tuple[BlockRow, ...]:
@@ -102,7 +105,15 @@ def _row(
         tuple(_input(graph, specs, spec, name) for name in block_type.inputs),
         tuple(f"{name}: {port.signal.__name__}" for name, port in block_type.outputs.items()),
         spec.machine,
+        _latency(graph, spec),
     )
+
+
+def _latency(graph: CheckedGraph, spec: BlockSpec) -> str:
+    if not issubclass(spec.block_type, BackgroundBlock):
+        return ""
+    ticks = spec.block_type.delay_runs * spec.period_ticks
+    return f"{ticks * graph.base_period * 1e3:.9g} ms"
 
 
 def _use(block_type: type[Block]) -> str:
@@ -221,6 +232,8 @@ def _nodes(
             boxes.setdefault(first, []).append(spec)
             continue
         label = f"{first}<br/>{_use(spec.block_type)}<br/>{_hertz(graph, spec)}"
+        latency = _latency(graph, spec)
+        label += f"<br/>in the background, {latency}" if latency else ""
         label += f"<br/>on {spec.machine}" if spec.machine else ""
         left, right = ('(["', '"])') if spec.block_type.is_moore() else ('["', '"]')
         lines.append(f"{indent}{names[spec.path]}{left}{label}{right}")

@@ -18,7 +18,6 @@ from math import lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from ..language.delay import WireDelay
 from ..language.schedule import runs_at
 from ..language.stages import BlockSpec, CheckedGraph
 from .placed import PlacementError
@@ -39,7 +38,7 @@ class _SampleTimes:
         self.output: dict[str, Instant] = {}
         self.ran: dict[str, float] = {}
         self.kept: dict[str, deque[Instant]] = {
-            spec.path: deque([None] * depth(spec), maxlen=depth(spec))
+            spec.path: deque([None] * spec.block_type.delay_runs, maxlen=spec.block_type.delay_runs)
             for spec in graph.blocks
             if spec.block_type.is_moore()
         }
@@ -80,14 +79,6 @@ class _SampleTimes:
         return None if limit is None else now - limit - (self.ran[source] - time)
 
 
-def depth(spec: BlockSpec) -> int:
-    """After how many runs of a Moore block its output depends on an input."""
-    if not issubclass(spec.block_type, WireDelay):
-        return 1
-    entries = next(iter(spec.block_type.states["past"].signal.fields.values()))
-    return int(entries.shape[0])
-
-
 def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
     """The largest age [s] of the newest sample of ``source`` at ``target``.
 
@@ -117,7 +108,7 @@ def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
             raise PlacementError(f"there is no wired {kind} {end!r}{there}")
     reader = specs[target.rpartition(".")[0]]
     pattern = lcm(*(spec.period_ticks for spec in graph.blocks))
-    settling = sum(spec.period_ticks * (1 + depth(spec)) for spec in graph.blocks)
+    settling = sum(spec.period_ticks * (1 + spec.block_type.delay_runs) for spec in graph.blocks)
     if pattern + settling > LONGEST:
         raise PlacementError(
             f"the age of {source} at {target} would need {pattern + settling} ticks to compute; at "
@@ -181,7 +172,7 @@ class _PartSamples:
         order = dict.fromkeys([*graph.order, *self.specs])
         self.own = [self.specs[p] for p in order if machine in (None, self.specs[p].machine)]
         self.kept: dict[str, deque[SampleTime]] = {
-            spec.path: deque([None] * depth(spec), maxlen=depth(spec))
+            spec.path: deque([None] * spec.block_type.delay_runs, maxlen=spec.block_type.delay_runs)
             for spec in self.own
             if spec.block_type.is_moore()
         }

@@ -26,7 +26,7 @@ from .real_time import NO_REAL_TIME, RealTimeOptions
 from .run_result import RunResult, SupportsAbandoned, SupportsResult, merge_metrics
 from .sinks import MemoryLog, Note, RunHash, Sink, SupportsMetrics, SupportsNotes
 from .ticker import SupportsTicker, Ticker, hang_text
-from .timing import block_times
+from .timing import BlockTimes, SupportsTimes, block_times
 from .watchdog import Interrupts, Watchdog
 
 
@@ -220,9 +220,9 @@ class Executor:
                 self.ticker.notes.append(sink.note)
         if self._fuse:  # once the freeze guard has said where the block that runs is written
             self.ticker.fuse()
-        for sink in self._sinks:
-            if isinstance(sink, SupportsTicker):
-                sink.watch_ticker(self.ticker)
+        for each in (*self._sinks, *self.bound.blocks.values()):
+            if isinstance(each, SupportsTicker):
+                each.watch_ticker(self.ticker)
 
     def _close_sinks(self) -> list[str]:
         problems = []
@@ -302,10 +302,7 @@ class Executor:
             wall_time_s=wall_time,
             run_hash=self._hash.hexdigest() if self._hash is not None else "",
             metrics=metrics,
-            blocks={
-                path: block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
-                for path in self.bound.graph.order
-            },
+            blocks={path: self._times_of(path) for path in self.bound.graph.order},
             overruns=pacer.overruns if pacer is not None else 0,
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
             error=error,
@@ -315,6 +312,12 @@ class Executor:
             log=self._log,
             graph=self.bound.graph,
         )
+
+    def _times_of(self, path: str) -> BlockTimes:
+        block = self.bound.blocks[path]
+        if isinstance(block, SupportsTimes):
+            return block.times()
+        return block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
 
     def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:
         """What a score says, with why another block ended the run; a score knows its own reason."""

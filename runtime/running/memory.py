@@ -186,15 +186,19 @@ class Memory:
 class BoundGraph:
     """A checked graph with its memory and its block instances, set up and ready to start.
 
+    Args:
+        graph: the graph.
+        clock: its clock; by default a new one.
+
     Raises:
         RunError: a block's constructor or ``setup`` failed; it names the block.
     """
 
     clock_type: type[Clock] = Clock
 
-    def __init__(self, graph: CheckedGraph) -> None:
+    def __init__(self, graph: CheckedGraph, clock: Clock | None = None) -> None:
         self.graph = graph
-        self.clock = self.clock_type(graph.base_period)
+        self.clock = clock or self.clock_type(graph.base_period)
         self.memory = Memory(graph.blocks, graph.robot)
         self.running: NDArray[np.int64] = np.full(1, -1)
         """The place in the order of the block that runs in a chain, (1,); see ``chain``."""

@@ -21,8 +21,9 @@ class Note:
     """An event of a run at ``tick``, before that tick ran, which the runtime gives to all recorders.
 
     The runtime writes the kinds ``life`` (a change of the life cycle), ``overrun`` (a late tick),
-    ``fault`` (the error that ended a run early), ``warning`` (a block's warning to those who read the
-    result) and ``parameter`` (a live change). Recorders add ``dropped`` (ticks that were not kept).
+    ``late`` (a result of a background block that was due and not there), ``fault`` (the error that
+    ended a run early), ``warning`` (a block's warning to those who read the result) and ``parameter``
+    (a live change). Recorders add ``dropped`` (ticks that were not kept).
 
     Attributes:
         kind: a word to search for.

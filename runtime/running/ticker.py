@@ -42,7 +42,9 @@ class Ticker:
         records: called with the tick after each tick, also after one with a value that is not
             finite.
         notes: called with every note: of overruns, and those given to ``tell``.
-        overruns_by_block: for each block, the number of deadlines that passed while it ran.
+        overruns_by_block: for each block, the number of deadlines that passed while it ran, and
+            of results that were late.
+        policy: how the run is paced.
     """
 
     def __init__(
@@ -59,7 +61,7 @@ class Ticker:
         self.notes: list[Callable[[Note], None]] = []
         self.overruns_by_block = dict.fromkeys(bound.blocks, 0)
         self.pacer = make_pacer(clock, bound, time_source)
-        self._policy = clock
+        self.policy = clock
         self._now = time_source.now
         self._timing = timing
         self._fused = False
@@ -213,7 +215,7 @@ class Ticker:
         if isinstance(owner, Block) or not isinstance(error, NotFiniteError):
             who = f"block '{block}'" if block else f"the runtime ({type(owner).__name__})"
             if isinstance(error, Hang):
-                text = hang_text(who, self.instant(tick), self._policy.hangs_after)
+                text = hang_text(who, self.instant(tick), self.policy.hangs_after)
                 return RunError(text, block=block, tick=tick)
             text = f"{who} failed at {self.instant(tick)}: {describe(error)}"
             if isinstance(error, ValueError) and "read-only" in str(error):
@@ -251,7 +253,7 @@ class Ticker:
             data = {"late_ns": late, "block": block, "skipped_periods": pacer.skipped_periods}
             text = f"overrun: {late * 1e-6:.3f} ms late{ran}"
             self.tell(Note(tick, "overrun", text, "WARN", data))
-        if self._policy.overrun == "stop" and pacer.in_a_row >= self._policy.stop_after:
+        if self.policy.overrun == "stop" and pacer.in_a_row >= self.policy.stop_after:
             who = f"block '{block}' was running" if block else "no block was running"
             raise RunError(
                 f"overrun at {self.instant(tick)}: {late * 1e-6:.3f} ms late, {pacer.in_a_row} in "
@@ -271,7 +273,7 @@ def owner_of(call: Callable[..., Any] | None) -> object:
 
 @runtime_checkable
 class SupportsTicker(Protocol):
-    """The method that a sink has, beside ``record``, if it shows the times of blocks."""
+    """The method that a sink or a block has if it shows the times of blocks, or has notes to tell."""
 
     def watch_ticker(self, ticker: Ticker) -> None:
         """Take what measures the times, after ``open`` and before the first tick."""

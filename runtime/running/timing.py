@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from struct import Struct
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,6 +201,28 @@ def block_times(programs: Sequence[Program], block: str, overruns: int = 0) -> B
     calls = sum(part[0] for part in parts)
     samples = np.concatenate([kept for *_, kept in parts])
     weights = np.concatenate([np.full(len(kept), runs / len(kept)) for runs, _, _, kept in parts])
+    total, longest = sum(part[1] for part in parts), max(part[2] for part in parts)
+    return _times(calls, total, longest, samples, weights, overruns)
+
+
+def times_of(
+    kept: NDArray[np.int64], calls: int, total: int, longest: int, overruns: int = 0
+) -> BlockTimes:
+    """The times of a block that were taken elsewhere: the last ones, and of all runs their number,
+    total and longest; all in ns."""
+    if not calls:
+        return BlockTimes(overruns=overruns)
+    return _times(calls, total, longest, kept, np.ones(len(kept)), overruns)
+
+
+def _times(
+    calls: int,
+    total: int,
+    longest: int,
+    samples: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    overruns: int,
+) -> BlockTimes:
     order = np.argsort(samples, kind="stable")
     shares = np.cumsum(weights[order]) / weights.sum()
 
@@ -210,9 +232,17 @@ def block_times(programs: Sequence[Program], block: str, overruns: int = 0) -> B
 
     return BlockTimes(
         calls=calls,
-        mean_us=sum(part[1] for part in parts) / calls * 1e-3,
+        mean_us=total / calls * 1e-3,
         p50_us=percentile(0.50),
         p99_us=percentile(0.99),
-        max_us=max(part[2] for part in parts) * 1e-3,
+        max_us=longest * 1e-3,
         overruns=overruns,
     )
+
+
+@runtime_checkable
+class SupportsTimes(Protocol):
+    """The method of a block that computes elsewhere, and takes its times there."""
+
+    def times(self) -> BlockTimes:
+        """The times of its runs."""

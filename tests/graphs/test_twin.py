@@ -94,7 +94,7 @@ def run_behind_ports(folder: Path) -> tuple[str, float]:
     twin._send_packet = watched  # type: ignore[method-assign]
     with TwinServer(twin, virtual=True, period=0.001) as server:
         data = hardware.model_dump(mode="json")
-        data["bus"] |= {"port": server.bus_path, "reply_time": 5.0}
+        data["bus"] |= {"port": server.bus_path, "time": "virtual", "reply_time": 5.0}
         data["board"] |= {"port": server.board_path}
         (folder / "twin.yaml").write_text(yaml.safe_dump(data))
         done = subprocess.run(

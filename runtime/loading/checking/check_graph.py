@@ -20,6 +20,7 @@ from ...language.stages import BlockSpec, CheckedGraph, Wire
 from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
+from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
@@ -121,6 +122,8 @@ def _draft(
         check_defaults(draft, problems)
     if settings.robot_known:
         check_fit(draft, settings, problems)
+    if draft.complete and settings.base_rate is not None:
+        move_to_background(draft, settings.base_rate, problems)
     return draft
 
 

@@ -122,15 +122,27 @@ class FlatBlock:
     """Where each wired input's name is written."""
     machine: Node | None = None
     """The name of the machine that the block is placed on."""
+    background: MapNode | None = None
+    """How the block works in the background, if it does."""
+
+    @property
+    def _settings(self) -> Mapping[str, Any]:
+        """What is given beside the block's use, parameters and wires, as plain data."""
+        given = {
+            "rate": self.rate,
+            "offset": self.offset,
+            "on": self.machine,
+            "background": self.background,
+        }
+        return {key: plain(node) for key, node in given.items() if node is not None}
 
     def plain(self) -> dict[str, Any]:
         """The block as an entry of ``blocks``, as plain data."""
-        given = (("rate", self.rate), ("offset", self.offset), ("on", self.machine))
         return {
             "use": self.use,
             "with": plain(self.parameters),
             "in": {name: wire.plain() for name, wire in self.wires.items()},
-            **{key: plain(node) for key, node in given if node is not None},
+            **self._settings,
         }
 
     def text(self) -> str:
@@ -138,9 +150,7 @@ class FlatBlock:
         lines = [f"  {self.path}:", f"    use: {text_of(self.use)}"]
         lines += _section("with", _escape(plain(self.parameters)))
         lines += _section("in", {name: wire.plain() for name, wire in self.wires.items()})
-        for key, node in (("rate", self.rate), ("offset", self.offset), ("on", self.machine)):
-            if node is not None:
-                lines.append(f"    {key}: {text_of(plain(node))}")
+        lines += [f"    {key}: {text_of(value)}" for key, value in self._settings.items()]
         return "\n".join(lines)
 
 

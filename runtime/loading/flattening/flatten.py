@@ -286,6 +286,8 @@ class _Flattener:
         if use is not None and not named:
             expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
             wrong_kind(use, "'use'", expected, self.problems, at=path)
+        background = substitute(block.background) if block.background else None
+        assert background is None or isinstance(background, MapNode)
         links, places = self._links(block, file, scope, path, wires)
         draft = _GraphDraft(
             FlatBlock(
@@ -299,11 +301,20 @@ class _Flattener:
                 offset=substitute(block.offset) if block.offset else scope.offset,
                 input_places=places,
                 machine=substitute(block.machine) if block.machine else scope.machine,
+                background=background,
             ),
             links,
             block.offset is None and (block.rate is not None or scope.shifted),
         )
         if draft.block.use.endswith(_SUFFIXES):
+            if background is not None:
+                self.problems.add(
+                    Code.MISPLACED_KEY,
+                    f"{path} uses a sub-graph, and only single blocks work in the background",
+                    background.where,
+                    at=f"{path}.background",
+                    fix="move 'background' to a block of the sub-graph",
+                )
             self._instance(draft, file, scope)
         else:
             self.drafts[path] = draft

@@ -129,6 +129,18 @@ Wire: TypeAlias = Item | Items | Fields | WireFrom | WireValue
 """What an input reads."""
 
 
+class BackgroundKeys(_Keys):
+    """How a block works in the background."""
+
+    latency: Seconds = _key("the time after which outputs appear: a multiple of the block's period")
+    late: WhenLate = _key(
+        "in real time, while a result is late: keep the last values, write zeros, or end the run"
+    )
+    initial: dict[str, dict[str, Any]] = _key(
+        "outputs before the first result, by output and field; otherwise zero"
+    )
+
+
 class BlockEntry(_Keys):
     """One block, or one use of a sub-graph."""
 
@@ -144,6 +156,7 @@ class BlockEntry(_Keys):
         "tick of the first run, below the period"
     )
     machine: str = _key("the machine that the block runs on", "on")
+    background: BackgroundKeys = _key("compute beside the control thread, with a declared latency")
 
 
 class ClockKeys(_Keys):

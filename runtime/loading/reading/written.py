@@ -35,6 +35,7 @@ class WrittenBlock:
     rate: Node | None = None
     offset: Node | None = None
     machine: Node | None = None
+    background: MapNode | None = None
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,7 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
         value("rate"),
         value("offset"),
         value("on"),
+        _mapping(found.get("background"), problems),
     )
 
 

@@ -184,6 +184,15 @@ def test_the_cable_is_pulled(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_the_boards_cable_is_pulled_and_the_drives_are_damped_at_once(tmp_path: Path) -> None:
+    fault = InjectedFault(kind="pulled_board", start=0.5)
+    with make_bench(tmp_path, fault) as server:
+        found = result(Bench(server, tmp_path).start())
+        assert "the port of the sensor board failed" in found["reason"], found
+        assert Bench(server, tmp_path).states() == {3}, "not by their own watchdog, after 5 s"
+
+
+@pytest.mark.long
 def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
     with make_bench(tmp_path) as server:
         bench = Bench(server, tmp_path)
@@ -193,6 +202,20 @@ def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
         found = result(process)
         assert "another program or adapter sends instructions" in found["reason"], found
         assert bench.states() == {3}
+
+
+@pytest.mark.long
+def test_somebody_calls_the_emergency_stop_while_a_graph_holds_the_port(bench: Bench) -> None:
+    process = bench.start()
+    bench.wait_until_it_drives(process)
+    done = subprocess.run(
+        [sys.executable, "-m", "aloft", "robot", "estop", "bench.yaml", "--json"],
+        cwd=bench.folder, capture_output=True, text=True, check=False, timeout=LONG,
+        env={**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])},
+    )  # fmt: skip
+    assert json.loads(done.stdout)["success"], done.stderr
+    assert result(process)["reason"].endswith("`aloft robot estop` has damped the drives")
+    assert bench.states() == {3}
 
 
 @pytest.mark.long
@@ -280,9 +303,12 @@ def test_why_the_motor_thread_must_not_go_on() -> None:
     let_go = SimpleNamespace(held=lambda: False)
     assert reason(block(_switch=let_go)) == "the dead man's switch was let go"
     for tripped in (True, False):
-        robot = block(_watchdog=SimpleNamespace(tripped=tripped))
+        robot = block(_watchdog=SimpleNamespace(tripped=tripped, asked=False))
         assert reason(robot).endswith("the graph hung for 40 ms") == tripped
-    robot = block(_watchdog=SimpleNamespace(tripped=True))
+    robot = block(_watchdog=SimpleNamespace(tripped=True, asked=False))
+    robot._watchdog.asked = True
+    assert reason(robot) == "`aloft robot estop` has damped the drives"
+    robot._watchdog.asked = False
     robot.context.clock.command_limit = 0.015
     assert reason(robot).endswith("or no commands came over the links for 15 ms")
 
@@ -382,6 +408,30 @@ def test_the_control_period_is_a_whole_number_of_the_buss(period: float, fits: b
     found = list(BearRobot.requires(params, context))  # type: ignore[arg-type]
     assert (found == []) == fits
     assert fits or "does not divide the control period" in str(found[0])
+
+
+@pytest.mark.parametrize(
+    ("armed", "port", "marked", "refused"),
+    [
+        (True, "/dev/ttyUSB0", False, True),
+        (True, "/dev/ttyUSB0", True, True),  # the file of a twin, with a real port written over
+        (True, "/dev/pts/7", False, True),
+        (True, "/dev/pts/7", True, False),
+        (False, "/dev/ttyUSB0", False, False),
+    ],
+)
+def test_only_a_twin_may_be_armed_in_virtual_time(
+    tmp_path: Path, armed: bool, port: str, marked: bool, refused: bool
+) -> None:
+    data = Hardware.for_twin(ROBOT).model_dump(mode="json")
+    data["bus"] |= {"port": port, "time": "virtual" if marked else "real"}
+    (tmp_path / "bench.yaml").write_text(yaml.safe_dump(data))
+    params = BearRobot.Params(hardware="bench.yaml", time="virtual", armed=armed)
+    context = SimpleNamespace(robot=ROBOT, period=0.002, folder=tmp_path, graph_folder=tmp_path)
+    found = list(BearRobot.requires(params, context))  # type: ignore[arg-type]
+    assert [each.parameter for each in found] == (["time"] if refused else [])
+    if refused:
+        assert f"in virtual time nothing guards the drives at {port}" in found[0].message
 
 
 @pytest.mark.parametrize("fault", ["", "drive left_knee_motor has not answered"])

@@ -110,7 +110,7 @@ def test_jog_moves_one_motor_there_and_back(wire: Wire, bus: BearBus, hardware: 
     assert np.abs(np.diff(goals)).max() < 0.002, "no step"
     assert states(wire) == [3] + [0] * 9, "it ends in damping, and the others were never on"
     config = wire.bus.actuators[1].config
-    assert config["limit_i_max"] == 8.0 and config["watchdog_timeout"] == 100_000
+    assert config["limit_i_max"] == 8.0 and config["watchdog_timeout"] == 25_000
     # the whole current if the motor did not move at all
     assert config["p_gain_direct_force"] * 0.2 == pytest.approx(8.0)
     assert config["d_gain_direct_force"] == pytest.approx(0.05 * config["p_gain_direct_force"])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import aloft
 from aloft.blocks.signals import CommandMode, DrivePhase, JointCommand
 from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import Hardware
@@ -127,6 +129,61 @@ def test_a_motor_far_from_the_standing_pose_is_not_enabled() -> None:
     with pytest.raises(BusError, match=r"left_knee_motor is at .* more than 1 rad away"):
         driver.arm(lambda: True)
     assert 1.0 not in states(twin)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "text"),
+    [
+        ({"offset": None}, "left_knee_motor: not calibrated, an `offset`: do step 3 of docs/bring"),
+        ({"high": None}, "left_knee_motor: not calibrated, `low` and `high`: do step 4 of docs/"),
+    ],
+)
+def test_a_motor_that_was_not_calibrated_is_not_enabled(
+    lacking: dict[str, None], text: str
+) -> None:
+    twin, driver = made(hardware(**{KNEE: lacking}))
+    with pytest.raises(BusError, match=text):
+        driver.arm(lambda: True)
+    assert states(twin) == {0.0} and driver.loop.phase is DrivePhase.OFF, "nothing was written"
+
+
+def test_the_shipped_file_is_not_armed() -> None:
+    shipped = Path(aloft.__file__).parent / "graphs" / "hardware" / "bruce.yaml"
+    settings = Hardware.read(shipped, ROBOT)
+    _, driver = made(settings.model_copy(update={"bus": hardware().bus}))
+    with pytest.raises(BusError) as caught:
+        driver.arm(lambda: True)
+    assert str(caught.value) == (
+        "the drives are not enabled: no motor has an `offset`: do step 3 of docs/bring_up.md; no motor "
+        "has `low` and `high`: do step 4 of docs/bring_up.md"
+    )
+
+
+def test_pump_and_fan_go_on_until_the_windings_are_cool(monkeypatch: pytest.MonkeyPatch) -> None:
+    twin, driver = made()
+    assert twin.board.cooling == 0
+    driver.arm(lambda: True)
+    assert twin.board.cooling == driver.hardware.board.cooling == 5
+    twin.actuators[3].status["winding_temperature"] = 60.0
+    driver.damp(2)
+    waited: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        assert twin.board.cooling == 5 and states(twin) == {3.0}
+        waited.append(seconds)
+        if len(waited) == 20:
+            twin.actuators[3].status["winding_temperature"] = 44.0
+
+    monkeypatch.setattr(time, "sleep", sleep)
+    driver.close()
+    assert len(waited) == 21 and twin.board.cooling == 0
+
+
+def test_unarmed_the_board_is_not_told_to_cool() -> None:
+    twin, driver = made()
+    driver.damp()
+    driver.close()
+    assert twin.board.cooling == 0
 
 
 @pytest.fixture

@@ -77,7 +77,7 @@ class Bench:
         for k, name in enumerate(MOTORS):
             settings = self.hardware.motors[name]
             status = self.bus.actuators[settings.id].status
-            status["present_position"] = settings.sign * (motor[k] + settings.offset)
+            status["present_position"] = settings.sign * (motor[k] + settings.zero)
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def bench() -> Bench:
 def motor_goals(bench: Bench) -> np.ndarray:
     """The goal angles that arrived, in the robot's signs and offsets."""
     sign = np.array([bench.hardware.motors[name].sign for name in MOTORS])
-    offset = np.array([bench.hardware.motors[name].offset for name in MOTORS])
+    offset = np.array([bench.hardware.motors[name].zero for name in MOTORS])
     return np.asarray(bench.goals("goal_position") * sign - offset)
 
 
@@ -140,14 +140,51 @@ def test_goal_angles_stay_within_what_a_drive_does_not_ignore(bench: Bench, far:
     wanted.stiffness[:] = STIFFNESS
     bench.loop.follow(wanted)
     bench.loop.cycle()
-    low = np.array([bench.hardware.motors[name].low for name in MOTORS])
-    high = np.array([bench.hardware.motors[name].high for name in MOTORS])
+    low, high = np.array([bench.hardware.motors[name].range for name in MOTORS]).T
     found = motor_goals(bench)
     assert np.all(found >= low - 1e-6) and np.all(found <= high + 1e-6)
     asked = ROBOT.joint_to_motor @ np.full(10, far)
     beyond = (asked > high) | (asked < low)
     np.testing.assert_allclose(found[beyond], np.clip(asked, low, high)[beyond], atol=1e-6)
     assert beyond.sum() > 5
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 150.0])
+def test_with_the_first_command_the_current_rises_from_that_of_the_soft_start(
+    bench: Bench, stiffness: float
+) -> None:
+    settings, drives = bench.hardware.soft_start, bench.hardware.drives
+    bench.enable(DrivePhase.HOLDING)
+    bench.loop.current_limit = settings.current
+    wanted = command(1e4, position=0.3)
+    wanted.stiffness[:], wanted.damping[:] = stiffness, 0.1 * stiffness
+    bench.loop.follow(wanted)
+    sign = np.array([bench.hardware.motors[name].sign for name in MOTORS])
+    largest = []
+    for _ in range(round(settings.ramp / bench.hardware.bus.period)):
+        bench.loop.cycle()
+        feedback = motor_goals(bench) * bench.stiffness / drives.torque_constant
+        current = sign * bench.goals("goal_iq") + feedback
+        largest.append(np.abs(current).max())
+    most = drives.current_limit - drives.current_margin
+    assert settings.current < largest[0] < settings.current + 0.2
+    assert np.diff(largest).max() < 1.01 * (most - settings.current) / (1000.0 * settings.ramp)
+    assert largest[-1] == pytest.approx(most) == bench.loop.current_limit
+
+
+def test_a_board_whose_port_fails_ends_in_damping_in_the_next_cycle(bench: Bench) -> None:
+    class Pulled(Silent):
+        def read(self, size: int = 1) -> bytes:
+            raise OSError("no such device")
+
+    bench.enable(DrivePhase.DRIVING)
+    bench.loop.board.port = Pulled(bench.bus)
+    bench.loop.cycle()
+    bench.loop.cycle()
+    assert bench.loop.fault == "the port of the sensor board failed (OSError: no such device)"
+    assert bench.loop.board_lost and not bench.loop.link_lost
+    assert {each.status["torque_enable"] for each in bench.bus.actuators.values()} == {3}
+    assert bench.loop.cycle() == 10, "the drives go on answering"
 
 
 def test_a_command_for_no_torque_and_one_for_damping(bench: Bench) -> None:

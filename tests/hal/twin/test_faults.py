@@ -38,6 +38,7 @@ STOPS: list[tuple[dict[str, Any], int, str]] = [
      "its winding is hotter than temp_limit_low; its supply voltage"),
     ({"kind": "second_writer"}, 4, "another program or adapter sends instructions on the bus"),
     ({"kind": "pulled_cable"}, 1, "a port failed (PulledCableError: the cable"),
+    ({"kind": "pulled_board"}, 1, "the port of the sensor board failed (PulledCableError: the"),
     ({"kind": "silent_board"}, 10, "the sensor board has sent nothing for 10 exchanges"),
     ({"kind": "frozen_imu"}, 25, "the IMU has sent the same numbers 26 times in a row"),
     ({"kind": "saturated_gyro"}, 100, "the gyroscope has been at its range of 35 rad/s"),
@@ -107,7 +108,7 @@ def test_a_stuck_encoder_is_noticed_while_the_others_move() -> None:
         robot.step(1)
         if loop.fault:
             break
-    assert "drive left_knee_motor (address 9): its encoder has not changed in 50 exch" in loop.fault
+    assert "drive left_knee_motor (address 9): its encoder has not changed in 25 exch" in loop.fault
     assert twin.exchanges - twin.zero - round(START / 0.001) < 120
 
 

@@ -109,10 +109,10 @@ def test_a_command_to_damp_damps() -> None:
 
 
 def write_hardware(folder: Path, **motor: Any) -> str:
-    names = ROBOT.transmission.motors
+    names, whole = ROBOT.transmission.motors, {"offset": 0.0, "low": -25.0, "high": 25.0}
     settings = {
         "robot": "bruce", "bus": {"port": "twin"}, "board": {"port": "twin"},
-        "motors": {name: {"id": 30 + k, **motor} for k, name in enumerate(names)},
+        "motors": {name: {"id": 30 + k, **whole, **motor} for k, name in enumerate(names)},
         "soft_start": {"duration": 0.3},
     }  # fmt: skip
     (folder / "bench.yaml").write_text(yaml.safe_dump(settings))

@@ -23,7 +23,7 @@ def read(text: str, model: type[ClockKeys] | type[Links]) -> tuple[dict[str, Any
 
 
 def test_keys_are_those_that_are_written() -> None:
-    assert BLOCK_KEYS == ("use", "with", "in", "rate", "offset", "on")
+    assert BLOCK_KEYS == ("use", "with", "in", "rate", "offset", "on", "background")
     assert WIRE_KEYS == ("from", "delay", "initial", "allow", "value")
 
 

@@ -1,0 +1,1 @@
+"""Blocks that compute beside the control thread and answer after a declared latency."""

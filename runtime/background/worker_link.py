@@ -1,0 +1,171 @@
+"""A worker as the control thread sees it: started, given jobs, waited for where time is virtual, and ended."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from select import select
+from time import monotonic
+from typing import Any
+
+from ...processes.child_process import ChildError, ChildProcess
+from ..language.block import Metric
+from ..language.context import Clock, Context
+from ..language.errors import AloftError
+from ..language.parameters import Parameters
+from .job_memory import JobMemory
+from .worker import BELL, CHANGE, MESSAGE, RESTORE, RUN, WorkerTask, main
+
+START_TIME = 120.0
+"""Seconds that a worker may take to be ready: it may have to compile its block's kernels first."""
+
+
+class WorkerError(AloftError):
+    """A worker has died, or hangs."""
+
+
+class WorkerLink:
+    """A worker's process, and the memory that it shares with this one.
+
+    Args:
+        use: the block, as a graph file names it.
+        params: its parameters.
+        context: of the block.
+        slots, inputs, results: see ``JobMemory``.
+
+    Attributes:
+        memory: the shared memory.
+        has_failed: whether it has died or hangs, so that nothing more comes from it.
+
+    Raises:
+        WorkerError: it does not start.
+    """
+
+    def __init__(
+        self, use: str, params: Parameters, context: Context, slots: int, inputs: int, results: int
+    ) -> None:
+        self.has_failed = False
+        clock = Clock(context.clock.base_period, context.clock.tick)
+        shared = JobMemory.make(slots, inputs, results)
+        self._answers, theirs = os.pipe()
+        try:
+            os.set_blocking(theirs, False)
+            task = WorkerTask(
+                use, params.model_dump_json(), replace(context, clock=clock), shared, theirs, slots,
+                inputs, results,
+            )  # fmt: skip
+            self._process = ChildProcess(
+                f"the worker of {context.path}", f"{main.__module__}:main",
+                descriptors=[shared, theirs],
+            )  # fmt: skip
+            self.memory = JobMemory(shared, slots, inputs, results)
+        finally:
+            os.close(theirs)
+            os.close(shared)
+        self._process.name = f"its worker (process {self._process.pid})"
+        self._requests = self._process.stdin.fileno()
+        self._message = bytearray(MESSAGE.size)
+        try:
+            self._process.stdin.write(pickle.dumps(task))
+            self._process.stdin.flush()
+            self._process.wait_until_ready(START_TIME)
+        except OSError as error:
+            raise WorkerError(str(self._process.failure())) from error
+        except ChildError as error:
+            self.kill()
+            raise WorkerError(str(error)) from error
+
+    def run(self, slot: int, job: int) -> None:
+        """Ask for the job whose inputs are in a slot."""
+        self._send(RUN, slot, job)
+
+    def restore(self, *, with_outputs: bool) -> None:
+        """Let the worker go on from the last slot."""
+        self._send(RESTORE, int(with_outputs))
+
+    def change(self, params: Parameters) -> None:
+        """Let the worker take over parameters, for the jobs that are asked for after this."""
+        text = params.model_dump_json().encode()
+        self._send(CHANGE, len(text))
+        with suppress(OSError):
+            os.write(self._requests, text)
+
+    def _send(self, kind: int, first: int = 0, second: int = 0) -> None:
+        MESSAGE.pack_into(self._message, 0, kind, first, second)
+        with suppress(OSError):  # it has died: that is an error when its result is due
+            os.write(self._requests, self._message)
+
+    def wait_for(self, slot: int, job: int, seconds: float) -> None:
+        """Wait until a job is finished.
+
+        Raises:
+            WorkerError: the worker has died, or the job takes longer.
+        """
+        end, is_finished = monotonic() + seconds, self.memory.is_finished
+        while not is_finished(slot, job):
+            left = end - monotonic()
+            if left <= 0.0:
+                raise self.hang(slot, seconds)
+            if select([self._answers], [], [], left)[0] and not os.read(self._answers, 1 << 16):
+                if is_finished(slot, job):
+                    return  # it died afterwards
+                raise self.death(slot)
+
+    def expect_alive(self, slot: int) -> None:
+        """Raise ``WorkerError`` if the worker has died before it finished the job of a slot."""
+        if not self._process.is_alive():
+            raise self.death(slot)
+
+    def death(self, slot: int) -> WorkerError:
+        """Why the worker has died."""
+        self.has_failed = True
+        return WorkerError(f"{self._process.failure()}, in the run of {self._sampled(slot)}")
+
+    def hang(self, slot: int, seconds: float) -> WorkerError:
+        """That it does not come to the end of a job."""
+        self.has_failed = True
+        return WorkerError(
+            f"{self._process.name} hangs in the run of {self._sampled(slot)}: it did not finish it "
+            f"within {seconds:g} s (clock.hangs_after allows longer)"
+        )
+
+    def _sampled(self, slot: int) -> str:
+        return f"tick {self.memory.tick_of(slot)}"
+
+    def end(self, seconds: float) -> tuple[Mapping[str, Metric], Sequence[str]] | None:
+        """Let the worker close its block and end.
+
+        Returns:
+            The block's metrics and warnings; none where the worker computes for longer than that, and
+            is killed.
+
+        Raises:
+            WorkerError: it fails.
+        """
+        with suppress(OSError):
+            self._process.stdin.close()
+        end, said, has_ended = monotonic() + seconds, b"", False
+        while not has_ended and (left := end - monotonic()) > 0.0:
+            if select([self._answers], [], [], left)[0]:
+                piece = os.read(self._answers, 1 << 16)
+                said += piece
+                has_ended = not piece
+        answer: dict[str, Any] | None = None
+        with suppress(ValueError):
+            answer = json.loads(said.lstrip(BELL))
+        failure = self._process.failure() if has_ended and answer is None else None
+        self.kill()
+        if failure is not None:
+            raise WorkerError(str(failure))
+        return (answer["metrics"], answer["warnings"]) if answer is not None else None
+
+    def kill(self) -> None:
+        """End the process, whatever it does."""
+        self.has_failed = True
+        self._process.stop()
+        with suppress(OSError):
+            os.close(self._answers)
