@@ -64,7 +64,10 @@ class TrialOptions:
         Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
     ] = None
     trial: Annotated[
-        str, typer.Option(help="nominal, standard or robust; by default as the graph says.")
+        str,
+        typer.Option(
+            help="nominal, standard, robust, real or uneven; by default as the graph says."
+        ),
     ] = ""
     seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0
     seeds: Annotated[

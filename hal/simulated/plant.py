@@ -44,7 +44,7 @@ from .drive_effects import DriveEffects
 from .drives import MotorLimits
 from .gears import YieldingGears
 from .imu_effects import ImuModel
-from .mujoco_model import body_name, build_world
+from .mujoco_model import body_name, build_world, number_of_soles
 from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
 from .stance import (
@@ -314,10 +314,13 @@ class Plant:
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
         period = self._period / self._samples_per_tick
         self.sensors.attach(model, data, period, self._samples_per_tick)
-        # The sensors of the contact points are the model's last.
+        # The sensors of the contact points are the model's last, those of soles come before them.
         first = model.nsensordata - 4 * len(self._robot.contacts)
+        soles = data.sensordata[first - number_of_soles(model) : first]
         load = data.sensordata[first:].reshape(-1, 4)
-        self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
+        self.truth = TruthReport(
+            data, base, self._robot, self._params.build_scene(self._robot), self.record
+        )
         sensors, physics = self.sensors, self.physics
         force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
         self._rate = base.angular_velocity
@@ -337,7 +340,7 @@ class Plant:
             self._seeing.append(self.drives.sensing(*self.sensed, data.ctrl))
             self.sensed = physics.encoder_position, physics.encoder_velocity
         self._note = signal_call(
-            record_step, self.physics.step, StepSensors(load, force, contacts, self.position),
+            record_step, self.physics.step, StepSensors(load, soles, force, contacts, self.position),
             *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
         )  # fmt: skip
         self._encoding = KernelCall(
@@ -519,6 +522,11 @@ class Plant:
             "robot_friction": float(self.variation.friction),
             "robot_mass_kg": float(self._robot.total_mass * self.variation.mass),
             "robot_contact_stiffness": float(self.variation.contact_stiffness),
+            **(
+                {"robot_sole_contacts": int(self.record.sole)}
+                if number_of_soles(self.model)
+                else {}
+            ),
             **({} if self.imu is None else self.imu.metrics()),
             **(self.drives.metrics() if self.drives.has_motors else {}),
         }
