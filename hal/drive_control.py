@@ -245,11 +245,13 @@ def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> flo
     """The torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
     constant, peak = gears.constant[motor], gears.peak[motor]
     lost = gears.load_friction * math.tanh(speed / _SLIDING)
-    asked = torque / constant
+    asked: float = torque / constant
     if gears.saturation > 0.0 or gears.load_friction > 0.0:
         for _ in range(_ROUNDS):
             load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
-            asked = (torque + lost * abs(asked)) / (constant * (1.0 - gears.saturation * load * load))
+            asked = (torque + lost * abs(asked)) / (
+                constant * (1.0 - gears.saturation * load * load)
+            )
     return asked
 
 
@@ -258,7 +260,7 @@ def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
     """The torque [N m] that a motor gives of what is asked of it: the inverse of ``nominal_torque``."""
     peak = gears.peak[motor]
     load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
-    given = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
+    given: float = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
     return given - gears.load_friction * abs(asked) * math.tanh(speed / _SLIDING)
 
 
@@ -270,7 +272,9 @@ class TorqueScratch(NamedTuple):
 
 
 @kernel
-def correct_torque(gears: Gears, scratch: TorqueScratch, velocity: Array1D, torque: Array1D) -> None:
+def correct_torque(
+    gears: Gears, scratch: TorqueScratch, velocity: Array1D, torque: Array1D
+) -> None:
     """Change joint torques [N m] by the nominal torque constants to those that the motors give.
 
     Args:
@@ -279,7 +283,9 @@ def correct_torque(gears: Gears, scratch: TorqueScratch, velocity: Array1D, torq
     multiply_vector(gears.torque_to_motor, torque, scratch.torque)
     multiply_vector(gears.to_motor, velocity, scratch.speed)
     for k in range(torque.shape[0]):
-        scratch.torque[k] = true_torque(gears, k, scratch.torque[k], scratch.speed[k])
+        asked: float = scratch.torque[k]
+        speed: float = scratch.speed[k]
+        scratch.torque[k] = true_torque(gears, k, asked, speed)
     multiply_vector(gears.torque_to_joint, scratch.torque, torque)
 
 
@@ -355,6 +361,11 @@ class DriveGoals:
         self._make = signal_call(
             make_goals, self.gears, self._targets, 0, self._measured, goals, scratch
         )
+        self._nominal = motors is None or motors == MotorModel()
+        n = len(robot.joints)
+        room = TorqueScratch(np.zeros(n), np.zeros(n))
+        self._speed, self._torque = np.zeros(n), np.zeros(n)
+        self._correct = signal_call(correct_torque, self.gears, room, self._speed, self._torque)
 
     def follow(
         self, command: JointCommand, position: Array, velocity: Array, joint_position: Array,
@@ -368,6 +379,15 @@ class DriveGoals:
         measured.position[:], measured.velocity[:] = position, velocity
         measured.joint_position[:], measured.joint_velocity[:] = joint_position, joint_velocity
         self._make.run()
+
+    def correct(self, velocity: Array, torque: Array) -> None:
+        """Change measured joint torques [N m] to those that the motors give; the joints' velocity
+        [rad/s] says which way they turn."""
+        if self._nominal:
+            return
+        self._speed[:], self._torque[:] = velocity, torque
+        self._correct.run()
+        torque[:] = self._torque
 
     def hold(self, position: Array) -> None:
         """Set the goals to motor angles [rad] at rest, without any torque of their own."""
