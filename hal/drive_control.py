@@ -57,8 +57,8 @@ _DAMPING_TIME = 0.025
 
 _SLIDING = 0.2
 """The speed [rad/s] at which the load friction of a gear has three quarters of its size."""
-_ROUNDS = 4
-"""Fixed-point rounds in which the nominal torque is found: at 20 % saturation 1e-3 of it is left."""
+_ROUNDS = 8
+"""Fixed-point rounds in which the nominal torque is found: at 12 % saturation 1e-4 of it is left."""
 
 
 class MotorModel(Parameters):
