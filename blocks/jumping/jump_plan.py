@@ -35,6 +35,7 @@ from .plan_progress import (
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
     from ...planner.library.library import PlanLibrary
+    from ...planner.library.rehearsed import Vector
     from ...planner.task.plan import PlannedJump
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
@@ -86,7 +87,9 @@ class JumpPlan(Block):
     ``landing_height``, ``distance`` [m, forward and left], ``yaw`` [rad], and ``rise`` [m] where the
     task gives it for a single jump. It also exports the ``velocity_correction`` [m/s] and the
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
-    (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
+    (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``. To
+    them is added what the robot itself has learnt from its last jumps of this and of other tasks
+    (``aloft jump --learn``), if ``learnt`` names the file.
 
     But for this, the progress and the rotation the block follows time alone. It raises ``BlockError`` at
     load where the task cannot be read or is for another robot, where it cannot be planned, or where its
@@ -120,6 +123,9 @@ class JumpPlan(Block):
         )
         rehearsed: bool = parameter(
             True, text="whether what a rehearsal of this plan has learnt is exported to the graph"
+        )
+        learnt: str = parameter(
+            "", text="file of what the robot has learnt from its own jumps; none: nothing"
         )
 
     Constants = ProgressConstants
@@ -210,28 +216,55 @@ class JumpPlan(Block):
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
-        """What a rehearsal has learnt; for both the same ``UnmetRequirement`` where its file is damaged."""
-        from ...planner.library.rehearsed import (
-            ZERO,
-            RehearsalFileError,
-            controller_hash,
-            find_rehearsed,
-        )
+        """What was learnt, in rehearsals and by the robot itself; for both corrections the same
+        ``UnmetRequirement`` where a file is damaged."""
+        from ...planner.library.learnt import LearntFileError
+        from ...planner.library.rehearsed import RehearsalFileError
 
-        assert context.robot is not None
-        if not params.rehearsed:
-            return list(ZERO), list(ZERO)
-        rate = 1.0 / context.clock.base_period
-        controller = controller_hash(context.graph, rate, context.path)
         try:
-            task = _as_planned(task, params.formulation)
-            found = find_rehearsed(plan_library(params, context.robot), task, controller)
+            rehearsed = cls._rehearsed(task, params, context)
         except RehearsalFileError as error:
             damaged = UnmetRequirement(str(error), fix=f"{context.path}.rehearsed: false")
             return damaged, damaged
+        try:
+            learnt = cls._learnt(task, params, context)
+        except LearntFileError as error:
+            damaged = UnmetRequirement(str(error), parameter="learnt")
+            return damaged, damaged
+        velocity, momentum = (
+            [a + b for a, b in zip(first, second, strict=True)]
+            for first, second in zip(rehearsed, learnt, strict=True)
+        )
+        return velocity, momentum
+
+    @classmethod
+    def _rehearsed(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
+        """What a rehearsal has learnt."""
+        from ...planner.library.rehearsed import ZERO, controller_hash, find_rehearsed
+
+        assert context.robot is not None
+        if not params.rehearsed:
+            return ZERO, ZERO
+        rate = 1.0 / context.clock.base_period
+        controller = controller_hash(context.graph, rate, context.path)
+        task = _as_planned(task, params.formulation)
+        found = find_rehearsed(plan_library(params, context.robot), task, controller)
         if found is None:
-            return list(ZERO), list(ZERO)
-        return list(found.velocity_correction), list(found.momentum_correction)
+            return ZERO, ZERO
+        return found.velocity_correction, found.momentum_correction
+
+    @classmethod
+    def _learnt(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
+        """What the robot itself has learnt."""
+        from ...planner.library.learnt import launch_of, read_learnt
+        from ...planner.library.rehearsed import ZERO
+
+        assert context.robot is not None
+        if not params.learnt:
+            return ZERO, ZERO
+        beside = context.folder / params.learnt
+        path = beside if beside.is_file() else context.graph_folder / params.learnt
+        return read_learnt(path, context.robot.name).correction(launch_of(task))
 
     def setup(self) -> None:
         from ...planner.library.once import reference_table_once

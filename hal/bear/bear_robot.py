@@ -109,7 +109,8 @@ class BearRobot(DrivenRobot):
         super().setup()
         self._hardware: Hardware = read_hardware(self.params.hardware, self.context, self.robot)
         gains = joint_gains(self.params, self.robot)
-        self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
+        motors = self.params.motor_model
+        self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead, motors)
         self._thread: MotorThread | None = None
         self._watchdog: DriveWatchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()

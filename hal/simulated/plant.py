@@ -35,6 +35,7 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
+from ..drive_control import correcting
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
@@ -458,6 +459,7 @@ class Plant:
         return [
             KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
             KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
+            *correcting(self._params, self._robot, self.sensed[1], torque),
             *self.reading_imu(force, imu),
             *sensors.reading_joints(*self.sensed, torque, joints),
         ]
