@@ -19,8 +19,8 @@ from ..mathematics.arrays import Array
 from ..robots.description import RobotDescription
 from ..runtime.graph import Graph
 
-CONSUMERS = ("controllers/late_sensors.yaml", "controllers/motor_model.yaml")
-"""The files that a graph includes so that its controller takes what is told."""
+CONSUMER = "controllers/late_sensors.yaml"
+"""The file that a graph includes so that its controller takes what is told."""
 
 
 class Errors(NamedTuple):
@@ -45,7 +45,7 @@ def told_values(
     """The parameters of the controller, as overrides of the graph.
 
     Args:
-        graph: with the simulated robot and ``CONSUMERS``; its seed must be set.
+        graph: with the simulated robot and ``CONSUMER``; its seed must be set.
         block: the simulated robot.
         seed: draws the errors.
     """
@@ -57,7 +57,7 @@ def told_values(
     return (
         _imu(params, errors, draw)
         | _ages(params, errors, draw)
-        | _motors(params, robot, errors, draw)
+        | _motors(block, params, robot, errors, draw)
         | _joints(params, robot, errors, draw)
     )
 
@@ -65,8 +65,8 @@ def told_values(
 def _imu(params: SimulatorParameters, errors: Errors, draw: np.random.Generator) -> dict[str, Any]:
     place, angle = map(np.array, draw_place(params.imu, params.seed))
     return {
-        "estimator.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
-        "estimator.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),
+        "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
+        "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),
     }
 
 
@@ -89,16 +89,17 @@ def _ages(params: SimulatorParameters, errors: Errors, draw: np.random.Generator
 
 
 def _motors(
-    params: SimulatorParameters, robot: RobotDescription, errors: Errors, draw: np.random.Generator
+    block: str, params: SimulatorParameters, robot: RobotDescription, errors: Errors,
+    draw: np.random.Generator,
 ) -> dict[str, Any]:
     motors, n = params.motors, len(robot.joints)
     spread = stream(params.seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
     constant = motors.torque_constant * (1.0 + motors.torque_constant_spread * spread)
     constant = constant * (1.0 + errors.torque_constant * draw.normal(size=n))
     return {
-        "motors.torque_constant": _by_joint(robot, constant),
-        "motors.saturation": motors.saturation,
-        "motors.load_friction": motors.load_friction,
+        f"{block}.motor_model.torque_constant": _named(robot.transmission.motors, constant),
+        f"{block}.motor_model.saturation": motors.saturation,
+        f"{block}.motor_model.load_friction": motors.load_friction,
         "wbc.peak_torque": _by_joint(robot, constant * (1.0 - motors.saturation)),
     }
 
@@ -113,9 +114,14 @@ def _joints(
     return {
         "joint_pd.friction": _by_joint(robot, (factor - 1.0) * robot.motors.friction),
         "joint_pd.damping": _by_joint(robot, (factor - 1.0) * robot.motors.damping),
+        "timing.play": params.encoders.backlash,
         "dynamics.rotor_inertia": _by_joint(robot, rotors),
     }
 
 
 def _by_joint(robot: RobotDescription, values: Sequence[float] | Array) -> dict[str, float]:
-    return {joint.name: float(value) for joint, value in zip(robot.joints, values, strict=True)}
+    return _named([joint.name for joint in robot.joints], values)
+
+
+def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar, Literal, NamedTuple
 
-import numpy as np
-
 from ...mathematics.arrays import Array1D, Flags1D, Vector3
-from ...mathematics.compiling.expressions import cross
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     StandingPoints,
@@ -19,7 +16,7 @@ from ...mathematics.inertial_filter import (
     rotate_in_world,
 )
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import exponential, rotate
+from ...mathematics.rotations import rotate
 from ...robots.contact_kinematics import (
     ContactGeometry,
     ContactKinematics,
@@ -28,7 +25,7 @@ from ...robots.contact_kinematics import (
     contact_motion,
 )
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import Parameters, ThreeNumbers, live_parameter, parameter
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, ContactState, ImuReading, JointState
 
@@ -76,13 +73,6 @@ class InertialParameters(Parameters):
     flight: Literal["imu", "ballistic"] = parameter(
         "imu", text="the prediction in flight: by the IMU, or by a free fall of the CoM"
     )
-    imu_position: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="m",
-        text="where the IMU is beside its place in the description, base frame",
-    )  # fmt: skip
-    imu_rotation: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="rad", text="rotation vector from the base's axes to the IMU's"
-    )
     velocity_gain: float = live_parameter(
         0.03, gt=0.0, le=1.0, text="gain of the legs' velocity correction, per tick"
     )
@@ -107,9 +97,6 @@ class InertialConstants(Signal):
     filtering = Field(unit="", text="share of a change that the low-pass takes over in a tick")
     block_size = Field(dtype="int64", text="samples in a block from which a bias is learnt")
     starts_level = Field(dtype="bool", text="whether the contact points give the first tilt")
-    imu_moved = Field(dtype="bool", text="whether the IMU is not where the description says")
-    imu_position = Field(3, unit="m", frame="body", text="where it is beside that place")
-    imu_axes = Field(4, text="quaternion from the IMU's axes to the base's")
 
 
 class InertialScratch(Signal):
@@ -184,10 +171,6 @@ class InertialEstimator(Block):
         constants.filtering = min(period / 0.02, 1.0)
         constants.block_size = max(round(0.03 / period), 1)
         constants.starts_level = self.starts_level
-        params = self.params
-        constants.imu_moved = any((*params.imu_position, *params.imu_rotation))
-        constants.imu_position[:] = params.imu_position
-        exponential(np.array(params.imu_rotation, np.float64), constants.imu_axes)
 
 
 @kernel
@@ -206,14 +189,9 @@ def predict(
     limit(imu.angular_velocity, _FASTEST_TURN, scratch.gyro)
     limit(imu.specific_force, _STRONGEST_FORCE, scratch.force)
     limit(joints.velocity, _FASTEST_JOINT, scratch.joint_rates)
-    if constants.imu_moved:
-        rotate(constants.imu_axes, scratch.gyro, scratch.gyro)
-        rotate(constants.imu_axes, scratch.force, scratch.force)
     scratch.force[:] -= estimate.accelerometer_bias
     scratch.last_rate[:] = estimate.angular_velocity
     estimate.angular_velocity[:] = scratch.gyro - estimate.gyro_bias
-    if constants.imu_moved and estimate.started:
-        move_to_base(estimate, constants, scratch)
     if not estimate.started:
         start(joints, estimate, legs, constants, scratch)
         return 0.0
@@ -227,20 +205,6 @@ def predict(
         scratch.joint_rates, legs.motion,
     )  # fmt: skip
     return watch_motion(estimate, legs, constants, scratch)
-
-
-@kernel
-def move_to_base(
-    estimate: BaseEstimate, constants: InertialConstants, scratch: InertialScratch
-) -> None:
-    """Turn the specific force where the IMU is into that of the base: f - w' x r - w x (w x r)."""
-    place, vector = constants.imu_position, scratch.vector
-    vector[:] = estimate.angular_velocity - scratch.last_rate
-    vector[:] = vector / constants.period
-    scratch.force[:] = scratch.force - cross(vector, place)
-    vector[:] = 0.5 * (estimate.angular_velocity + scratch.last_rate)
-    scratch.error[:] = cross(vector, place)
-    scratch.force[:] = scratch.force - cross(vector, scratch.error)
 
 
 @kernel

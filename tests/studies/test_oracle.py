@@ -9,13 +9,13 @@ import pytest
 
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import load_text
-from aloft.studies.oracle import CALIBRATED, CONSUMERS, Errors, told_values
+from aloft.studies.oracle import CALIBRATED, CONSUMER, Errors, told_values
 
 GRAPHS = Path(__file__).parents[2] / "graphs"
 
 
 def graph_of(overrides, trial="real"):
-    files = ["jump.yaml", f"trials/{trial}.yaml", *CONSUMERS]
+    files = ["jump.yaml", f"trials/{trial}.yaml", CONSUMER]
     text = "include: [" + ", ".join(files) + "]\n"
     return Graph(load_text(text, GRAPHS / "told.yaml", {"robot.seed": 4, **overrides}))
 
@@ -35,15 +35,15 @@ def test_ages_are_those_of_filter_packet_and_drive(told):
 
 def test_a_nominal_robot_has_nothing_to_tell():
     told = told_values(graph_of({}, trial="robust"))
-    assert told["estimator.imu_position"] == told["estimator.imu_rotation"] == [0.0] * 3
-    assert set(told["motors.torque_constant"].values()) == {1.0}
+    assert told["timing.imu_position"] == told["timing.imu_rotation"] == [0.0] * 3
+    assert set(told["robot.motor_model.torque_constant"].values()) == {1.0}
     assert set(told["joint_pd.friction"].values()) <= {0.0}
     assert set(told["dynamics.rotor_inertia"].values()) == {1.0}
 
 
 def test_values_stay_within_what_is_drawn(told):
-    assert all(0.95 <= c <= 1.05 for c in told["motors.torque_constant"].values())
-    assert all(abs(x) <= 0.005 for x in told["estimator.imu_position"])
+    assert all(0.95 <= c <= 1.05 for c in told["robot.motor_model.torque_constant"].values())
+    assert all(abs(x) <= 0.005 for x in told["timing.imu_position"])
     assert set(told["dynamics.rotor_inertia"].values()) == {1.2}
     friction = [1.0 + added / 0.07 for added in told["joint_pd.friction"].values()]
     assert all(1.6 * 0.7 <= factor <= 1.6 * 1.3 for factor in friction)

@@ -385,31 +385,3 @@ def test_the_papers_filter_is_spoilt_by_the_latch_at_lift_off():
     """Why the weights: the same hop with the paper's filter."""
     plain = simulate(2001, kind=ComplementaryFilter, velocity_gain=0.1, position_gain=0.1)
     assert plain["touchdown"][0] > 0.1
-
-
-def test_an_imu_told_to_be_elsewhere_and_turned_shows_the_same_motion():
-    place, angle = np.array([0.02, -0.01, 0.03]), np.array([0.02, -0.03, 0.05])
-    axes, nominal, moved = quaternion_of(angle), np.empty(3), np.empty(3)
-    benches = [
-        BlockBench(StateEstimator, params, robot=ROBOT)
-        for params in ({}, {"imu_position": place.tolist(), "imu_rotation": angle.tolist()})
-    ]
-    last = np.zeros(3)
-    for tick in range(100):
-        rate = np.array([1.0, -2.0, 3.0]) * np.sin(0.05 * tick)
-        mean, change = 0.5 * (rate + last), (rate - last) / PERIOD
-        nominal[:] = [0.3, 0.1, 9.81 - 0.05 * tick]
-        shifted = nominal + np.cross(change, place) + np.cross(mean, np.cross(mean, place))
-        benches[0].set("imu", angular_velocity=rate, specific_force=nominal)
-        rotations.rotate_back(axes, shifted, moved)
-        turned = np.empty(3)
-        rotations.rotate_back(axes, rate, turned)
-        benches[1].set("imu", angular_velocity=turned, specific_force=moved)
-        for bench in benches:
-            bench.step()
-        last = rate
-    first, second = (bench.get("base") for bench in benches)
-    assert np.abs(first.linear_velocity).max() > 0.01
-    assert second.linear_velocity == pytest.approx(first.linear_velocity, abs=1e-9)
-    assert second.orientation == pytest.approx(first.orientation, abs=1e-9)
-    assert second.angular_velocity == pytest.approx(first.angular_velocity, abs=1e-12)
