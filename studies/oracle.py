@@ -89,7 +89,10 @@ def _ages(params: SimulatorParameters, errors: Errors, draw: np.random.Generator
 
 
 def _motors(
-    block: str, params: SimulatorParameters, robot: RobotDescription, errors: Errors,
+    block: str,
+    params: SimulatorParameters,
+    robot: RobotDescription,
+    errors: Errors,
     draw: np.random.Generator,
 ) -> dict[str, Any]:
     motors, n = params.motors, len(robot.joints)
