@@ -57,6 +57,7 @@ class JumpPlan(Block):
     of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
     without the features that only ``full`` has: impacts, margins and limits of the motors.
 
+    The plan begins with the run; that of a ``TriggeredJumpPlan`` when the robot has been put down.
     At the start the robot stands still for ``stand_time``; at the end it stays where the plan
     ended. Between the plan's knots the reference is read from a table of 2 ms steps
     (``planner/library/reference_table``); accelerations and torques are read ``lead`` ahead of
@@ -270,15 +271,10 @@ class JumpPlan(Block):
         constants: ProgressConstants,
         clock: Clock,
     ) -> None:
-        lead = delay.delay if constants.lead < 0.0 else constants.lead
-        early = min(delay.ahead, lead)
-        time = clock.base_period * clock.tick - progress.late + early
-        read_table(table, time, lead - early, constants.period, reference)
-        if constants.follows_motion:
-            follow_thrust(time, terms, reference, progress, params, constants)
-            follow_fall(time, terms, reference, progress, params, constants)
-        if constants.follows_turn:
-            follow_turn(time, terms, reference, rotation, progress, constants)
+        now = clock.base_period * clock.tick
+        follow_plan(
+            now, terms, delay, reference, progress, table, rotation, params, constants
+        )  # fmt: skip
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report
@@ -327,6 +323,30 @@ class JumpPlan(Block):
         kept = library.path_of(task)
         self.files_read = (kept,) if kept is not None else ()
         return plan
+
+
+@kernel
+def follow_plan(
+    now: float,
+    terms: DynamicsTerms,
+    delay: DelayEstimate,
+    reference: JumpReference,
+    progress: PlanProgress,
+    table: TableRows,
+    rotation: FlightRotation,
+    params: ProgressParameters,
+    constants: ProgressConstants,
+) -> None:
+    """Read the plan at the time ``now`` [s] of the run, and keep it in time with the robot."""
+    lead = delay.delay if constants.lead < 0.0 else constants.lead
+    early = min(delay.ahead, lead)
+    time = now - progress.late + early
+    read_table(table, time, lead - early, constants.period, reference)
+    if constants.follows_motion:
+        follow_thrust(time, terms, reference, progress, params, constants)
+        follow_fall(time, terms, reference, progress, params, constants)
+    if constants.follows_turn:
+        follow_turn(time, terms, reference, rotation, progress, constants)
 
 
 def plan_library(params: JumpPlan.Params, robot: RobotDescription) -> PlanLibrary:
