@@ -13,7 +13,8 @@
 
 An episode begins at the graph's start. ``reset(seed=k)`` gives every parameter called ``seed`` the
 value k; without it episodes have seeds that are drawn from the environment's own generator. A block
-that asks for the end of the run terminates the episode, and the graph's duration truncates it.
+that asks for the end of the run terminates the episode, and the graph's duration truncates it. An
+action outside its limits, and a step of an episode that is over, are errors.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         observation: Sequence[str],
         reward: Reward,
         action_limits: tuple[Any, Any],
+        normalised: bool,
         ticks: int,
     ) -> None:
         self.graph = graph
@@ -62,7 +64,14 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         run = self._open(0 if self._seeded else None)
         shape = run[f"{action}.y.value"].shape
         low, high = (np.broadcast_to(np.asarray(a, np.float64), shape) for a in action_limits)
+        if normalised and not np.isfinite([low, high]).all():
+            raise AloftError("normalised actions need finite action_limits")
+        self._normalised = normalised
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        if normalised:
+            low, high = -np.ones(shape), np.ones(shape)
         self.action_space = gymnasium.spaces.Box(low.copy(), high.copy(), dtype=np.float64)
+        self._over = ""
         size = self._observation().shape
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float64)
         self._reward_now()
@@ -80,17 +89,26 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         else:
             self._run.reset()
         run = self._running()
+        self._over = ""
         run.step()
         return self._observation(), {"time": run.time}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Set the action, run some ticks, and return observation, reward, terminated, truncated."""
+        """Set the action, run some ticks, and return observation, reward, terminated, truncated.
+
+        Raises:
+            AloftError: the episode is over, or the action is outside ``action_space``.
+        """
         run = self._running()
-        run[self._action] = action
+        if self._over:
+            raise AloftError(f"the episode is over ({self._over}); call reset()")
+        run[self._action] = self._checked(action)
         run.step(self._ticks)
         over = run.graph.ticks is not None and run.tick >= run.graph.ticks
         terminated = bool(run.reason) and not over
         info = {"time": run.time, **({"reason": run.reason} if run.reason else {})}
+        if terminated or over:
+            self._over = run.reason or "the duration is over"
         return self._observation(), self._reward_now(), terminated, over, info
 
     def close(self) -> None:
@@ -103,6 +121,21 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         self.close()
         self._run = self.graph.open(seed=seed)
         return self._run
+
+    def _checked(self, action: Array) -> Array:
+        """The graph's action, (n,), of one in ``action_space``."""
+        space, given = self.action_space, np.asarray(action, np.float64)
+        assert isinstance(space, gymnasium.spaces.Box)
+        if given.shape != space.shape:
+            raise AloftError(f"an action has the shape {space.shape}, not {given.shape}")
+        outside = ~((given >= space.low) & (given <= space.high))
+        if outside.any():
+            k = int(np.flatnonzero(outside)[0])
+            raise AloftError(
+                f"element {k} of the action is {given.flat[k]:g}, outside of its limits "
+                f"{space.low.flat[k]:g} to {space.high.flat[k]:g}; clip it, or set action_limits"
+            )
+        return self._middle + self._half * given if self._normalised else given
 
     def _running(self) -> SteppedRun:
         if self._run is None:
@@ -131,6 +164,7 @@ def make(
     observation: str | Sequence[str],
     reward: Reward,
     action_limits: tuple[Any, Any] = (-1.0, 1.0),
+    normalised: bool = False,
     ticks: int = 1,
 ) -> GraphEnvironment:
     """An environment of a graph. Many may live in one process.
@@ -141,6 +175,7 @@ def make(
         observation: signals, ``block.port.field``; their numbers follow each other.
         reward: a signal with one number, or a function of the run.
         action_limits: the least and the greatest action, each a number or one for every element.
+        normalised: actions are -1 to 1, and stand for the least to the greatest.
         ticks: how many ticks of the graph a step is.
 
     Raises:
@@ -157,4 +192,4 @@ def make(
     observed = (observation,) if isinstance(observation, str) else tuple(observation)
     if not observed:
         raise AloftError("an environment needs at least one observation")
-    return GraphEnvironment(loaded, action, observed, reward, action_limits, ticks)
+    return GraphEnvironment(loaded, action, observed, reward, action_limits, normalised, ticks)

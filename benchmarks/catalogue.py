@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .agreement import agreement
+from .background import background
 from .driver import driver
 from .frontier.frontier import frontier
 from .general_blocks import general_blocks
@@ -36,6 +37,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "general_blocks": general_blocks,
     "planner": planner,
     "recorder": recorder,
+    "background": background,
     "links": links,
     "driver": driver,
     "link_delays": link_delays,
@@ -47,7 +49,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 LONG = ("agreement", "jumps", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
-    "seconds": ("recorder",),
+    "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
     "seeds": ("frontier", "link_delays"),

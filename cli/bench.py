@@ -52,7 +52,10 @@ def bench(
     ] = "",
     seconds: Annotated[
         float | None,
-        typer.Option(help="Length of the run in real time of 'recorder'; by default 60.", min=1.0),
+        typer.Option(
+            help="Length of the runs in real time of 'recorder' and 'background'; by default 60 and 10.",
+            min=1.0,
+        ),
     ] = None,
     count: Annotated[
         int | None,

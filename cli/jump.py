@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode, UnitError
+from .shared.learning import LearningOptions, PlannedGraph, Prepare, learn_jumps
 from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, graph_of, rehearsal
@@ -64,7 +66,10 @@ class TrialOptions:
         Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
     ] = None
     trial: Annotated[
-        str, typer.Option(help="nominal, standard or robust; by default as the graph says.")
+        str,
+        typer.Option(
+            help="nominal, standard, robust, real or uneven; by default as the graph says."
+        ),
     ] = ""
     seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0
     seeds: Annotated[
@@ -100,11 +105,14 @@ def jump(
     running: TrialOptions,
     recording: RecordOptions,
     planning: PlanningOptions,
+    learning: LearningOptions,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
+    from ..runtime.loading import flatten
     from ..studies.batch.seeds import parse_seeds
+    from ..studies.rehearsal import corrected_parameters
 
     seeds, seed = running.seeds, running.seed
     out = console(to_stderr=as_json, quiet=quiet)
@@ -118,6 +126,19 @@ def jump(
         changes = task_changes(lengths, asked.rise, asked.turn, path)
         settings = [*settings_for(changes, running.trial), *(running.overrides or [])]
         many = parse_seeds(seeds) if seeds else []
+        if learning.learn is not None:
+            if seeds or recording.no_record or planning.rehearse:
+                raise AloftError(
+                    "--learn: a robot learns from one recorded jump after the other, so leave out "
+                    "--seeds, --no-record and --rehearse"
+                )
+            corrected_parameters(flatten(path, settings))  # refuses a graph without them
+            record = recording.record or Path("recordings") / "jump.rrd"
+            rise = changes.get("rise") or usual_rise(path) or 0.0
+            prepare = planner_of(path, running, planning.nearest, console(quiet=True))
+            raise typer.Exit(
+                learn_jumps(prepare, changes, rise, learning, seed, record, out, as_json)
+            )
         loaded = load_jump(path, settings, None if seeds else seed)
         task = task_of(loaded)
         say(out, f"{task.robot} jumps: {task.name}")
@@ -139,6 +160,22 @@ def jump(
             options = OneRunOptions(record=place, as_json=as_json, times=False)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned})
     raise typer.Exit(code)
+
+
+def planner_of(path: Path, running: TrialOptions, nearest: bool, out: Console) -> Prepare:
+    """What plans a task and loads its graph, with the trial and settings of the command line."""
+
+    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
+        settings = [*settings_for(changes, running.trial), *(running.overrides or []), *further]
+        loaded = load_jump(path, settings, None)
+        task = task_of(loaded)
+        planned = plan_of(task, loaded, nearest, out)
+        plan = library_of(loaded).find(task)
+        if plan is None:
+            raise AloftError(f"{task.name}: {planned['reason']}")
+        return PlannedGraph(loaded, plan)
+
+    return prepare
 
 
 def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> dict[str, float]:
@@ -212,7 +249,7 @@ def usual_rise(path: Path) -> float | None:
     return task_of(load_jump(path, [], None)).rise
 
 
-def settings_for(asked: dict[str, float], trial: str) -> list[str]:
+def settings_for(asked: Mapping[str, float], trial: str) -> list[str]:
     """The overrides of a graph for what was asked."""
     from ..files.nodes import text_of
     from ..studies.rehearsal import trial_settings

@@ -13,7 +13,12 @@ asks for, and the drive's own loop acts on as much of the error as the command's
     phi_goal' = phi' + d (phi_d' - phi')           d: share of its damping
     kappa     = A^-T (tau + Kp (q_d - q) + Kd (q_d' - q')) - s P (phi_d - phi) - d D (phi_d' - phi')
 
-With the gains that the drives were given, ``s`` and ``d`` are 1 and ``kappa`` is the feedforward
+**Motors as they are.** Where ``motor_model`` says how a motor differs from its nominal torque constant, the
+driver asks of it the nominal torque r for which it gives the torque t that the joints need::
+
+    t = c r (1 - s (r / peak)^2) - f |r| tanh(v / v_0)
+
+**Shares.** With the gains that the drives were given, ``s`` and ``d`` are 1 and ``kappa`` is the feedforward
 alone: the whole feedback runs in the drives. With zero gains both are 0: the goals then are the
 measured motion, carried on by the time ``T`` that passes until they arrive, and the drive adds no
 torque of its own. What the drives cannot give, such as different gains on coupled joints, is left
@@ -22,13 +27,16 @@ in ``kappa`` and runs at the rate of the bus instead.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ..blocks.signals import JointCommand
 from ..mathematics.arrays import Array, Array1D, Array2D
+from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
@@ -47,8 +55,61 @@ _DAMPING_TIME = 0.025
 """The default damping as a time of the stiffness [s]."""
 
 
+_SLIDING = 0.2
+"""The speed [rad/s] at which the load friction of a gear has three quarters of its size."""
+_ROUNDS = 8
+"""Fixed-point rounds in which the nominal torque is found: at 12 % saturation 1e-4 of it is left."""
+
+
+class MotorModel(Parameters):
+    """How motors differ from their nominal torque constants, as far as it is known.
+
+    Values by motor are given by name or shell pattern; later entries win, and motors that none
+    matches are nominal.
+    """
+
+    torque_constant: float | dict[str, float] = parameter(
+        1.0, text="factor on the nominal torque constant, of all motors or by motor"
+    )
+    saturation: float = parameter(
+        0.0, ge=0.0, le=0.3,
+        text="share of the torque that is missing at the peak torque; it grows with its square",
+    )  # fmt: skip
+    load_friction: float = parameter(
+        0.0, ge=0.0, le=0.3, text="share of the torque that the gear loses to friction under load"
+    )
+
+    def constants(self, robot: RobotDescription) -> Array:
+        """The factor of every motor, (n_joints,)."""
+        given = self.torque_constant
+        patterns = given if isinstance(given, dict) else {"*": given}
+        out = np.ones(len(robot.joints))
+        for k, name in enumerate(robot.transmission.motors):
+            for pattern, value in patterns.items():
+                if fnmatchcase(name, pattern):
+                    out[k] = value
+        return out
+
+    def unmet(self, robot: RobotDescription) -> Iterator[UnmetRequirement]:
+        """Report factors that are not positive, or of motors that are not there."""
+        given = self.torque_constant
+        for pattern, value in (given if isinstance(given, dict) else {"*": given}).items():
+            place = f"motor_model.torque_constant of {pattern}"
+            if not 0.5 <= value <= 2.0:
+                yield UnmetRequirement(
+                    f"{place} is {value:g}", parameter="motor_model",
+                    expected="a factor from 0.5 to 2", found=f"{value:g}",
+                    fix="the measured torque constant divided by the nominal one",
+                )  # fmt: skip
+            if not any(fnmatchcase(name, pattern) for name in robot.transmission.motors):
+                yield UnmetRequirement(
+                    f"{robot.name} has no motor {pattern}", parameter="motor_model",
+                    expected=", ".join(robot.transmission.motors), found=pattern,
+                )  # fmt: skip
+
+
 class DriveGains(Parameters):
-    """The gains of the joints that the drives' own loops are set for."""
+    """The gains of the joints that the drives' own loops are set for, and what is known of the motors."""
 
     stiffness: PerJoint | None = parameter(
         None, unit="N m/rad", ge=0.0,
@@ -62,6 +123,9 @@ class DriveGains(Parameters):
         "exact",
         text="if no motor gains give these joints' gains: refuse them, or take the nearest and let "
         "the driver add what is lost at the rate of the bus",
+    )
+    motor_model: MotorModel = parameter(
+        MotorModel(), text="how the motors differ from their nominal torque constants"
     )
 
 
@@ -78,7 +142,9 @@ def joint_gains(params: DriveGains, robot: RobotDescription) -> tuple[Array, Arr
 
 
 def gain_requirements(params: DriveGains, robot: RobotDescription) -> Iterator[UnmetRequirement]:
-    """Report gains that no drives can give the joints, unless the nearest ones are asked for."""
+    """Report gains that no drives can give the joints, unless the nearest ones are asked for, and a
+    model of other motors."""
+    yield from params.motor_model.unmet(robot)
     if params.gains == "nearest":
         return
     for name, given, gains in zip(
@@ -156,7 +222,9 @@ class GoalScratch(Signal):
 class Gears(NamedTuple):
     """Between joints and drives: ``to_motor``, ``torque_to_motor`` and ``torque_to_joint`` (n, n), the
     gains of the joints that the drives were set for, ``stiffness`` and ``damping`` (n,), the drives' own
-    gains at the motors' outputs, ``motor_stiffness`` and ``motor_damping`` (n,), and the ``lead`` [s]."""
+    gains at the motors' outputs, ``motor_stiffness`` and ``motor_damping`` (n,), and the ``lead`` [s]. Of
+    the motors: the factor on the torque ``constant`` and the ``peak`` torque [N m], (n,), ``saturation`` and
+    ``load_friction``."""
 
     to_motor: Array2D
     torque_to_motor: Array2D
@@ -166,6 +234,59 @@ class Gears(NamedTuple):
     motor_stiffness: Array1D
     motor_damping: Array1D
     lead: float
+    constant: Array1D
+    peak: Array1D
+    saturation: float
+    load_friction: float
+
+
+@kernel
+def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> float:
+    """The torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
+    constant, peak = gears.constant[motor], gears.peak[motor]
+    lost = gears.load_friction * math.tanh(speed / _SLIDING)
+    asked: float = torque / constant
+    if gears.saturation > 0.0 or gears.load_friction > 0.0:
+        for _ in range(_ROUNDS):
+            load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
+            asked = (torque + lost * abs(asked)) / (
+                constant * (1.0 - gears.saturation * load * load)
+            )
+    return asked
+
+
+@kernel
+def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
+    """The torque [N m] that a motor gives of what is asked of it: the inverse of ``nominal_torque``."""
+    peak = gears.peak[motor]
+    load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
+    given: float = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
+    return given - gears.load_friction * abs(asked) * math.tanh(speed / _SLIDING)
+
+
+class TorqueScratch(NamedTuple):
+    """Of the motors: torque and speed, (n_joints,)."""
+
+    torque: Array1D
+    speed: Array1D
+
+
+@kernel
+def correct_torque(
+    gears: Gears, scratch: TorqueScratch, velocity: Array1D, torque: Array1D
+) -> None:
+    """Change joint torques [N m] by the nominal torque constants to those that the motors give.
+
+    Args:
+        velocity: of the joints [rad/s].
+    """
+    multiply_vector(gears.torque_to_motor, torque, scratch.torque)
+    multiply_vector(gears.to_motor, velocity, scratch.speed)
+    for k in range(torque.shape[0]):
+        asked: float = scratch.torque[k]
+        speed: float = scratch.speed[k]
+        scratch.torque[k] = true_torque(gears, k, asked, speed)
+    multiply_vector(gears.torque_to_joint, scratch.torque, torque)
 
 
 @kernel
@@ -200,6 +321,7 @@ def make_goals(
     multiply_vector(gears.to_motor, scratch.velocity_error, goals.velocity)
     for k in range(goals.torque.shape[0]):
         angle, speed = measured.position[k], measured.velocity[k]
+        goals.torque[k] = nominal_torque(gears, k, goals.torque[k], speed)
         share = smallest_share(gears, k, stiffness, gears.stiffness)
         error = goals.position[k] * share
         # Where the drive follows the target by itself, its goal needs no lead.
@@ -218,6 +340,7 @@ class DriveGoals:
         stiffness, damping: the joints' gains that the drives were set for [N m/rad, N m s/rad].
         motor_stiffness, motor_damping: the drives' own gains, at the motors' outputs.
         lead: the time from a measurement to when the goals made from it act [s].
+        motors: what is known of the motors.
 
     Attributes:
         torque, position, velocity: the goals of every motor [N m, rad, rad/s], (n_joints,).
@@ -225,9 +348,11 @@ class DriveGoals:
 
     def __init__(
         self, robot: RobotDescription, stiffness: Array, damping: Array, motor_stiffness: Array,
-        motor_damping: Array, lead: float,
+        motor_damping: Array, lead: float, motors: MotorModel | None = None,
     ) -> None:  # fmt: skip
-        self.gears = gears_of(robot, stiffness, damping, motor_stiffness, motor_damping, lead)
+        self.gears = gears_of(
+            robot, stiffness, damping, motor_stiffness, motor_damping, lead, motors
+        )
         goals = MotorGoals.allocate(robot.dimensions)
         self.torque, self.position, self.velocity = goals.torque, goals.position, goals.velocity
         self._targets = CommandTargets.allocate({**robot.dimensions, "n_queue": 1})
@@ -236,6 +361,11 @@ class DriveGoals:
         self._make = signal_call(
             make_goals, self.gears, self._targets, 0, self._measured, goals, scratch
         )
+        self._nominal = motors is None or motors == MotorModel()
+        n = len(robot.joints)
+        room = TorqueScratch(np.zeros(n), np.zeros(n))
+        self._speed, self._torque = np.zeros(n), np.zeros(n)
+        self._correct = signal_call(correct_torque, self.gears, room, self._speed, self._torque)
 
     def follow(
         self, command: JointCommand, position: Array, velocity: Array, joint_position: Array,
@@ -250,6 +380,15 @@ class DriveGoals:
         measured.joint_position[:], measured.joint_velocity[:] = joint_position, joint_velocity
         self._make.run()
 
+    def correct(self, velocity: Array, torque: Array) -> None:
+        """Change measured joint torques [N m] to those that the motors give; the joints' velocity
+        [rad/s] says which way they turn."""
+        if self._nominal:
+            return
+        self._speed[:], self._torque[:] = velocity, torque
+        self._correct.run()
+        torque[:] = self._torque
+
     def hold(self, position: Array) -> None:
         """Set the goals to motor angles [rad] at rest, without any torque of their own."""
         self.torque.fill(0.0)
@@ -259,12 +398,27 @@ class DriveGoals:
 
 def gears_of(
     robot: RobotDescription, stiffness: Array, damping: Array, motor_stiffness: Array,
-    motor_damping: Array, lead: float,
+    motor_damping: Array, lead: float, motors: MotorModel | None = None,
 ) -> Gears:  # fmt: skip
     """The gears of a robot; arguments as for ``DriveGoals``."""
+    motors = motors or MotorModel()
     matrix = np.ascontiguousarray(robot.joint_to_motor)
     return Gears(
         matrix, np.ascontiguousarray(robot.torque_to_motor), np.ascontiguousarray(matrix.T),
         np.array(stiffness), np.array(damping), np.array(motor_stiffness),
-        np.array(motor_damping), float(lead),
+        np.array(motor_damping), float(lead), motors.constants(robot),
+        np.array(robot.motors.peak_torque), motors.saturation, motors.load_friction,
     )  # fmt: skip
+
+
+def correcting(
+    params: DriveGains, robot: RobotDescription, velocity: Array, torque: Array
+) -> list[KernelCall]:
+    """The call that corrects measured joint torques; none where all motors are nominal."""
+    if params.motor_model == MotorModel():
+        return []
+    n = len(robot.joints)
+    none = np.zeros(n)
+    gears = gears_of(robot, none, none, none, none, 0.0, params.motor_model)
+    scratch = TorqueScratch(np.zeros(n), np.zeros(n))
+    return [signal_call(correct_torque, gears, scratch, velocity, torque)]

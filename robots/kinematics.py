@@ -155,6 +155,22 @@ def standing_heights(robot: RobotDescription) -> Array:
     return heights
 
 
+def standing_contacts(robot: RobotDescription) -> Array:
+    """Where the contact points are in the standing pose, from the middle between the feet, (n_contacts, 3)."""
+    poses = link_poses_in_base(robot, robot.standing_position)
+    links = {foot.name: foot.link for foot in robot.feet}
+    points = np.array(
+        [
+            poses[links[contact.foot]][1] + product(poses[links[contact.foot]][0], centre)
+            for contact, centre in zip(robot.contacts, contact_centres(robot), strict=True)
+        ]
+    )
+    owners = np.array(robot.foot_of_contact())
+    middles = [points[owners == foot].mean(axis=0) for foot in range(len(robot.feet))]
+    found: Array = points - np.mean(middles, axis=0)
+    return found
+
+
 def standing_com(robot: RobotDescription) -> Array:
     """The centre of mass in the standing pose [m, base frame], (3,)."""
     poses = link_poses_in_base(robot, robot.standing_position)

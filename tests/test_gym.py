@@ -54,8 +54,8 @@ def test_a_seed_repeats_an_episode_and_episodes_without_differ() -> None:
 def test_an_episode_ends_by_a_block_or_by_the_duration() -> None:
     env = environment()
     env.reset(seed=1)
-    ended = [env.step(np.array([10.0]))[2:] for _ in range(2)]
-    assert ended[1][:2] == (True, False) and "bounds" in ended[1][2]["reason"]
+    ended = env.step(np.array([10.0]))[2:]
+    assert ended[:2] == (True, False) and "bounds" in ended[2]["reason"]
     env.reset(seed=1)
     steps = 0
     while True:
@@ -65,6 +65,46 @@ def test_an_episode_ends_by_a_block_or_by_the_duration() -> None:
         if truncated:
             break
     assert steps == 20 and info["reason"] == "the duration is over"
+
+
+def test_a_step_after_the_end_is_an_error() -> None:
+    env = environment()
+    env.reset(seed=1)
+    while not env.step(np.array([10.0]))[2]:
+        pass
+    with pytest.raises(AloftError, match=r"the episode is over \(.*bounds.*\); call reset"):
+        env.step(np.zeros(1))
+    env.reset(seed=1)
+    env.step(np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ([10.5], "element 0 of the action is 10.5, outside of its limits -10 to 10"),
+        ([np.nan], "element 0 of the action is nan, outside"),
+        ([0.0, 0.0], r"an action has the shape \(1,\), not \(2,\)"),
+    ],
+)
+def test_an_action_outside_its_box_is_an_error(action: list[float], message: str) -> None:
+    env = environment()
+    env.reset(seed=1)
+    with pytest.raises(AloftError, match=message):
+        env.step(np.array(action))
+
+
+def test_normalised_actions_stand_for_the_limits() -> None:
+    found = []
+    for normalised, action in ((False, -4.0), (True, -0.4)):
+        env = environment(normalised=normalised)
+        env.reset(seed=2)
+        found.append(env.step(np.array([action]))[0])
+    assert np.array_equal(*found) and env.action_space.high == [1.0]
+    with pytest.raises(AloftError, match="normalised actions need finite action_limits"):
+        gym.make(
+            GRAPH, action="action", observation="place.y.value", reward="reward.y.value",
+            action_limits=(-1.0, np.inf), normalised=True,
+        )  # fmt: skip
 
 
 def test_many_live_in_one_process() -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import IntEnum
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D
 from ...mathematics.kernel import kernel
-from ...mathematics.linear_algebra import inverse, product
+from ...mathematics.linear_algebra import inverse, multiply_vector, product
 from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Clock, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -28,6 +27,7 @@ from ..signals import (
     WholeBodyCommand,
 )
 from ..signals.robot import HEALTHY, describe_conditions
+from .safety_faults import SWITCH_TEXTS, TEXTS, SafetyFault, is_of_hardware
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
@@ -37,48 +37,6 @@ _ANSWERED = 0x80
 """The bit that every condition has."""
 UNSTAMPED = -1.0
 """The time stamp of a robot that does not report when it measured."""
-
-
-class SafetyFault(IntEnum):
-    """The reason why the robot was put into damping."""
-
-    NONE = 0
-    TILT = 1
-    """The base leant too far for too long."""
-    JOINT_LIMIT = 2
-    """A joint went beyond its limits."""
-    JOINT_SPEED = 3
-    """A joint turned too fast for too long."""
-    STALE_SENSORS = 4
-    """Joint readings stopped changing."""
-    ABSURD_STATE = 5
-    """A state is not finite or beyond anything the robot can do."""
-    ABSURD_COMMAND = 6
-    """A command is not finite or beyond anything the drives can do."""
-    SOLVER = 7
-    """The whole-body controller failed too often in a row."""
-    DRIVE = 8
-    """A drive reports an error."""
-    SILENT_DRIVE = 9
-    """A drive has not answered for too long."""
-    VOLTAGE = 10
-    """The supply voltage of a drive was too low for too long."""
-    TEMPERATURE = 11
-    """The winding of a drive was too hot for too long."""
-    CURRENT = 12
-    """The current of a drive was too large for too long."""
-    SILENT_IMU = 13
-    """The sensor board has sent nothing for too long."""
-    INVALID_JOINTS = 14
-    """The joint readings were marked as not valid for too long."""
-    INVALID_IMU = 15
-    """The IMU's readings were marked as not valid for too long."""
-    INVALID_CONTACTS = 16
-    """The foot switches' readings were marked as not valid for too long."""
-    STALE_HEALTH = 17
-    """The robot's time stamp stopped changing."""
-    SWITCH = 18
-    """A foot switch is stuck or bounces."""
 
 
 class SafetyParams(Parameters):
@@ -106,8 +64,19 @@ class SafetyParams(Parameters):
         text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
     )  # fmt: skip
     lowest_voltage: float | None = parameter(
-        None, unit="V", gt=0.0, text="lowest supply voltage of a drive; none: not judged"
+        None, unit="V", gt=0.0, text="lowest voltage of the pack without load; none: not judged"
     )
+    brown_out_voltage: float = parameter(
+        0.0, unit="V", ge=0.0, text="lowest voltage of a drive under any load"
+    )
+    pack_resistance: float = parameter(
+        0.0,
+        unit="ohm",
+        ge=0.0,
+        text="of the pack and its leads: under load the voltage may be lower",
+    )
+    winding_resistance: float = parameter(0.2, unit="ohm", ge=0.0, text="of a motor, for its load")
+    torque_constant: float = parameter(0.35, unit="N m/A", gt=0.0, text="of a motor, for its load")
     highest_temperature: float = parameter(
         80.0, gt=0.0, le=200.0, text="highest temperature of a winding [deg C]"
     )
@@ -152,6 +121,7 @@ class SafetyState(Signal):
     strong = Field("n_joints", dtype="int64", text="ticks in a row each current was too large")
     invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
     stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
+    motor_torque = Field("n_joints", unit="N m", text="measured torques of the motors")
     fault_place = Field(dtype="int64", text="index of the motor or switch that was at fault")
     fault_value = Field(text="what it measured, in the unit of its signal")
 
@@ -165,6 +135,7 @@ class SafetyConstants(Signal):
     torque = Field("n_joints", unit="N m", text="greatest torques of a command")
     damping = Field("n_joints", unit="N m s/rad", text="joint damping after a fault")
     lowest_voltage = Field(unit="V", text="zero: not judged")
+    torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of the motors")
     largest_current = Field(unit="A", text="infinite: not judged")
     tilt_ticks = Field(dtype="int64", text="how many ticks the base may lean too far")
     joint_ticks = Field(dtype="int64", text="how many a joint may be beyond its limits")
@@ -188,7 +159,8 @@ class SafetyMonitor(Block):
     * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row;
     * while the drives are on, the robot's own report (``health``) is bad: a drive reports an error,
       its last answer is older than ``answer_age`` or the sensor board's packet than ``imu_age``; a
-      voltage, temperature or current is beyond its limit for ``health_hold``; joints, IMU or
+      voltage, temperature or current is beyond its limit for ``health_hold`` (under load the voltage may
+      be lower, by ``pack_resistance``, but not below ``brown_out_voltage``); joints, IMU or
       switches are marked as not valid for ``invalid_hold``; the time stamp stays for ``stamp_age``;
     * a foot switch is at fault, and ``SwitchMonitor`` asks to stop.
 
@@ -234,6 +206,7 @@ class SafetyMonitor(Block):
         constants.torque[:] = 10.0 * peak if given[1] is None else given[1].resolve(robot)
         constants.damping[:] = peak / _DAMPED_SPEED if given[2] is None else given[2].resolve(robot)
         constants.lowest_voltage = p.lowest_voltage or 0.0
+        constants.torque_to_motor[:] = robot.torque_to_motor
         constants.largest_current = p.largest_current or np.inf
         constants.tilt_ticks = round(p.tilt_hold / period)
         constants.joint_ticks = round(p.joint_hold / period)
@@ -259,7 +232,7 @@ class SafetyMonitor(Block):
         fault = judge_motion(desired, base, joints, wbc, state, params, constants)
         place, value = 0, 0.0
         if health.state > DrivePhase.OFF and health.state < DrivePhase.DAMPED:
-            found, drive = judge_health(health, state, params, constants)
+            found, drive = judge_health(health, joints, state, params, constants)
             if fault == SafetyFault.NONE:
                 fault, place, value = found, drive, measured_value(health, found, drive)
         if fault == SafetyFault.NONE and switches.stop:
@@ -411,12 +384,20 @@ def count_unchanged(joints: JointState, state: SafetyState) -> None:
 
 @kernel
 def judge_health(
-    health: RobotHealth, state: SafetyState, params: SafetyParams, constants: SafetyConstants
+    health: RobotHealth,
+    joints: JointState,
+    state: SafetyState,
+    params: SafetyParams,
+    constants: SafetyConstants,
 ) -> tuple[int, int]:
     """The gravest fault of the hardware, and the drive that has it; updates all counts."""
     fault, place = 0, 0
+    lowest = constants.lowest_voltage
+    if params.pack_resistance > 0.0:
+        lowest -= sag_under_load(health, joints, state, params, constants)
+    lowest = max(lowest, params.brown_out_voltage)
     for k in range(health.condition.shape[0]):
-        found = judge_drive(health, state, params, constants, k)
+        found = judge_drive(health, state, params, constants, lowest, k)
         if found != 0 and (fault == 0 or found < fault):
             fault, place = found, k
     found = judge_sensors(health, state, params, constants)
@@ -426,16 +407,41 @@ def judge_health(
 
 
 @kernel
+def sag_under_load(
+    health: RobotHealth,
+    joints: JointState,
+    state: SafetyState,
+    params: SafetyParams,
+    constants: SafetyConstants,
+) -> float:
+    """By how much [V] the pack's voltage is below that without load, from the work of the motors and
+    the heat of their windings."""
+    count = health.voltage.shape[0]
+    multiply_vector(constants.torque_to_motor, joints.torque, state.motor_torque)
+    power, total = 0.0, 0.0
+    for k in range(count):
+        current = state.motor_torque[k] / params.torque_constant
+        power += joints.torque[k] * joints.velocity[k]
+        power += params.winding_resistance * current * current
+        total += health.voltage[k]
+    if not (power > 0.0 and total > 0.0):
+        return 0.0
+    return float(params.pack_resistance * power * count / total)
+
+
+@kernel
 def judge_drive(
     health: RobotHealth,
     state: SafetyState,
     params: SafetyParams,
     constants: SafetyConstants,
+    lowest: float,
     k: int,
 ) -> int:
-    """The gravest fault of drive ``k``; updates its counts. A voltage of zero was not measured."""
+    """The gravest fault of drive ``k``, whose voltage may be as low as ``lowest`` [V]; updates its counts.
+    A voltage of zero was not measured."""
     condition, voltage = health.condition[k], health.voltage[k]
-    low = 0.0 < voltage < constants.lowest_voltage
+    low = 0.0 < voltage < lowest
     hot = not health.temperature[k] <= params.highest_temperature
     strong = not abs(health.current[k]) <= constants.largest_current
     state.low[k] = state.low[k] + 1 if low else 0
@@ -533,31 +539,6 @@ def damp(position: Array1D, damping: Array1D, command: JointCommand) -> None:
 # Reasons in words
 
 
-TEXTS = {
-    SafetyFault.TILT: "the base leant more than `tilt_limit`",
-    SafetyFault.JOINT_LIMIT: "a joint went beyond its limits",
-    SafetyFault.JOINT_SPEED: "a joint turned faster than `speed_limit`",
-    SafetyFault.STALE_SENSORS: "the joint readings stopped changing",
-    SafetyFault.ABSURD_STATE: "the state is not finite, or beyond anything the robot can do",
-    SafetyFault.ABSURD_COMMAND: "the command is not finite, or beyond anything the drives can do",
-    SafetyFault.SOLVER: "the whole-body controller failed too often in a row",
-}
-"""The faults of motion and computation in words; those of the hardware name a drive and a value."""
-
-
-SWITCH_TEXTS = {
-    SwitchFault.STUCK_CLOSED: "is stuck: it was closed in the air",
-    SwitchFault.STUCK_OPEN: "is stuck: it was open under a foot that stood",
-    SwitchFault.BOUNCING: "bounces: it opened and closed too often",
-}
-"""What is wrong with a foot switch, in words."""
-
-
-def is_of_hardware(fault: SafetyFault) -> bool:
-    """Whether the robot's hardware reported the fault, so that the run must end."""
-    return fault >= SafetyFault.DRIVE
-
-
 def health_text(fault: SafetyFault, motor: str, value: float, params: SafetyParams) -> str:
     """A fault of the hardware in words, with its limit and the measured value.
 
@@ -574,9 +555,13 @@ def health_text(fault: SafetyFault, motor: str, value: float, params: SafetyPara
                 f"{1e3 * params.answer_age:g} ms"
             )
         case SafetyFault.VOLTAGE:
-            return (
-                f"drive {motor}: {value:.1f} V is below lowest_voltage, {params.lowest_voltage:g} V"
-            )
+            if value < params.brown_out_voltage:
+                limit = f"brown_out_voltage, {params.brown_out_voltage:g} V"
+            elif params.pack_resistance > 0.0:
+                limit = f"lowest_voltage, {params.lowest_voltage:g} V without load"
+            else:
+                limit = f"lowest_voltage, {params.lowest_voltage:g} V"
+            return f"drive {motor}: {value:.1f} V is below {limit}"
         case SafetyFault.TEMPERATURE:
             return (
                 f"drive {motor}: its winding has {value:.0f} deg C; highest_temperature is "

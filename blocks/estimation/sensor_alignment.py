@@ -1,11 +1,18 @@
-"""Brings the readings of sensors of different delays to one time, that of the latest one."""
+"""Brings the readings of sensors to one time and one place, by what is known of the sensors."""
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from ...mathematics.arrays import Array1D, Array2D
+from ...mathematics.compiling.expressions import cross
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import exponential, rotate
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
+from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import ImuReading, JointState
 
@@ -13,13 +20,29 @@ SAMPLES = 16
 """The number of samples that are remembered."""
 
 
+_TURNING = 0.1
+"""The torque [N m] that holds a rotor at three quarters of the width of its play."""
+_CROSSING = 0.005
+"""The time constant in which a rotor crosses its play [s]."""
+
+
 class SensorAlignmentParameters(Parameters):
-    """The parameters of ``SensorAlignment``: by how much each reading is older than the tick."""
+    """The parameters of ``SensorAlignment``: by how much each reading is older than the tick, where the
+    IMU is, and the play of the gears."""
 
     rate: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of the gyroscope's readings")
     force: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of the accelerometer's")
     position: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of joint angles")
     velocity: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of joint velocities")
+    imu_position: ThreeNumbers = parameter(
+        (0.0, 0.0, 0.0), unit="m", text="where the IMU is, from the base's origin, base frame"
+    )
+    imu_rotation: ThreeNumbers = parameter(
+        (0.0, 0.0, 0.0), unit="rad", text="rotation vector from the base's axes to the IMU's"
+    )
+    play: PerJoint = parameter(
+        PerJoint(0.0), unit="rad", ge=0.0, text="width of the gear's play before each encoder"
+    )
 
 
 class AlignmentMemory(Signal):
@@ -30,6 +53,27 @@ class AlignmentMemory(Signal):
     position = Field((SAMPLES, "n_joints"), unit="rad", text="joint angles")
     velocity = Field((SAMPLES, "n_joints"), unit="rad/s", text="joint velocities")
     count = Field(dtype="int64", text="how many samples there were")
+    turning = Field(3, unit="rad/s", frame="body", text="angular velocity in the tick before")
+    play = Field("n_joints", unit="rad", text="where in its play each rotor is")
+
+
+class AlignmentConstants(Signal):
+    """What follows from the parameters."""
+
+    to_base = Field(4, text="quaternion from the IMU's axes to the base's")
+    place = Field(3, unit="m", frame="body", text="where the IMU is")
+    moved = Field(dtype="bool", text="whether the IMU is not at the base's origin with its axes")
+    play = Field("n_joints", unit="rad", text="half the width of each play")
+    has_play = Field(dtype="bool", text="whether there is any play")
+
+
+class AlignmentScratch(Signal):
+    """Room for a step of ``SensorAlignment``."""
+
+    rate = Field(3, unit="rad/s", frame="body", text="an angular velocity")
+    force = Field(3, unit="m/s^2", frame="body", text="a specific force")
+    swing = Field(3, unit="rad/s^2", frame="body", text="angular acceleration")
+    inwards = Field(3, unit="m/s", frame="body", text="velocity of the IMU's place by the rotation")
 
 
 class SensorAlignment(Block):
@@ -42,16 +86,36 @@ class SensorAlignment(Block):
     delay that is longer by the oldest age, by ``delay.told`` with ``delay.follow: told``. A filter counts with its
     delay of slow signals: its time constant, or d / (pi f) for one of second order with cutoff f and damping d.
 
+    The IMU's readings are turned to the base's axes and brought to the base's origin, from r, where it is::
+
+        f_base = f - w' x r - w x (w x r)
+
+    with the angular acceleration w' of the last tick. An encoder on the motor, behind a gear with play, reads
+    half the play more or less, by the sign of the torque, which is measured; that is taken off.
+
     With equal ages the outputs are the inputs. An age beyond 15 ticks of the oldest is taken for 15.
     """
 
     Params = SensorAlignmentParameters
+    Constants = AlignmentConstants
+    Scratch = AlignmentScratch
+    needs = ("robot",)
+    params: SensorAlignmentParameters
+    constants: AlignmentConstants
 
     measured_imu = Input(ImuReading, text="readings of the IMU")
     measured_joints = Input(JointState, text="readings of the joints")
     imu = Output(ImuReading, text="at the common time")
     joints = Output(JointState, text="at the common time; torques as measured")
     memory = State(AlignmentMemory, text="the last samples")
+
+    def setup(self) -> None:
+        p, constants = self.params, self.constants
+        exponential(np.array(p.imu_rotation), constants.to_base)
+        constants.place[:] = p.imu_position
+        constants.moved = any((*p.imu_position, *p.imu_rotation))
+        constants.play[:] = 0.5 * p.play.resolve(self.robot)
+        constants.has_play = bool(constants.play.any())
 
     @kernel
     @staticmethod
@@ -62,6 +126,8 @@ class SensorAlignment(Block):
         joints: JointState,
         memory: AlignmentMemory,
         params: SensorAlignmentParameters,
+        constants: AlignmentConstants,
+        scratch: AlignmentScratch,
         period: float,
     ) -> None:
         oldest = max(max(params.rate, params.force), max(params.position, params.velocity))
@@ -75,7 +141,46 @@ class SensorAlignment(Block):
         interpolate(memory.position, count, (oldest - params.position) / period, joints.position)
         interpolate(memory.velocity, count, (oldest - params.velocity) / period, joints.velocity)
         joints.torque[:] = measured_joints.torque
+        if constants.moved:
+            bring_to_base(imu, constants, scratch, memory, period)
+        if constants.has_play:
+            take_off_play(joints, constants, memory, period)
         memory.count = count + 1
+
+
+@kernel
+def bring_to_base(
+    imu: ImuReading,
+    constants: AlignmentConstants,
+    scratch: AlignmentScratch,
+    memory: AlignmentMemory,
+    period: float,
+) -> None:
+    """Change a reading of the IMU to what one at the base's origin, with its axes, reads."""
+    rate, force = scratch.rate, scratch.force
+    rotate(constants.to_base, imu.angular_velocity, rate)
+    rotate(constants.to_base, imu.specific_force, force)
+    if memory.count == 0:
+        memory.turning[:] = rate
+    swing, inwards, place = scratch.swing, scratch.inwards, constants.place
+    swing[:] = (rate - memory.turning) / period
+    inwards[:] = cross(rate, place)
+    force[:] = force - cross(swing, place) - cross(rate, inwards)
+    memory.turning[:] = rate
+    imu.angular_velocity[:] = rate
+    imu.specific_force[:] = force
+
+
+@kernel
+def take_off_play(
+    joints: JointState, constants: AlignmentConstants, memory: AlignmentMemory, period: float
+) -> None:
+    """Take off joint angles [rad] what the gears' play adds to them, by the measured torques."""
+    share = -math.expm1(-period / _CROSSING)
+    for k in range(joints.position.shape[0]):
+        end = constants.play[k] * math.tanh(joints.torque[k] / _TURNING)
+        memory.play[k] += share * (end - memory.play[k])
+        joints.position[k] -= memory.play[k]
 
 
 @kernel

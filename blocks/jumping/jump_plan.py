@@ -22,7 +22,7 @@ from ...runtime.language.block import Block, Context, Input, Metric, Output, Sta
 from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
-from ..signals import DelayEstimate, DynamicsTerms, JumpReference
+from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from .plan_progress import (
     PlanProgress,
     ProgressConstants,
@@ -35,6 +35,7 @@ from .plan_progress import (
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
     from ...planner.library.library import PlanLibrary
+    from ...planner.library.rehearsed import Vector
     from ...planner.task.plan import PlannedJump
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
@@ -87,7 +88,9 @@ class JumpPlan(Block):
     ``landing_height``, ``distance`` [m, forward and left], ``yaw`` [rad], and ``rise`` [m] where the
     task gives it for a single jump. It also exports the ``velocity_correction`` [m/s] and the
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
-    (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``.
+    (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``. To
+    them is added what the robot itself has learnt from its last jumps of this and of other tasks
+    (``aloft jump --learn``), if ``learnt`` names the file.
 
     But for this, the progress and the rotation the block follows time alone. It raises ``BlockError`` at
     load where the task cannot be read or is for another robot, where it cannot be planned, or where its
@@ -121,6 +124,9 @@ class JumpPlan(Block):
         )
         rehearsed: bool = parameter(
             True, text="whether what a rehearsal of this plan has learnt is exported to the graph"
+        )
+        learnt: str = parameter(
+            "", text="file of what the robot has learnt from its own jumps; none: nothing"
         )
 
     Constants = ProgressConstants
@@ -211,28 +217,55 @@ class JumpPlan(Block):
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
-        """What a rehearsal has learnt; for both the same ``UnmetRequirement`` where its file is damaged."""
-        from ...planner.library.rehearsed import (
-            ZERO,
-            RehearsalFileError,
-            controller_hash,
-            find_rehearsed,
-        )
+        """What was learnt, in rehearsals and by the robot itself; for both corrections the same
+        ``UnmetRequirement`` where a file is damaged."""
+        from ...planner.library.learnt import LearntFileError
+        from ...planner.library.rehearsed import RehearsalFileError
 
-        assert context.robot is not None
-        if not params.rehearsed:
-            return list(ZERO), list(ZERO)
-        rate = 1.0 / context.clock.base_period
-        controller = controller_hash(context.graph, rate, context.path)
         try:
-            task = _as_planned(task, params.formulation)
-            found = find_rehearsed(plan_library(params, context.robot), task, controller)
+            rehearsed = cls._rehearsed(task, params, context)
         except RehearsalFileError as error:
             damaged = UnmetRequirement(str(error), fix=f"{context.path}.rehearsed: false")
             return damaged, damaged
+        try:
+            learnt = cls._learnt(task, params, context)
+        except LearntFileError as error:
+            damaged = UnmetRequirement(str(error), parameter="learnt")
+            return damaged, damaged
+        velocity, momentum = (
+            [a + b for a, b in zip(first, second, strict=True)]
+            for first, second in zip(rehearsed, learnt, strict=True)
+        )
+        return velocity, momentum
+
+    @classmethod
+    def _rehearsed(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
+        """What a rehearsal has learnt."""
+        from ...planner.library.rehearsed import ZERO, controller_hash, find_rehearsed
+
+        assert context.robot is not None
+        if not params.rehearsed:
+            return ZERO, ZERO
+        rate = 1.0 / context.clock.base_period
+        controller = controller_hash(context.graph, rate, context.path)
+        task = _as_planned(task, params.formulation)
+        found = find_rehearsed(plan_library(params, context.robot), task, controller)
         if found is None:
-            return list(ZERO), list(ZERO)
-        return list(found.velocity_correction), list(found.momentum_correction)
+            return ZERO, ZERO
+        return found.velocity_correction, found.momentum_correction
+
+    @classmethod
+    def _learnt(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
+        """What the robot itself has learnt."""
+        from ...planner.library.learnt import launch_of, read_learnt
+        from ...planner.library.rehearsed import ZERO
+
+        assert context.robot is not None
+        if not params.learnt:
+            return ZERO, ZERO
+        beside = context.folder / params.learnt
+        path = beside if beside.is_file() else context.graph_folder / params.learnt
+        return read_learnt(path, context.robot.name).correction(launch_of(task))
 
     def setup(self) -> None:
         from ...planner.library.once import reference_table_once
@@ -347,6 +380,39 @@ def follow_plan(
         follow_fall(time, terms, reference, progress, params, constants)
     if constants.follows_turn:
         follow_turn(time, terms, reference, rotation, progress, constants)
+
+
+class TriggeredJumpPlan(JumpPlan):
+    """A ``JumpPlan`` that begins when the robot stands, and not with the run.
+
+    While the ``phase`` of the tick before is HANG the reference is the beginning of the plan, and
+    ``reference.time`` is negative. Wire it with ``{from: phase.phase, delay: 1, initial: {phase: -1}}``.
+    """
+
+    phase = Input(PhaseState, text="the phase; the plan begins after HANG")
+
+    @kernel
+    @staticmethod
+    def step(  # type: ignore[override]  # it has another port
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        phase: PhaseState,
+        reference: JumpReference,
+        progress: PlanProgress,
+        table: TableRows,
+        rotation: FlightRotation,
+        params: JumpPlan.Params,
+        constants: ProgressConstants,
+        clock: Clock,
+    ) -> None:
+        now = clock.base_period * clock.tick
+        if phase.phase == Phase.HANG:
+            progress.late = now + clock.base_period
+            read_table(table, -constants.period, 0.0, constants.period, reference)
+            return
+        follow_plan(
+            now, terms, delay, reference, progress, table, rotation, params, constants
+        )  # fmt: skip
 
 
 def plan_library(params: JumpPlan.Params, robot: RobotDescription) -> PlanLibrary:

@@ -92,6 +92,11 @@ class JumpCriteria(StandCriteria):
     landing_height: float = parameter(
         0.0, unit="m", text="height of the ground that every contact point must end on"
     )
+    ground_tolerance: float = parameter(
+        0.0, unit="m", ge=0,
+        text="how far the ground under a contact point may be above or below that height; or "
+        "{from: robot.ground_tolerance}, as uneven as the simulator's scene is",
+    )  # fmt: skip
     flight_confirmation: float = parameter(
         0.02, unit="s", gt=0, text="all points unloaded for this long is a flight"
     )
@@ -172,7 +177,7 @@ def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
         r.judged_time != NEVER,
         (f"the run ended {r.now - r.touchdown_time:.3f} s after touchdown, before {c.rest_time} s"),
     )
-    yield from judge_rest(r, c, "after touchdown")
+    yield from judge_rest(r, c, "after touchdown", level=not c.ground_tolerance)
     yield from judge_feet(r, c, "after landing")
     yield from _judge_task(r, c, planned)
 
@@ -218,11 +223,12 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
             ),
         )
     low, high = float(r.ground_low), float(r.ground_high)
+    within = f" within {1e3 * c.ground_tolerance:.0f} mm" if c.ground_tolerance else ""
     yield (
-        max(abs(low - c.landing_height), abs(high - c.landing_height)) < 1e-6,
+        max(abs(low - c.landing_height), abs(high - c.landing_height)) < c.ground_tolerance + 1e-6,
         (
             f"contact points ended above ground at {low:.3f} to {high:.3f} m, not all at "
-            f"{c.landing_height:.3f} m"
+            f"{c.landing_height:.3f} m{within}"
         ),
     )
 

@@ -88,6 +88,12 @@ class JumpScore(Block):
        every contact point above ground of the ``landing_height``. Targets are the parameters
        ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
 
+    On ground that is not as level as the task says (``ground_tolerance``) three of them differ. The simulator lets soles
+    of several points touch the ground between these points, and counts that in its metric
+    ``robot_sole_contacts``. Load there is not measured, so rest (6) is judged by what the robot does: tilt
+    and speeds; soles need not be flat, and neither load share nor support count. The ground under a
+    contact point may be so far above or below the ``landing_height``.
+
     A jump begins with its plan: a robot that is put down from a gantry before is not judged.
 
     The run ends 0.1 s after the rest has been judged. Not judged, but counted: solver failures,

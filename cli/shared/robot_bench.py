@@ -177,14 +177,18 @@ def jog(
 
 
 def estop(file: HardwareFile, as_json: AsJson = False) -> None:
-    """Put all drives into damping, and read back whether they are."""
+    """Put all drives into damping: by the run that holds the port, or else here, and read back."""
     from ...hal.bear import bench
+    from ...hal.bear.configuration import Hardware
+    from ...hal.bear.watchdog import ask_to_stop
 
     with errors_reported(as_json):
-        with _bus(file) as (bus, hardware, _):
-            unsure = bench.stop(bus, hardware)
-        if unsure:
-            raise AloftError(f"not certain to be in damping: {', '.join(unsure)}")
+        hardware = Hardware.read(file)
+        if not ask_to_stop(hardware.bus.port):
+            with _bus(file) as (bus, hardware, _):
+                unsure = bench.stop(bus, hardware)
+            if unsure:
+                raise AloftError(f"not certain to be in damping: {', '.join(unsure)}")
     if as_json:
         print_json({"success": True, "damped": list(hardware.motors)})
     else:

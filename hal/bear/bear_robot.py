@@ -60,8 +60,8 @@ class BearRobot(DrivenRobot):
     * in the motor thread: a drive or the board is silent, reports an error, is too hot, has too low
       a voltage; a stuck encoder, a frozen IMU, a saturated gyroscope; a second writer on the bus; a
       command older than ``command_age``; the dead man's switch let go;
-    * in a process of its own: the graph hangs for ``graph_timeout`` or has died, or a link that
-      brings commands from another machine was silent for ``links.watchdog``, by default 15 ms;
+    * in a process of its own: ``aloft robot estop`` is called; the graph hangs for ``graph_timeout`` or
+      has died, or a link that brings commands from another machine was silent for ``links.watchdog``, by default 15 ms;
     * in the drives: nothing written for the hardware's ``drives.watchdog``.
 
     It was never run on a real robot; against the twin every shipped jump was (``aloft twin``).
@@ -109,7 +109,8 @@ class BearRobot(DrivenRobot):
         super().setup()
         self._hardware: Hardware = read_hardware(self.params.hardware, self.context, self.robot)
         gains = joint_gains(self.params, self.robot)
-        self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead)
+        motors = self.params.motor_model
+        self._law = DriveLaw(self.robot, *gains, self._hardware.bus.lead, motors)
         self._thread: MotorThread | None = None
         self._watchdog: DriveWatchdog | None = None
         self._switch: DeadMansSwitch = AlwaysHeld()
@@ -138,7 +139,9 @@ class BearRobot(DrivenRobot):
                 devices = [motor.id for motor in hardware.motors.values()]
                 descriptor = bus_port.fileno()  # type: ignore[attr-defined]  # a serial port
                 silence = self.context.clock.command_limit
-                self._watchdog = DriveWatchdog(descriptor, devices, params.graph_timeout, silence)
+                self._watchdog = DriveWatchdog(
+                    descriptor, devices, params.graph_timeout, silence, hardware.bus.port
+                )
             self._cycle = time.monotonic()
             driver.arm(self._next_cycle)
         if params.time == "real":
@@ -214,6 +217,8 @@ class BearRobot(DrivenRobot):
 
     def _stop_reason(self) -> str:
         """Why the motor thread must not go on; empty if it may."""
+        if self._watchdog is not None and self._watchdog.asked:
+            return "`aloft robot estop` has damped the drives"
         if self._watchdog is not None and self._watchdog.tripped:
             limit, silence = 1e3 * self.params.graph_timeout, 1e3 * self.context.clock.command_limit
             links = f", or no commands came over the links for {silence:g} ms" if silence else ""
@@ -231,4 +236,7 @@ class BearRobot(DrivenRobot):
             time.sleep(rest)
         else:
             self._cycle -= rest
+        if self._watchdog is not None and self._watchdog.asked:
+            self._driver.loop.fail(self._stop_reason())
+            return False
         return self._switch.held()

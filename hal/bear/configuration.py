@@ -131,7 +131,19 @@ class DriveSettings(Parameters):
     watchdog: float = parameter(
         0.025, unit="s", ge=0, le=10.0, text="register watchdog_timeout; zero: off"
     )
-    lowest_voltage: float = parameter(13.0, unit="V", gt=0, text="below it all drives are damped")
+    lowest_voltage: float = parameter(
+        13.0, unit="V", gt=0, text="of the pack without load; below it all drives are damped"
+    )
+    brown_out_voltage: float = parameter(
+        10.0, unit="V", ge=0, text="below it all drives are damped under any load"
+    )
+    pack_resistance: float = parameter(
+        0.04,
+        unit="ohm",
+        ge=0,
+        text="of the pack and its leads: under load the voltage may be lower",
+    )
+    winding_resistance: float = parameter(0.2, unit="ohm", ge=0, text="of a motor, for its load")
     highest_voltage: float = parameter(18.0, unit="V", gt=0, text="above it nothing is enabled")
     highest_temperature: float = parameter(
         75.0, gt=0, le=125.0, text="of a winding [deg C]; beyond it all drives are damped"

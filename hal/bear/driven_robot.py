@@ -46,6 +46,7 @@ class DrivenRobot(Robot):
         loop = self._driver.loop
         with loop.lock:
             loop.measured.publish(self.imu, self.joints, self.contacts)
+            loop.goals.correct(self.joints.velocity, self.joints.torque)
             loop.measured.publish_mounted(self.mounted())
             loop.report(self.health)
             loop.measured.next_tick()

@@ -19,7 +19,7 @@ from ...blocks.signals.robot import describe_conditions, is_critical
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ...robots.transmission import TransmissionMap, motor_gains
-from ..drive_control import DriveGoals
+from ..drive_control import DriveGoals, MotorModel
 from .bus import BearBus, BusError, NoReplyError, Reply, SerialPort
 from .configuration import Hardware
 from .motor_loop import MotorLoop
@@ -38,6 +38,7 @@ class DriveLaw:
         stiffness, damping: the joints' gains that run in the drives [N m/rad, N m s/rad],
             (n_joints,); where no motor gains give them, the nearest do.
         lead: the time from a measurement to when the goals made from it act [s].
+        motors: what is known of the motors.
 
     Attributes:
         motor_stiffness, motor_damping: the gains of every drive at its output [N m/rad, N m s/rad],
@@ -46,12 +47,13 @@ class DriveLaw:
     """
 
     def __init__(
-        self, robot: RobotDescription, stiffness: Array, damping: Array, lead: float
-    ) -> None:
+        self, robot: RobotDescription, stiffness: Array, damping: Array, lead: float,
+        motors: MotorModel | None = None,
+    ) -> None:  # fmt: skip
         self.motor_stiffness = motor_gains(robot, stiffness, "N m/rad").motor
         self.motor_damping = motor_gains(robot, damping, "N m s/rad").motor
         self.goals = DriveGoals(
-            robot, stiffness, damping, self.motor_stiffness, self.motor_damping, lead
+            robot, stiffness, damping, self.motor_stiffness, self.motor_damping, lead, motors
         )
 
 

@@ -53,6 +53,7 @@ class Measurement:
         motors = [hardware.motors[name] for name in robot.transmission.motors]
         self.sign = np.array([float(motor.sign) for motor in motors])
         self.offset = np.array([motor.zero for motor in motors])
+        self._drives = hardware.drives
         self.torque_constant = hardware.drives.torque_constant
         self.position, self.velocity, self.current = (np.zeros(n) for _ in range(3))
         self.voltage, self.temperature, self._torque = (np.zeros(n) for _ in range(3))
@@ -95,6 +96,17 @@ class Measurement:
         self.temperature[:] = values[:, 4]
         self._transmission.joint_motion(self.position, self.joint_position)
         self._transmission.joint_motion(self.velocity, self.joint_velocity)
+
+    def sag(self) -> float:
+        """By how much [V] the pack's voltage is below that without load, from the work of the motors
+        and the heat of their windings."""
+        drives, current = self._drives, self.current
+        work = self.torque_constant * float(np.dot(current, self.velocity))
+        power = work + drives.winding_resistance * float(np.dot(current, current))
+        voltage = float(self.voltage.mean())
+        if power <= 0.0 or voltage <= 0.0:
+            return 0.0
+        return drives.pack_resistance * power / voltage
 
     def _mean_torque(self) -> None:
         np.multiply(self.current_sum, self.torque_constant / self.exchanges, out=self._torque)
@@ -230,14 +242,16 @@ class Supervision:
         for k, condition in enumerate(bulk.error_bytes.tolist()):
             if is_critical(condition):
                 return f"{self._who[k]}: {describe_conditions(condition)}"
-        voltage = _first_lasting(
-            measured.voltage, settings.lowest_voltage, self.low, settings.bad_cycles, -1.0
-        )
-        if voltage >= 0:
-            return (
-                f"{self._who[voltage]}: {measured.voltage.item(voltage):.1f} V is below the lowest "
-                f"voltage of {settings.lowest_voltage:g} V"
-            )
+        sag = measured.sag()
+        lowest = max(settings.lowest_voltage - sag, settings.brown_out_voltage)
+        low = _first_lasting(measured.voltage, lowest, self.low, settings.bad_cycles, -1.0)
+        if low >= 0:
+            voltage = measured.voltage.item(low)
+            load = f", also without its sag of {sag:.1f} V" if sag >= 0.05 else ""
+            limit = f"the lowest voltage of {settings.lowest_voltage:g} V{load}"
+            if voltage < settings.brown_out_voltage:
+                limit = f"the {settings.brown_out_voltage:g} V of a brown-out"
+            return f"{self._who[low]}: {voltage:.1f} V is below {limit}"
         hot = _first_lasting(
             measured.temperature, settings.highest_temperature, self.hot, settings.bad_cycles, 1.0
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import mmap
 import os
+import socket
 import struct
 import sys
 import time
@@ -16,10 +17,12 @@ from ...processes.child_process import ChildError, ChildProcess
 from .bus import BusError
 from .configuration import DeadMan
 from .protocol import BROADCAST, STATUS, Instruction, Torque, frame_bytes
-from .watchdog_process import CLOSING, SIZE, TRIPPED, UNTIL
+from .watchdog_process import ASKED, CLOSING, SIZE, TRIPPED, UNTIL
 
 _STARTING = 10.0
 """How long the process may take to start [s]."""
+_ANSWERING = 0.5
+"""How long a run may take to answer that it has stopped [s]."""
 _ENDING = 5.0
 """How long it may take to end, once it is told to [s]."""
 
@@ -34,8 +37,8 @@ def damping_frame(devices: list[int]) -> bytes:
 
 class DriveWatchdog:
     """A process that commands damping when ``beat`` was not called for ``limit`` seconds, when
-    links have brought no commands for ``silence`` seconds, or when this process has died. It shares
-    the open port, so no opening can fail then.
+    links have brought no commands for ``silence`` seconds, when this process has died, or when somebody
+    calls ``ask_to_stop`` for the same port. It shares the open port, so no opening can fail then.
 
     It begins to count at the first beat. Its process looks every millisecond whether its parent is
     still the one that started it: a pipe's end would come late where a copy of the graph's process
@@ -46,14 +49,18 @@ class DriveWatchdog:
         devices: the drives' addresses.
         limit: the time without a beat [s].
         silence: the time without commands from other machines [s].
+        port: the name of the drives' port; without one nobody can ask it to stop.
 
     Raises:
         BusError: the process does not start.
     """
 
     def __init__(
-        self, port_fd: int, devices: list[int], limit: float, silence: float = 0.0
+        self, port_fd: int, devices: list[int], limit: float, silence: float = 0.0, port: str = ""
     ) -> None:
+        stops = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        if port:
+            stops.bind(_stop_address(port))
         memory_fd = os.memfd_create("aloft-watchdog")
         os.truncate(memory_fd, SIZE)
         self._memory = mmap.mmap(memory_fd, SIZE)
@@ -62,11 +69,13 @@ class DriveWatchdog:
         frame = damping_frame(devices).hex()
         try:
             self._process = ChildProcess(
-                "the watchdog's process", program, [str(port_fd), str(memory_fd), frame],
-                descriptors=(port_fd, memory_fd),
+                "the watchdog's process", program,
+                [str(port_fd), str(memory_fd), str(stops.fileno()), frame],
+                descriptors=(port_fd, memory_fd, stops.fileno()),
             )  # fmt: skip
         finally:
             os.close(memory_fd)
+            stops.close()
         try:
             self._process.wait_until_ready(_STARTING)
         except ChildError as error:
@@ -94,6 +103,11 @@ class DriveWatchdog:
         """Whether it has taken over and damps."""
         return bool(self._read(TRIPPED))
 
+    @property
+    def asked(self) -> bool:
+        """Whether somebody has asked it to stop, and it has damped the drives once."""
+        return bool(self._read(ASKED))
+
     def close(self) -> None:
         """End the process: the drives are in damping already, or were never on."""
         with suppress(ValueError):
@@ -104,11 +118,28 @@ class DriveWatchdog:
         return int(struct.unpack_from("Q", self._memory, place)[0])
 
 
+def ask_to_stop(port: str) -> bool:
+    """Ask the run that holds this port to damp its drives; says whether one has."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ours:
+        ours.bind("")  # an address to answer to
+        ours.settimeout(_ANSWERING)
+        try:
+            ours.sendto(b"stop", _stop_address(port))
+            return ours.recv(16) == b"damped"
+        except OSError:  # nobody listens
+            return False
+
+
+def _stop_address(port: str) -> bytes:
+    """The abstract socket that belongs to a port: it vanishes with the processes that have it."""
+    return b"\0aloft drives " + os.path.realpath(port).encode()
+
+
 _EVENT = struct.Struct("<IhBB")
 """Linux's joystick event: time, value, type, number."""
 _BUTTON, _INITIAL = 0x01, 0x80
-_KEY_TIME = 0.7
-"""A held key repeats; without a repetition for so long it counts as let go [s]."""
+_KEY_TIME = 0.1
+"""A held key repeats at least 10.9 times a second; after so long without it was let go [s]."""
 
 
 class DeadMansSwitch(Protocol):
@@ -169,7 +200,7 @@ class GamepadButton:
 
 
 class SpaceBar:
-    """The space bar of the terminal, as long as it repeats.
+    """The space bar of the terminal, as long as it repeats: pressed once it is not held yet.
 
     Raises:
         BusError: standard input is no terminal.
@@ -186,13 +217,19 @@ class SpaceBar:
         tty.setcbreak(self._file)
         os.set_blocking(self._file, False)
         self._last = -1e9
+        self._repeats = False
 
     def held(self) -> bool:
-        """Whether it was pressed, or repeated itself, a moment ago."""
+        """Whether it has repeated itself a moment ago."""
+        now = time.monotonic()
+        recent = now - self._last < _KEY_TIME
+        pressed = 0
         with suppress(BlockingIOError):
-            if b" " in os.read(self._file, 256):
-                self._last = time.monotonic()
-        return time.monotonic() - self._last < _KEY_TIME
+            pressed = os.read(self._file, 256).count(b" ")
+        self._repeats = (self._repeats and recent) or pressed + recent > 1
+        if pressed:
+            self._last = now
+        return self._repeats
 
     def close(self) -> None:
         """Give the terminal back as it was."""

@@ -85,6 +85,7 @@ class MotorFeedback:
             gears_of(
                 robot, stiffness, damping, motor_gains(robot, stiffness, "N m/rad").motor,
                 motor_gains(robot, damping, "N m s/rad").motor, _LEAD * period,
+                params.motor_model,
             ),
             steps, as_record(state), as_record(measured),
             as_record(LoopScratch.allocate(robot.dimensions)),

@@ -19,12 +19,14 @@ point is a geom and a site; if it is a foot's only point the site is at the cent
 link called ``world`` is the body ``link/world``. Motors are ``motor/<joint>``, named points are
 sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
 ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
+``sole/<link>`` (on uneven ground, how many contacts a sole and its points have with it),
 ``load/<contact point>`` (how many with the ground, and their net force on it). A sensor that the
 description mounts has a site ``sensor/<name>``.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from copy import copy
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,7 +36,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
-from ...runtime.language.terrain import Terrain
+from ...runtime.language.terrain import Ground, HeightField, Terrain
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .simulated_robot import SimulatorParameters
@@ -50,6 +52,10 @@ MAX_LIMBS = 30
 """The number of limbs that collision bits can distinguish; further limbs do not collide with the
 last of these."""
 CONTACT_TIME_CONSTANT = 0.004
+LEAST_RISE = 1e-4
+"""A level height field is stored as one of so many metres."""
+FIELD_THICKNESS = 0.1
+"""How far a height field reaches below its lowest corner [m]."""
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 
 
@@ -106,7 +112,7 @@ def mujoco_spec(
     _add_ground(spec, scene or Terrain(), variation)
     _add_robot(spec, robot, variation)
     _add_mounted_sensors(spec, robot)
-    _add_sensors(spec, robot)
+    _add_sensors(spec, robot, uneven=scene is not None and scene.uneven > 0.0)
     return spec
 
 
@@ -158,17 +164,46 @@ def _sole(variation: Variation) -> dict[str, Any]:
 def _add_ground(spec: MjSpec, scene: Terrain, variation: Variation) -> None:
     import mujoco
 
-    surface = {**_surface(variation), "contype": GROUND_BIT, "conaffinity": 0}
+    bits = {"contype": GROUND_BIT, "conaffinity": 0}
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1], pos=[0, 0, scene.floor],
-        **surface,
+        **bits, **_surface(variation),
     )  # fmt: skip
     for k, block in enumerate(scene.blocks):
         low, high = np.array(block.least), np.array(block.most)
+        place: dict[str, Any] = {"size": (high - low) / 2, "pos": (high + low) / 2}
+        if not block.level:
+            x, y, z, w = block.quaternion
+            place = {"size": block.half_sizes, "pos": block.middle, "quat": [w, x, y, z]}
         spec.worldbody.add_geom(
-            name=f"box/{k}", type=mujoco.mjtGeom.mjGEOM_BOX, size=(high - low) / 2,
-            pos=(high + low) / 2, **surface,
+            name=f"box/{k}", type=mujoco.mjtGeom.mjGEOM_BOX, **place, **bits,
+            **_piece(block, variation),
         )  # fmt: skip
+    for k, field in enumerate(scene.fields):
+        heights = np.array(field.heights)
+        low, high = np.array(field.least), np.array(field.most)
+        rise = max(field.highest - field.lowest, LEAST_RISE)
+        spec.add_hfield(
+            name=f"field/{k}", nrow=len(heights), ncol=len(heights[0]),
+            size=[*(high - low) / 2, rise, FIELD_THICKNESS],
+            userdata=((heights - field.lowest) / rise).ravel(),
+        )  # fmt: skip
+        spec.worldbody.add_geom(
+            name=f"field/{k}", type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=f"field/{k}",
+            pos=[*(high + low) / 2, field.lowest], **bits, **_piece(field, variation),
+        )  # fmt: skip
+
+
+def _piece(piece: Ground | HeightField, variation: Variation) -> dict[str, Any]:
+    """The contact parameters of a piece of ground; what has its own decides alone."""
+    surface = _surface(variation)
+    if piece.friction is None and piece.stiffness == 1.0:
+        return surface
+    time_constant, damping = variation.sole or surface["solref"]
+    surface |= {"solref": [time_constant / math.sqrt(piece.stiffness), damping], "priority": 2}
+    if piece.friction is not None:
+        surface["friction"] = [piece.friction, *surface["friction"][1:]]
+    return surface
 
 
 def _limb_of_link(robot: RobotDescription) -> dict[str, int]:
@@ -266,7 +301,7 @@ def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription) -> None:
         sensor.add_to_model(spec, body)
 
 
-def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
+def _add_sensors(spec: MjSpec, robot: RobotDescription, *, uneven: bool) -> None:
     import mujoco
 
     kind, thing = mujoco.mjtSensor, mujoco.mjtObj
@@ -288,6 +323,12 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
     spec.add_sensor(
         name="contacts", type=kind.mjSENS_CONTACT, intprm=[found, 0, 1],
     )  # fmt: skip
+    for link in _soles(robot) if uneven else ():
+        spec.add_sensor(
+            name=f"sole/{link}", type=kind.mjSENS_CONTACT,
+            objtype=thing.mjOBJ_BODY, objname=body_name(link),
+            reftype=thing.mjOBJ_BODY, refname="world", intprm=[found, 0, 1],
+        )  # fmt: skip
     for contact in robot.contacts:
         spec.add_sensor(
             name=f"load/{contact.name}", type=kind.mjSENS_CONTACT,
@@ -295,6 +336,17 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription) -> None:
             reftype=thing.mjOBJ_BODY, refname="world",
             intprm=[found | 1 << int(field.mjCONDATA_FORCE), net_force, 1],
         )  # fmt: skip
+
+
+def _soles(robot: RobotDescription) -> list[str]:
+    """The links of feet with several contact points, between which they may touch uneven ground."""
+    owners = [contact.foot for contact in robot.contacts]
+    return [foot.link for foot in robot.feet if owners.count(foot.name) > 1]
+
+
+def number_of_soles(model: MjModel) -> int:
+    """How many soles may touch the ground between their contact points."""
+    return sum(model.sensor(k).name.startswith("sole/") for k in range(model.nsensor))
 
 
 def build_world(
@@ -305,7 +357,7 @@ def build_world(
     Raises:
         ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
     """
-    scene = params.build_scene()
+    scene = params.build_scene(robot)
     for cached in _model_cache:
         if cached.robot is robot and cached[1:4] == (scene, params.timestep, variation):
             return copy(cached.model)

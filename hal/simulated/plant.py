@@ -35,6 +35,7 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
+from ..drive_control import correcting
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
@@ -44,7 +45,7 @@ from .drives import MotorLimits
 from .gantry import Gantry
 from .gears import YieldingGears
 from .imu_effects import ImuModel
-from .mujoco_model import body_name, build_world
+from .mujoco_model import body_name, build_world, number_of_soles
 from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
 from .stance import (
@@ -315,10 +316,13 @@ class Plant:
         self.position, self.velocity = data.qpos[base.positions :], data.qvel[base.velocities :]
         period = self._period / self._samples_per_tick
         self.sensors.attach(model, data, period, self._samples_per_tick)
-        # The sensors of the contact points are the model's last.
+        # The sensors of the contact points are the model's last, those of soles come before them.
         first = model.nsensordata - 4 * len(self._robot.contacts)
+        soles = data.sensordata[first - number_of_soles(model) : first]
         load = data.sensordata[first:].reshape(-1, 4)
-        self.truth = TruthReport(data, base, self._robot, self._params.build_scene(), self.record)
+        self.truth = TruthReport(
+            data, base, self._robot, self._params.build_scene(self._robot), self.record
+        )
         sensors, physics = self.sensors, self.physics
         force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
         self._rate = base.angular_velocity
@@ -338,7 +342,7 @@ class Plant:
             self._seeing.append(self.drives.sensing(*self.sensed, data.ctrl))
             self.sensed = physics.encoder_position, physics.encoder_velocity
         self._note = signal_call(
-            record_step, self.physics.step, StepSensors(load, force, contacts, self.position),
+            record_step, self.physics.step, StepSensors(load, soles, force, contacts, self.position),
             *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
         )  # fmt: skip
         self._encoding = KernelCall(
@@ -474,6 +478,7 @@ class Plant:
         return [
             KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
             KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
+            *correcting(self._params, self._robot, self.sensed[1], torque),
             *self.reading_imu(force, imu),
             *sensors.reading_joints(*self.sensed, torque, joints),
         ]
@@ -536,6 +541,11 @@ class Plant:
             "robot_friction": float(self.variation.friction),
             "robot_mass_kg": float(self._robot.total_mass * self.variation.mass),
             "robot_contact_stiffness": float(self.variation.contact_stiffness),
+            **(
+                {"robot_sole_contacts": int(self.record.sole)}
+                if number_of_soles(self.model)
+                else {}
+            ),
             **({} if self.imu is None else self.imu.metrics()),
             **(self.drives.metrics() if self.drives.has_motors else {}),
         }

@@ -11,6 +11,7 @@ from pydantic import model_validator
 from ...blocks.signals import ExternalForce, RobotTruth
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Input, Output, Port, State, UnmetRequirement
+from ...runtime.language.context import Context
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Terrain
 from ..drive_control import DriveGains
@@ -30,6 +31,7 @@ from .gears import GearParameters, longest_step
 from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
 from .switch_effects import SwitchEffects
+from .tiles import UnevenParameters
 
 
 class SimulatorParameters(DriveGains):
@@ -52,7 +54,8 @@ class SimulatorParameters(DriveGains):
 
     scene: Literal["flat", "step", "platform", "none"] | scenes.SceneParameters = parameter(
         "flat",
-        text="the kind of ground; none: there is no ground; or a floor and boxes; or "
+        text="the kind of ground; none: there is no ground; or a floor with boxes, stairs, "
+        "tiles and height fields; or "
         "{from: plan.scene}, the ground that a jump's task asks for",
     )
     step_height: float = parameter(0.05, unit="m", gt=0, text="scene step: its height")
@@ -69,6 +72,10 @@ class SimulatorParameters(DriveGains):
         0.15, unit="m",
         text="scene platform: from the start to the edge that is jumped off; negative: behind it",
     )  # fmt: skip
+
+    uneven: UnevenParameters | None = parameter(
+        None, text="tiles on all level ground that nobody is told of; none: the scene as it is"
+    )
 
     friction: float = parameter(0.7, gt=0, text="friction coefficient of the ground")
     friction_range: list[float] | None = parameter(
@@ -194,10 +201,15 @@ class SimulatorParameters(DriveGains):
         """The seed of what differs from run to run of one robot."""
         return self.seed if self.noise_seed is None else self.noise_seed
 
-    def build_scene(self) -> Terrain:
-        """The ground these parameters describe."""
+    def build_scene(self, robot: RobotDescription | None) -> Terrain:
+        """The ground these parameters describe, for a robot."""
+        scene = self._scene_of_the_task()
+        return scene if self.uneven is None else self.uneven.cover(scene, robot, self.seed)
+
+    def _scene_of_the_task(self) -> Terrain:
+        """The ground without tiles that nobody is told of."""
         if isinstance(self.scene, scenes.SceneParameters):
-            return self.scene.build()
+            return self.scene.build(self.seed)
         if self.scene == "step":
             return scenes.step(self.step_height, self.step_distance, self.step_depth)
         if self.scene == "platform":
@@ -252,6 +264,13 @@ class SimulatedRobot(Robot, ABC):
         """The outputs of mounted sensors, and the memory that their simulation needs."""
         memory = State(SensorMemory, text="what the simulation of mounted sensors keeps")
         return {**super().ports_of(sensors), "sensor_memory": memory}
+
+    @classmethod
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """``ground_tolerance``: how far the ground may be from what a task says [m], for scores."""
+        assert isinstance(params, SimulatorParameters)
+        scene = params.build_scene(context.robot)
+        return {**super().exported_values(params, context), "ground_tolerance": scene.uneven}
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:

@@ -65,6 +65,10 @@ class TickRecord(Signal):
     forbidden = Field(
         dtype="int64", text="steps with a contact other than a contact point's on the ground"
     )
+    sole = Field(
+        dtype="int64",
+        text="steps of the run in which a sole touched uneven ground between its contact points",
+    )
     violation = Field("n_joints", unit="rad", text="largest excess over a joint limit")
     joint_torque = Field("n_joints", unit="N m", text="sum of the joint torques")
     torque_high = Field("n_joints", unit="N m", text="highest motor torque")
@@ -90,11 +94,12 @@ class StepSensors(NamedTuple):
     """What the simulator knows after a physics step.
 
     ``load`` (n_contacts, 4) are the contact counts of the contact points and the forces on the ground
-    [N], ``accelerometer`` (3,) is the specific force [m/s^2, body], ``contacts`` (1,) the number of all
+    [N], ``soles`` (n_soles,) all contacts of soles with uneven ground, ``accelerometer`` (3,) is the specific force [m/s^2, body], ``contacts`` (1,) the number of all
     contacts, and ``position`` (n_joints,) are the joint angles [rad].
     """
 
     load: Array2D
+    soles: Array1D
     accelerometer: Vector3
     contacts: Array1D
     position: Array1D
@@ -193,6 +198,12 @@ def record_step(
     allowed = 0.0
     for point in range(sensors.load.shape[0]):
         allowed += sensors.load[point, 0]
+    on_soles = 0.0
+    for sole in range(sensors.soles.shape[0]):
+        on_soles += sensors.soles[sole]
+    if on_soles > allowed:
+        record.sole = record.sole + 1
+        allowed = on_soles
     record.load[:, :] += sensors.load
     record.accelerometer[:] += sensors.accelerometer
     if sensors.contacts[0] > allowed:

@@ -9,12 +9,12 @@ import numpy as np
 from ...blocks.signals import RobotTruth
 from ...mathematics.arrays import (
     Array1D,
-    Array2D,
     Indices1D,
     Rows3,
     Vector3,
 )
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.ground_surface import Surface, height_of_ground
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
@@ -33,8 +33,7 @@ class TrueState(NamedTuple):
     ``joint_position``, ``joint_velocity`` (n_joints,) [rad, rad/s]; ``com``, ``com_velocity`` and
     ``angular_momentum`` (3,) [m, m/s, N m s, world]; ``places`` (n, 3) [m, world] of all named places,
     of which ``contacts`` (n_contacts,) are those of the contact points, which lie ``below`` [m] under
-    them. ``floor`` (1,) is its height, and ``boxes`` (n_boxes, 5) stand on it: from and to in x, from
-    and to in y, top [m].
+    them. ``ground`` is the surface of the ground, ``normal`` (3,) room for its normal.
     """
 
     joint_position: Array1D
@@ -45,19 +44,8 @@ class TrueState(NamedTuple):
     places: Rows3
     contacts: Indices1D
     below: Array1D
-    floor: Array1D
-    boxes: Array2D
-
-
-@kernel
-def height_of_ground(floor: Array1D, boxes: Array2D, x: float, y: float) -> float:
-    """The height [m, world] of the highest surface at a place: as ``Terrain.height``."""
-    height = floor[0]
-    for box in range(boxes.shape[0]):
-        inside = boxes[box, 0] <= x <= boxes[box, 1] and boxes[box, 2] <= y <= boxes[box, 3]
-        if boxes[box, 4] > height and inside:
-            height = boxes[box, 4]
-    return float(height)
+    ground: Surface
+    normal: Vector3
 
 
 @kernel
@@ -78,7 +66,7 @@ def report_contacts(instant: TrueState, peaks: TickRecord, report: RobotTruth) -
         x, y = instant.places[place, 0], instant.places[place, 1]
         report.contact_position[point, 0], report.contact_position[point, 1] = x, y
         report.contact_position[point, 2] = instant.places[place, 2] - instant.below[point]
-        report.ground_height[point] = height_of_ground(instant.floor, instant.boxes, x, y)
+        report.ground_height[point] = height_of_ground(instant.ground, x, y, instant.normal)
         touched = False
         for axis in range(3):
             force = peaks.load[point, 1 + axis] / -steps
@@ -125,10 +113,6 @@ class TruthReport:
         record: TickRecord,
     ) -> None:
         self._base = base
-        boxes = [
-            (low[0], high[0], low[1], high[1], high[2])
-            for low, high in ((block.least, block.most) for block in scene.blocks)
-        ]
         self._instant = TrueState(
             data.qpos[base.positions :],
             data.qvel[base.velocities :],
@@ -138,8 +122,8 @@ class TruthReport:
             data.site_xpos,
             np.array([data.site(contact.name).id for contact in robot.contacts], dtype=np.int64),
             depth_of_contacts(robot),
-            np.array([scene.floor]),
-            np.array(boxes, dtype=np.float64).reshape(-1, 5),
+            scene.surface,
+            np.zeros(3),
         )
         self._record = record
 

@@ -274,7 +274,8 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 def _driver(
     robot: RobotDescription, params: TwinParameters, hardware: Hardware, twin: Twin
 ) -> Driver:
-    law = DriveLaw(robot, *joint_gains(params, robot), hardware.bus.lead)
+    gains = joint_gains(params, robot)
+    law = DriveLaw(robot, *gains, hardware.bus.lead, params.motor_model)
     return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), law)
 
 

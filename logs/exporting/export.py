@@ -26,6 +26,7 @@ from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import RobotDescription
 from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError
+from ...runtime.language.terrain import HeightField
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
@@ -219,13 +220,16 @@ def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dic
         shown = {"cylinders": cylinders, "spheres": spheres}
         entities.append(_entity(link.name, link.name, instant, shown))
     terrain = run.header.terrain
-    if terrain is not None and terrain.blocks:
-        cubes = []
-        for block in terrain.blocks:
-            least, most = np.array(block.least), np.array(block.most)
-            middle = 0.5 * (least + most)
-            cubes.append(_solid(middle, (0.0, 0.0, 0.0, 1.0), tuple(most - least), GROUND))
-        entities.append(_entity("ground", WORLD, instant, {"cubes": cubes}))
+    if terrain is not None and (terrain.blocks or terrain.fields):
+        cubes = [
+            _solid(
+                block.middle, block.quaternion, [2.0 * half for half in block.half_sizes], GROUND
+            )
+            for block in terrain.blocks
+        ]
+        fields = [_triangles(field) for field in terrain.fields]
+        shown = {"cubes": cubes, "triangles": fields}
+        entities.append(_entity("ground", WORLD, instant, shown))
     return {"deletions": [], "entities": entities}
 
 
@@ -254,6 +258,19 @@ def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
         },
         "size": dict(zip("xyz", map(float, size), strict=True)),
         "color": dict(zip("rgba", color, strict=True)),
+    }
+
+
+def _triangles(field: HeightField) -> dict[str, Any]:
+    """A height field as a ``foxglove.TriangleListPrimitive``."""
+    corners, triangles = field.triangles()
+    solid = _solid((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (), GROUND)
+    return {
+        "pose": solid["pose"],
+        "points": [dict(zip("xyz", corner, strict=True)) for corner in corners],
+        "color": solid["color"],
+        "colors": [],
+        "indices": [corner for triangle in triangles for corner in triangle],
     }
 
 

@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 from ...robots.robot_description import RobotDescription
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
-from ...runtime.language.terrain import Ground, Terrain
+from ...runtime.language.terrain import Ground, HeightField, Terrain
 
 FORMAT = 5
 """The number of this format, the only one that is read."""
@@ -228,8 +228,22 @@ def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
     """The terrain from plain data; a run without a simulated world has none."""
     if data is None:
         return None
-    blocks = tuple(Ground(tuple(b["least"]), tuple(b["most"])) for b in data["blocks"])
-    return Terrain(data["floor"], blocks)
+    blocks, fields = data["blocks"], data.get("fields", ())
+    return Terrain(
+        data["floor"],
+        tuple(Ground(**_tuples(block)) for block in blocks),
+        tuple(HeightField(**_tuples(field)) for field in fields),
+        data.get("uneven", 0.0),
+    )
+
+
+def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a dataclass from plain data, with tuples for lists."""
+
+    def convert(value: Any) -> Any:
+        return tuple(map(convert, value)) if isinstance(value, list | tuple) else value
+
+    return {name: convert(value) for name, value in data.items()}
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ def make_header(
 def terrain_of(graph: CheckedGraph) -> Terrain | None:
     """The ground of the first block that has a world."""
     scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, SupportsScene))
-    return next((params.build_scene() for params in scenes), None)
+    return next((params.build_scene(graph.robot) for params in scenes), None)
 
 
 def _block(spec: BlockSpec) -> RecordedBlock:

@@ -25,6 +25,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from ...runtime.language.layout import only_field
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
@@ -202,14 +203,15 @@ class RecordedRun:
         return {field.name: field for field in self.header.bus.fields if not field.constant}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """One signal at every recorded tick, (ticks, ...), in its own dtype.
+        """One signal at every recorded tick, (ticks, ...), in its own dtype. A port of one field
+        may stand for its field, as in wires.
 
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
         """
         known = self.signals()
         if name not in known:
-            self.nearest(name)
+            name = only_field(name, known) or self.nearest(name)
         self._asked.add(name)
         whole = len(self.ticks) * self.header.bus.size
         if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):

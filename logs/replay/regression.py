@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...robots.description import RobotDescription, find_robot
+from ...runtime.background.background_block import BackgroundBlock
 from ...runtime.language.layout import Layout
 from ...runtime.language.registry import block_name
 from ...runtime.language.schedule import runs_at
@@ -119,7 +120,13 @@ def _spec(graph: CheckedGraph, path: str) -> BlockSpec:
     known = [spec.path for spec in graph.blocks if "~" not in spec.path]
     if path not in known:
         raise ReplayError(f"there is no block {path!r} to test; there is {', '.join(known)}")
-    return graph.block(path)
+    spec = graph.block(path)
+    if issubclass(spec.block_type, BackgroundBlock):
+        raise ReplayError(
+            f"block {path!r} works in the background, so its outputs are not those of the inputs "
+            "beside them; record a run without the key 'background' and test that"
+        )
+    return spec
 
 
 def _setting(recorded: Replayable, spec: BlockSpec, first: int, last: int) -> Setting:

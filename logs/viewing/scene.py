@@ -9,9 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import quaternions_of_matrices
+from ...runtime.language.terrain import Ground, HeightField
 from ..file.format import EVENTS, WORLD, Header, RecordedRows, time_columns, timed
 from .contacts import (
     ABOVE_GROUND,
@@ -265,6 +267,8 @@ class PushPart(ScenePart):
 
 
 COLOR = 0x8D9299FF
+SLIPPERY = 0x5B8DB8FF
+"""The colour of ground with a friction coefficient of 0.3."""
 EDGES = 0xCFD8DCFF
 """The edges of the boxes: all their sides have one colour, so a step would not be seen without."""
 FLOOR_SIZE = 4.0
@@ -274,39 +278,75 @@ DEEPEST_FLOOR = -10.0
 """A floor below this height [m] is out of reach, and so not drawn."""
 
 
+def color_of_ground(friction: float | None) -> int:
+    """The colour of a piece of ground, as 0xRRGGBBAA."""
+    if friction is None:
+        return COLOR
+    share = min(max((friction - 0.3) / 0.7, 0.0), 1.0)
+    channels = ((COLOR >> shift & 0xFF, SLIPPERY >> shift & 0xFF) for shift in (24, 16, 8, 0))
+    mixed = [round(share * rough + (1.0 - share) * smooth) for rough, smooth in channels]
+    return int.from_bytes(bytes(mixed))
+
+
+def _normals(field: HeightField) -> NDArray[np.float64]:
+    """The normals at a field's corners, for its shading, (n, 3)."""
+    heights = np.array(field.heights)
+    rows, columns = heights.shape
+    x, y = ((field.most[k] - field.least[k]) / (n - 1) for k, n in enumerate((columns, rows)))
+    left, ahead = np.gradient(heights, y, x)
+    normals = np.stack([-ahead, -left, np.ones_like(heights)], axis=-1).reshape(-1, 3)
+    unit: NDArray[np.float64] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return unit
+
+
 class TerrainPart(ScenePart):
-    """``ground``: the boxes of the scene with their edges, drawn once. A level floor at height zero is not drawn,
-    as the viewer has a grid there."""
+    """``ground``: the boxes of the scene with their edges, and its height fields, drawn once. What is more
+    slippery is bluer. A level floor at height zero is not drawn, as the viewer has a grid there."""
 
     def write_static(self) -> None:
-        """Write the boxes."""
-        import rerun as rr
-
+        """Write the boxes and the fields."""
         terrain = self.header.terrain
         if terrain is None:
             return
-        corners = [(block.least, block.most) for block in terrain.blocks]
+        blocks = list(terrain.blocks)
         if DEEPEST_FLOOR < terrain.floor < 0.0:
-            half = 0.5 * FLOOR_SIZE
-            corners.append(
-                ((-half, -half, terrain.floor - FLOOR_THICKNESS), (half, half, terrain.floor))
-            )
-        if not corners:
-            return
-        places = np.array(corners)
-        centers, half_sizes = places.mean(axis=1), 0.5 * (places[:, 1] - places[:, 0])
+            half, bottom = 0.5 * FLOOR_SIZE, terrain.floor - FLOOR_THICKNESS
+            blocks.append(Ground((-half, -half, bottom), (half, half, terrain.floor)))
+        if blocks:
+            self._write_boxes(blocks)
+        for k, field in enumerate(terrain.fields):
+            self._write_field(f"ground/field/{k}", field)
+
+    def _write_boxes(self, blocks: list[Ground]) -> None:
+        import rerun as rr
+
+        colors = np.array([color_of_ground(block.friction) for block in blocks], np.uint32)
         for name, color, mode in (
-            ("ground", COLOR, "solid"),
-            ("ground/edges", EDGES, "majorwireframe"),
+            ("ground", colors, "solid"),
+            ("ground/edges", np.full(len(blocks), EDGES, np.uint32), "majorwireframe"),
         ):
             boxes = rr.Boxes3D(
-                centers=centers,
-                half_sizes=half_sizes,
-                colors=np.full(len(places), color, np.uint32),
-                radii=np.full(len(places), 0.003 * self.scale),
+                centers=[block.middle for block in blocks],
+                half_sizes=[block.half_sizes for block in blocks],
+                quaternions=None
+                if all(block.level for block in blocks)
+                else [rr.Quaternion(xyzw=block.quaternion) for block in blocks],
+                colors=color,
+                radii=np.full(len(blocks), 0.003 * self.scale),
                 fill_mode=mode,
             )
             self.log(name, boxes)
+
+    def _write_field(self, name: str, field: HeightField) -> None:
+        import rerun as rr
+
+        corners, triangles = field.triangles()
+        color = color_of_ground(field.friction)
+        mesh = rr.Mesh3D(
+            vertex_positions=corners, triangle_indices=triangles, vertex_normals=_normals(field),
+            vertex_colors=np.full(len(corners), color, np.uint32),
+        )  # fmt: skip
+        self.log(name, mesh)
 
     def write(self, moments: Moments) -> None:
         """Nothing: the ground does not move."""

@@ -21,7 +21,7 @@ from .library import PlanLibrary
 FORMAT = 1
 FOLDER = "rehearsed"
 """The folder, within a library's, of what was learnt."""
-NO_PART = ("task", "rehearsed", "library", "solve", "check")
+NO_PART = ("task", "rehearsed", "learnt", "library", "solve", "check")
 """The parameters of the plan's block that are no part of the controller."""
 
 Vector = tuple[float, float, float]
@@ -129,7 +129,7 @@ def find_rehearsed(library: PlanLibrary, task: JumpTask, controller: str) -> Reh
     try:
         data = json.loads(path.read_text("utf-8"))
         key = data.pop("format"), data.pop("plan"), data.pop("controller")
-        corrections = {name: _vector(data.pop(f"{name}_correction")) for name in KINDS}
+        corrections = {name: read_vector(data.pop(f"{name}_correction")) for name in KINDS}
         before, after = (_deviation(data.pop(name)) for name in ("before", "after"))
         found = Rehearsed(
             corrections["velocity"], corrections["momentum"], before, after,
@@ -179,7 +179,8 @@ def _hash_of(plan: Path) -> str:
     return hashlib.sha256(plan.read_bytes()).hexdigest()
 
 
-def _vector(values: Any) -> Vector:
+def read_vector(values: Any) -> Vector:
+    """Three finite numbers from a file; raises ``ValueError`` or ``TypeError`` for anything else."""
     x, y, z = (float(value) for value in values)
     if not all(abs(value) < 1e6 for value in (x, y, z)):
         raise ValueError(f"{values} is not finite")
@@ -188,6 +189,6 @@ def _vector(values: Any) -> Vector:
 
 def _deviation(data: Any) -> Deviation:
     return Deviation(
-        _vector(data["velocity"]), _vector(data["momentum"]), float(data["size"]),
+        read_vector(data["velocity"]), read_vector(data["momentum"]), float(data["size"]),
         float(data["scatter"]), int(data["landed"]), int(data["flown"]), int(data["runs"]),
     )  # fmt: skip

@@ -6,11 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
-from ...robots.kinematics import contact_centres, link_poses_in_base
+from ...robots.kinematics import standing_contacts
 from .files import JumpTaskError
 from .sequence import SHORTEST_JUMP_OVER_AN_EDGE, Hop, StanceLocation, edge_of
 from .task import JumpTask
@@ -126,17 +123,7 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
 
 def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, float]]:
     """Where the contact points are on the ground, as the robot stands at a place."""
-    poses = link_poses_in_base(robot, robot.standing_position)
-    links = {foot.name: foot.link for foot in robot.feet}
-    points = np.array(
-        [
-            poses[links[contact.foot]][1] + product(poses[links[contact.foot]][0], centre)
-            for contact, centre in zip(robot.contacts, contact_centres(robot), strict=True)
-        ]
-    )[:, :2]
-    owners = np.array(robot.foot_of_contact())
-    middles = [points[owners == foot].mean(axis=0) for foot in range(len(robot.feet))]
-    points -= np.mean(middles, axis=0)
+    points = standing_contacts(robot)[:, :2]
     cosine, sine = math.cos(place.heading), math.sin(place.heading)
     return [
         (place.x + cosine * x - sine * y, place.y + sine * x + cosine * y)

@@ -136,7 +136,6 @@ class BackgroundBlock(Block):
                 getattr(self, port).views()[name][...] = value
         self._numbers = [0] * self._slots
         """The number of the job in each slot."""
-        self._job = 0
         self._changes: list[tuple[int, Parameters]] = []
         """The parameters, and from which tick on they hold."""
         self._worker_has: Parameters | None = None
@@ -164,7 +163,7 @@ class BackgroundBlock(Block):
         results = [*self._outputs, *self._states]
         self._worker = worker = WorkerLink(
             block_name(type(self)), self.params, self.context, self._slots,
-            record_size(self._inputs), record_size(results),
+            record_size(self._inputs), record_size(results), in_real_time=self._in_real_time,
         )  # fmt: skip
         self._worker_has = self.params
         memory, slots = worker.memory, range(self._slots)
@@ -223,10 +222,7 @@ class BackgroundBlock(Block):
 
     def _ask(self, slot: int, tick: int) -> None:
         assert self._worker is not None
-        self._job += 1
-        self._numbers[slot] = self._job
-        self._worker.memory.ask(slot, self._job, tick)
-        self._worker.run(slot, self._job)
+        self._numbers[slot] = self._worker.ask(slot, tick)
 
     def _change(self, params: Parameters) -> None:
         assert self._worker is not None
@@ -305,6 +301,7 @@ class BackgroundBlock(Block):
         if worker is None:
             self._restored = True
             return
+        worker.memory.withdraw()
         copy(self._handing_over)
         worker.restore(with_outputs=self._marks[SHOWN] >= 0)
         inputs = worker.memory.inputs
@@ -330,11 +327,10 @@ class BackgroundBlock(Block):
             worker.kill()
             return
         seconds = END_TIME
-        for slot in range(self._slots):
-            if self._in_real_time:
-                worker.memory.ask(slot, -1, self.tick)
-            elif self._sampled[slot] >= 0:
-                seconds += self._hangs_after
+        if self._in_real_time:
+            worker.memory.withdraw()
+        else:
+            seconds += self._hangs_after * sum(tick >= 0 for tick in self._sampled)
         self._metrics, self._warnings = worker.end(seconds) or ({}, (STILL_COMPUTING,))
 
     def metrics(self) -> Mapping[str, Metric]:

@@ -82,14 +82,32 @@ class JobMemory:
         return _split(self._results[slot], like)
 
     def ask(self, slot: int, job: int, tick: int) -> None:
-        """Number the job whose inputs are in a slot; the worker leaves out a job of another number."""
+        """Number the job whose inputs are in a slot. Numbers count from one and increase."""
         self._asked[slot, _TICK] = tick
         with self._fence:
             pass
         self._asked[slot, _JOB] = job
 
+    def withdraw(self) -> None:
+        """Leave out all jobs that have not begun."""
+        for slot in range(self.slots):
+            self._asked[slot, _JOB] = 0
+
+    def next_job(self, last: int) -> tuple[int, int]:
+        """The first job after ``last`` that is asked for, and its slot; zeros if there is none."""
+        jobs = np.asarray(self._asked)[: self.slots, _JOB]
+        later = jobs[jobs > last]
+        if not later.size:
+            return 0, 0
+        with self._fence:
+            pass
+        job = int(later.min())
+        return job, int(np.argmax(jobs == job))
+
     def is_asked(self, slot: int, job: int) -> bool:
         """Whether the slot still holds that job."""
+        with self._fence:
+            pass
         return self._asked[slot, _JOB] == job
 
     def tick_of(self, slot: int) -> int:

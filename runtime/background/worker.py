@@ -1,8 +1,12 @@
 """The process that runs one background block: the block alone in a graph of its own.
 
-What it is to do comes through its standard input, in order: first the ``WorkerTask``, then messages. The
-inputs and results lie in memory that both processes share. When its input ends, it closes the block
-and answers with the block's metrics and warnings.
+The jobs lie in memory that both processes share; the worker does them in the order of their numbers. In
+virtual time it is woken for each. In real time it looks by itself, every millisecond or less, because a
+control thread that wakes another may lose its processor to it.
+
+Through its standard input come first the ``WorkerTask`` and then messages, each of which says before
+which job it holds. When its input ends, it closes the block and answers with the block's metrics and
+warnings.
 """
 
 from __future__ import annotations
@@ -11,11 +15,13 @@ import json
 import os
 import pickle
 import time
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from select import select
 from struct import Struct
-from typing import IO, Any
+from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...processes.child import report_ready
@@ -31,12 +37,15 @@ from ..running.memory import BoundGraph
 from .job_memory import JobMemory, copies, copy, record_size
 
 MESSAGE = Struct("@qqq")
-"""A kind, and two numbers."""
-RUN, RESTORE, CHANGE = range(3)
-"""Run the job of a slot and number; go on from the outputs, if the first number is not zero, and the
-states in the last slot; take over parameters, of which as many bytes of JSON follow."""
+"""A kind, the number of a job, and a further number."""
+WAKE, RESTORE, CHANGE = range(3)
+"""Look for jobs. From that job on, go on from the states in the last slot, and where the further number
+is not zero from the outputs there. From that job on, take over parameters, of which so many bytes of
+JSON follow."""
 BELL = b"."
 """What the worker writes after each job, so that who waits for it wakes up."""
+NICENESS = 5
+"""By how much the worker steps back behind the control thread, in real time."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +59,7 @@ class WorkerTask:
         descriptor: of the shared memory.
         answers: the descriptor of the pipe on which it rings and answers.
         slots, inputs, results: see ``JobMemory``.
+        look_every: the seconds after which it looks for jobs; ``None``: it is woken.
     """
 
     use: str
@@ -60,17 +70,23 @@ class WorkerTask:
     slots: int
     inputs: int
     results: int
+    look_every: float | None
 
 
 def main() -> None:
     """Work until the input ends."""
-    requests = os.fdopen(os.dup(0), "rb")
+    requests = os.dup(0)
     with open(os.devnull, "rb") as nothing:  # the block is not to read the messages
         os.dup2(nothing.fileno(), 0)
-    worker = Worker(pickle.load(requests))
+    with open(requests, "rb", buffering=0, closefd=False) as stream:
+        task: WorkerTask = pickle.load(stream)
+    if task.look_every is not None:
+        with suppress(OSError):
+            os.nice(NICENESS)
+    worker = Worker(task, requests)
     try:
         report_ready()
-        worker.serve(requests)
+        worker.serve()
     finally:
         worker.block.close()
     worker.answer()
@@ -83,8 +99,10 @@ class Worker:
         AloftError: the block is not the one that the graph has.
     """
 
-    def __init__(self, task: WorkerTask) -> None:
-        self._task = task
+    def __init__(self, task: WorkerTask, requests: int) -> None:
+        self._task, self._requests = task, requests
+        self._received = b""
+        self._messages: deque[tuple[int, int, int, bytes]] = deque()
         context = task.context
         kind = _find(task.use, context)
         params = kind.Params.model_validate_json(task.params)
@@ -112,24 +130,58 @@ class Worker:
         self.block.save_state()
         copy(self._results[-1])
 
-    def serve(self, requests: IO[bytes]) -> None:
-        """Do what the messages say until they end."""
-        while len(message := requests.read(MESSAGE.size)) == MESSAGE.size:
-            kind, first, second = MESSAGE.unpack(message)
-            if kind == RUN:
-                self._run(first, second)
-            elif kind == RESTORE:
-                self._restore(with_outputs=bool(first))
+    def serve(self) -> None:
+        """Do the jobs until the input ends, and then those that are still asked for."""
+        memory, last, goes_on = self._memory, 0, True
+        while True:
+            job, slot = memory.next_job(last)
+            if goes_on:
+                goes_on = self._receive(0.0 if job else self._task.look_every)
+            elif not job:
+                return
+            if job:
+                last = job
+                if self._obey(job):
+                    self._run(slot, job)
+
+    def _receive(self, seconds: float | None) -> bool:
+        """Take the messages that come within a time, or until one comes. Returns false at their end."""
+        while select([self._requests], [], [], seconds)[0]:
+            piece = os.read(self._requests, 1 << 16)
+            if not piece:
+                return False
+            self._received += piece
+            seconds = 0.0
+            while len(self._received) >= MESSAGE.size:
+                kind, job, number = MESSAGE.unpack_from(self._received)
+                end = MESSAGE.size + (number if kind == CHANGE else 0)
+                if len(self._received) < end:
+                    break
+                text = self._received[MESSAGE.size : end]
+                self._received = self._received[end:]
+                if kind != WAKE:
+                    self._messages.append((kind, job, number, text))
+        return True
+
+    def _obey(self, job: int) -> bool:
+        """Do what messages say for a job. Returns false where it is one from before a restore."""
+        if any(kind == RESTORE and first > job for kind, first, _, _ in self._messages):
+            return False
+        while self._messages and self._messages[0][1] <= job:
+            kind, _, number, text = self._messages.popleft()
+            if kind == RESTORE:
+                self._restore(with_outputs=bool(number))
             else:
-                self._change(requests.read(first))
+                self._change(text)
+        return True
 
     def _run(self, slot: int, job: int) -> None:
         memory, clock = self._memory, self._bound.clock
-        if not memory.is_asked(slot, job):
-            return  # it was withdrawn
         started = time.perf_counter_ns()
-        copy(self._inputs[slot])
         clock.tick = memory.tick_of(slot)
+        copy(self._inputs[slot])
+        if not memory.is_asked(slot, job):
+            return  # it was withdrawn, and the slot may be written again
         clock.stop_reason = None
         if type(self.block).is_moore():
             self.block.emit()

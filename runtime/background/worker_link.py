@@ -18,10 +18,12 @@ from ..language.context import Clock, Context
 from ..language.errors import AloftError
 from ..language.parameters import Parameters
 from .job_memory import JobMemory
-from .worker import BELL, CHANGE, MESSAGE, RESTORE, RUN, WorkerTask, main
+from .worker import BELL, CHANGE, MESSAGE, RESTORE, WAKE, WorkerTask, main
 
 START_TIME = 120.0
 """Seconds that a worker may take to be ready: it may have to compile its block's kernels first."""
+LOOK_EVERY, LOOK_SHARE = 1e-3, 0.02
+"""Seconds after which a worker in real time looks for jobs, at most, and as a share of the latency."""
 
 
 class WorkerError(AloftError):
@@ -36,6 +38,7 @@ class WorkerLink:
         params: its parameters.
         context: of the block.
         slots, inputs, results: see ``JobMemory``.
+        in_real_time: whether the control thread must not lose its processor to the worker.
 
     Attributes:
         memory: the shared memory.
@@ -46,9 +49,21 @@ class WorkerLink:
     """
 
     def __init__(
-        self, use: str, params: Parameters, context: Context, slots: int, inputs: int, results: int
+        self,
+        use: str,
+        params: Parameters,
+        context: Context,
+        slots: int,
+        inputs: int,
+        results: int,
+        *,
+        in_real_time: bool,
     ) -> None:
         self.has_failed = False
+        self._wakes = not in_real_time
+        self._job = 0
+        latency = slots * context.period
+        look_every = min(LOOK_EVERY, LOOK_SHARE * latency) if in_real_time else None
         clock = Clock(context.clock.base_period, context.clock.tick)
         shared = JobMemory.make(slots, inputs, results)
         self._answers, theirs = os.pipe()
@@ -56,7 +71,7 @@ class WorkerLink:
             os.set_blocking(theirs, False)
             task = WorkerTask(
                 use, params.model_dump_json(), replace(context, clock=clock), shared, theirs, slots,
-                inputs, results,
+                inputs, results, look_every,
             )  # fmt: skip
             self._process = ChildProcess(
                 f"the worker of {context.path}", f"{main.__module__}:main",
@@ -79,25 +94,27 @@ class WorkerLink:
             self.kill()
             raise WorkerError(str(error)) from error
 
-    def run(self, slot: int, job: int) -> None:
-        """Ask for the job whose inputs are in a slot."""
-        self._send(RUN, slot, job)
+    def ask(self, slot: int, tick: int) -> int:
+        """Ask for the job whose inputs, sampled in that tick, are in a slot. Returns its number."""
+        self._job += 1
+        self.memory.ask(slot, self._job, tick)
+        if self._wakes:
+            self._send(WAKE)
+        return self._job
 
     def restore(self, *, with_outputs: bool) -> None:
-        """Let the worker go on from the last slot."""
+        """Let the worker go on from the last slot, with the jobs that are asked for after this."""
         self._send(RESTORE, int(with_outputs))
 
     def change(self, params: Parameters) -> None:
         """Let the worker take over parameters, for the jobs that are asked for after this."""
         text = params.model_dump_json().encode()
-        self._send(CHANGE, len(text))
-        with suppress(OSError):
-            os.write(self._requests, text)
+        self._send(CHANGE, len(text), text)
 
-    def _send(self, kind: int, first: int = 0, second: int = 0) -> None:
-        MESSAGE.pack_into(self._message, 0, kind, first, second)
+    def _send(self, kind: int, number: int = 0, text: bytes = b"") -> None:
+        MESSAGE.pack_into(self._message, 0, kind, self._job + 1, number)
         with suppress(OSError):  # it has died: that is an error when its result is due
-            os.write(self._requests, self._message)
+            os.write(self._requests, self._message + text if text else self._message)
 
     def wait_for(self, slot: int, job: int, seconds: float) -> None:
         """Wait until a job is finished.

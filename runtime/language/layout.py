@@ -113,3 +113,9 @@ class Layout:
         if not part.flags.c_contiguous:
             part = np.ascontiguousarray(part)
         return part.view(DTYPES[slot.section]).reshape((*rows.shape[:-1], *slot.shape))
+
+
+def only_field(port: str, signals: Iterable[str]) -> str | None:
+    """The field of a port, where it has only one; wires are written so, too."""
+    fields = [name for name in signals if name.rpartition(".")[0] == port]
+    return fields[0] if len(fields) == 1 else None

@@ -72,12 +72,15 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
     model = block_type.Params.model_json_schema()
     for inner, schema in model.pop("$defs", {}).items():
         definitions[f"{name}.{inner}"] = _relocate(schema, name)
+    in_unit = getattr(block_type.Params, "in_unit", ())
     properties: Schema = {}
     for key, schema in _relocate(model.get("properties", {}), name).items():
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
         options = [schema, _REFERENCE, _EXPORTED]
-        if schema.pop("unit", ""):  # a text with a unit may stand for each number, also in a list
+        if (
+            schema.pop("unit", "") or key in in_unit
+        ):  # a text with a unit may stand for each number, also in a list
             per_joint = "PerJoint" in json.dumps(schema)
             inside = {"type": "object"} if per_joint else {"type": "array"}
             options += [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
@@ -93,7 +96,7 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
             },
             "in": {
                 "type": ["object", "null"],
-                "additionalProperties": False,
+                "additionalProperties": _further_inputs(block_type),
                 "properties": {
                     port: {
                         "allOf": [{"$ref": "#/definitions/Wire"}],
@@ -104,6 +107,12 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
             },
         },
     }
+
+
+def _further_inputs(block_type: type[Block]) -> Schema | bool:
+    """What inputs may be called that the class does not declare: their parameters may make some."""
+    made = block_type.specialize.__func__ is not Block.specialize.__func__  # type: ignore[attr-defined]
+    return {"$ref": "#/definitions/Wire"} if made and not block_type.inputs else False
 
 
 def _unit_text(schema: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..language.block import Metric
 from ..language.errors import ExitCode, RunError
+from ..language.layout import only_field
 from ..language.parameter_change import ParameterChange
 from ..language.stages import CheckedGraph
 from .sinks import MemoryLog
@@ -92,7 +93,7 @@ class RunResult:
         return np.array(self._recorded().ticks, np.float64) * self.period
 
     def signal(self, name: str) -> NDArray[Any]:
-        """All values of ``block.output.field``, (ticks, ...).
+        """All values of ``block.output.field``, (ticks, ...); an output of one field may stand for it.
 
         Raises:
             KeyError: there is no such field; the message has the nearest name.
@@ -100,10 +101,12 @@ class RunResult:
         """
         log = self._recorded()
         assert log.layout is not None
-        if name not in log.layout.slots:
-            near = get_close_matches(name, log.layout.slots, 1, 0.0)
+        slots = log.layout.slots
+        found = name if name in slots else only_field(name, slots)
+        if found is None:
+            near = get_close_matches(name, slots, 1, 0.0)
             raise KeyError(f"no signal {name!r}; the nearest is {', '.join(near)}")
-        return log.layout.view(log.rows(), name)
+        return log.layout.view(log.rows(), found)
 
     def plot(
         self, *signals: str, start: float | None = None, end: float | None = None

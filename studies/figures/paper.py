@@ -186,7 +186,7 @@ def scene_of(cell: Cell) -> Terrain:
     """The ground that a cell's simulated robot jumps on."""
     checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin).checked
     params: Any = next(spec.params for spec in checked.blocks if spec.path == "robot")
-    scene: Terrain = params.build_scene()
+    scene: Terrain = params.build_scene(None)
     return scene
 
 

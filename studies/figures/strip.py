@@ -153,7 +153,7 @@ def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -
     for geom in spec.geoms:
         if geom.name == "floor":
             geom.material = "tiles"
-        elif geom.name.startswith("box/"):
+        elif geom.name.startswith(("box/", "field/")):
             geom.rgba = [*BLOCK, 1.0]
         else:
             part = next((c for p, c in PAINT.items() if p in geom.name), PAINT["foot"])

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aloft import LoadError, load
 from aloft.blocks.signals import JointCommand
-from aloft.hal.drive_control import DriveGoals
+from aloft.hal.drive_control import (
+    DriveGoals,
+    MotorModel,
+    gears_of,
+    nominal_torque,
+    true_torque,
+)
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
 from aloft.robots.transmission import TransmissionMap, motor_gains
 
+GRAPHS = Path(__file__).parents[2] / "graphs"
 ROBOT = find_robot("bruce")
 FLIGHT = np.array([40.0, 60.0, 60.0, 60.0, 15.0] * 2), np.array([1.0, 1.5, 1.5, 1.2, 0.3] * 2)
 STIFFNESS, DAMPING = (motor_gains(ROBOT, gains, "").motor for gains in FLIGHT)
@@ -104,3 +114,54 @@ def test_the_share_follows_the_gains(factor: float) -> None:
     wish = command(np.random.default_rng(3), factor * FLIGHT[0], factor * FLIGHT[1])
     made.follow(wish, np.zeros(10), np.zeros(10), np.zeros(10), np.zeros(10))
     np.testing.assert_allclose(made.position, min(1.0, factor) * motors(wish.position), atol=1e-12)
+
+
+KNOWN = MotorModel(torque_constant={"*": 0.96, "left_*": 1.05}, saturation=0.12, load_friction=0.05)
+
+
+@settings(max_examples=200)
+@given(st.floats(-9.0, 9.0), st.floats(-20.0, 20.0), st.integers(0, 9))
+def test_what_is_asked_of_a_known_motor_gives_the_torque(
+    torque: float, speed: float, motor: int
+) -> None:
+    none = np.zeros(10)
+    gears = gears_of(ROBOT, none, none, none, none, 0.0, KNOWN)
+    asked = nominal_torque(gears, motor, torque, speed)
+    assert true_torque(gears, motor, asked, speed) == pytest.approx(torque, abs=2e-3)
+
+
+def test_a_known_motor_is_asked_for_what_gives_the_commanded_torque() -> None:
+    rng = np.random.default_rng(2)
+    made, true = goals(), DriveGoals(ROBOT, *FLIGHT, STIFFNESS, DAMPING, 0.0, KNOWN)
+    asked = command(rng, *(np.zeros(10) for _ in range(2)))
+    asked.torque *= 0.5
+    for each in (made, true):
+        each.follow(asked, *(np.zeros(10) for _ in range(4)))
+    torque = np.zeros(10)
+    TransmissionMap(ROBOT).joint_torque(true.torque, torque)
+    assert np.abs(torque - asked.torque).max() > 0.1
+    true.correct(np.zeros(10), torque)
+    np.testing.assert_allclose(torque, asked.torque, atol=2e-3)
+
+
+def test_nominal_motors_change_no_bit() -> None:
+    asked = command(np.random.default_rng(3), *FLIGHT)
+    found = []
+    for motors in (None, MotorModel(), MotorModel(torque_constant={"*": 1.0})):
+        made = DriveGoals(ROBOT, *FLIGHT, STIFFNESS, DAMPING, 0.0, motors)
+        made.follow(asked, *(np.full(10, 0.1) for _ in range(4)))
+        found.append(made.torque.tobytes())
+    assert len(set(found)) == 1
+
+
+@pytest.mark.parametrize(
+    ("constant", "message"),
+    [
+        ({"left_knee": 1.1}, "bruce has no motor left_knee"),
+        ({"*": 3.0}, "motor_model.torque_constant of * is 3"),
+    ],
+)
+def test_a_model_of_motors_that_are_not_there(constant: dict[str, float], message: str) -> None:
+    with pytest.raises(LoadError) as caught:
+        load(GRAPHS / "jump.yaml", {"robot.motor_model.torque_constant": constant})
+    assert message in str(caught.value)

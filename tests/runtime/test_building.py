@@ -47,6 +47,14 @@ def test_what_is_built_runs_and_is_the_same_graph_as_its_file(tmp_path: Path) ->
     assert aloft.load(tmp_path / "loop.yaml").run().run_hash == result.run_hash
 
 
+def test_a_block_may_be_added_in_the_background() -> None:
+    graph = GraphBuilder(rate="100 Hz", duration="0.1 s")
+    wave = graph.add("wave", "blocks.SineWave")
+    graph.add("slow", Gain, {"u": wave.y}, background={"latency": "30 ms", "late": "hold"})
+    assert "background: {latency: 30 ms, late: hold}" in graph.yaml()
+    assert graph.load().checked.block("slow").block_type.delay_runs == 3
+
+
 def test_rates_offsets_and_delays_are_written_where_they_are_given() -> None:
     graph = GraphBuilder(rate="100 Hz")
     source = graph.add("a", "blocks.Constant", value=[1.0], rate="50 Hz", offset=1, on="left")

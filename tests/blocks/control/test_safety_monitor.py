@@ -290,6 +290,39 @@ def test_sensors_that_are_not_to_be_trusted(bad, ticks, reason, text):
     assert bench.clock.stop_reason == text
 
 
+PACK = {
+    "lowest_voltage": 13.2, "brown_out_voltage": 10.0, "pack_resistance": 0.05,
+    "winding_resistance": 0.2, "torque_constant": 0.35,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("voltage", "power", "text"),
+    [
+        (13.1, 0.0, "13.1 V is below lowest_voltage, 13.2 V without load"),
+        (11.5, 400.0, ""),  # 400 W at 11.5 V: 1.74 V over 50 mOhm
+        (11.3, 400.0, "11.3 V is below lowest_voltage, 13.2 V without load"),
+        (13.1, -300.0, "13.1 V is below lowest_voltage, 13.2 V without load"),  # it charges
+        (9.9, 500.0, "9.9 V is below brown_out_voltage, 10 V"),
+    ],
+)
+def test_a_pack_that_sags_under_load_is_not_empty(voltage, power, text):
+    bench = make(**PACK)
+    torque, velocity = np.zeros(10), np.zeros(10)
+    if power:
+        torque[KNEE] = 8.0
+        motors = ROBOT.torque_to_motor @ torque
+        heat = PACK["winding_resistance"] * np.square(motors / PACK["torque_constant"]).sum()
+        velocity[KNEE] = (power - heat) / 8.0
+    bench.set("joints", torque=torque, velocity=velocity)
+    bench.set("health", **{**HEALTHY, "voltage": np.full(10, voltage)})
+    bench.step(10)
+    assert fault(bench) == SafetyFault.NONE
+    bench.step()
+    assert fault(bench) == (SafetyFault.VOLTAGE if text else SafetyFault.NONE)
+    assert text in bench.block.metrics().get("safety_reason", "")
+
+
 @pytest.mark.parametrize("state", [DrivePhase.OFF, DrivePhase.DAMPED])
 def test_drives_that_do_not_drive_are_not_judged(state):
     bench = with_health(condition=np.full(10, 0x88), voltage=np.full(10, 5.0), state=int(state))

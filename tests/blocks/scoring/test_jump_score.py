@@ -246,6 +246,17 @@ def test_a_short_hop_is_no_flight() -> None:
     assert metrics["flight_time_s"] == pytest.approx(TOUCHDOWN - LIFT_OFF, abs=PERIOD)
 
 
+def test_on_uneven_ground_the_robot_is_judged_by_what_it_does() -> None:
+    change = after(0.0, ground_height=[0.0, 0.004, -0.003, 0.0],
+                   contact_touched=[True, False, False, True])  # fmt: skip
+    level, _ = run(change)
+    assert "contact points carry no load" in str(level["reason"])
+    uneven, _ = run(change, ground_tolerance=0.005)
+    assert uneven["success"] is True, uneven["reason"]
+    lower, _ = run(change, ground_tolerance=0.003)
+    assert "not all at 0.000 m within 3 mm" in str(lower["reason"])
+
+
 def test_targets_given_as_parameters_win_over_the_reference() -> None:
     change = after(0.0, contact_position=moved(0.1, 0.0, 0.5), com=[0.1, 0.0, 0.32],
                    ground_height=[0.05] * 4, base_position=[0.1, 0.0, 0.4])  # fmt: skip

@@ -205,6 +205,20 @@ def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
+def test_somebody_calls_the_emergency_stop_while_a_graph_holds_the_port(bench: Bench) -> None:
+    process = bench.start()
+    bench.wait_until_it_drives(process)
+    done = subprocess.run(
+        [sys.executable, "-m", "aloft", "robot", "estop", "bench.yaml", "--json"],
+        cwd=bench.folder, capture_output=True, text=True, check=False, timeout=LONG,
+        env={**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])},
+    )  # fmt: skip
+    assert json.loads(done.stdout)["success"], done.stderr
+    assert result(process)["reason"].endswith("`aloft robot estop` has damped the drives")
+    assert bench.states() == {3}
+
+
+@pytest.mark.long
 def test_another_process_cannot_open_the_same_port(bench: Bench) -> None:
     port = open_port(bench.server.bus_path)
     try:
@@ -289,9 +303,12 @@ def test_why_the_motor_thread_must_not_go_on() -> None:
     let_go = SimpleNamespace(held=lambda: False)
     assert reason(block(_switch=let_go)) == "the dead man's switch was let go"
     for tripped in (True, False):
-        robot = block(_watchdog=SimpleNamespace(tripped=tripped))
+        robot = block(_watchdog=SimpleNamespace(tripped=tripped, asked=False))
         assert reason(robot).endswith("the graph hung for 40 ms") == tripped
-    robot = block(_watchdog=SimpleNamespace(tripped=True))
+    robot = block(_watchdog=SimpleNamespace(tripped=True, asked=False))
+    robot._watchdog.asked = True
+    assert reason(robot) == "`aloft robot estop` has damped the drives"
+    robot._watchdog.asked = False
     robot.context.clock.command_limit = 0.015
     assert reason(robot).endswith("or no commands came over the links for 15 ms")
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from aloft.hal.bear.bulk import BulkExchange
 from aloft.hal.bear.bus import BearBus
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.bear.measurement import READ, Measurement
+from aloft.hal.bear.measurement import READ, Measurement, Supervision
 from aloft.hal.twin.twin_robot import VirtualBusPort
 from aloft.robots.description import find_robot
 
@@ -57,3 +57,33 @@ def test_restored_measurements_are_not_counted_twice(bulk: BulkExchange) -> None
         each.take_drives(bulk)
     np.testing.assert_array_equal(other.joint_torque, measured.joint_torque)
     np.testing.assert_allclose(measured.joint_torque, joints_of(4.0), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("voltage", "current", "speed", "text"),
+    [
+        (12.9, 0.0, 0.0, "12.9 V is below the lowest voltage of 13 V"),
+        (11.2, 10.0, 10.0, ""),  # 350 W of work and 200 W of heat: 2.0 V over 40 mOhm
+        (
+            10.9,
+            10.0,
+            10.0,
+            "10.9 V is below the lowest voltage of 13 V, also without its sag of 2.0 V",
+        ),
+        (12.9, 10.0, -10.0, "12.9 V is below the lowest voltage of 13 V"),  # it charges the pack
+        (9.9, 30.0, 20.0, "9.9 V is below the 10 V of a brown-out"),
+    ],
+)
+def test_a_pack_that_sags_under_load_is_not_empty(
+    bulk: BulkExchange, voltage: float, current: float, speed: float, text: str
+) -> None:
+    measured = Measurement(ROBOT, HARDWARE)
+    supervision = Supervision(HARDWARE, ROBOT.transmission.motors)
+    bulk.values[:, 1:4], bulk.values[:, 4] = (speed, current, voltage), 30.0
+    bulk.error_bytes[:] = 0x80
+    measured.take_drives(bulk)
+    for cycle in range(1, HARDWARE.drives.bad_cycles + 1):
+        found = supervision.check_drives(measured, bulk, driving=True)
+        assert not found or cycle == HARDWARE.drives.bad_cycles
+    who = "drive right_yaw_motor (address 1): "
+    assert found == (f"{who}{text}" if text else "")

@@ -21,6 +21,7 @@ from aloft.hal.bear.watchdog import (
     AlwaysHeld,
     DriveWatchdog,
     GamepadButton,
+    ask_to_stop,
     damping_frame,
     open_switch,
     wait_until_held,
@@ -108,6 +109,23 @@ def test_it_ends_without_damping_when_told_that_the_graph_closes(
         os.kill(watchdog.pid, 0)
 
 
+def test_somebody_asks_it_to_stop(port: tuple[int, int]) -> None:
+    name = f"/dev/not there {os.getpid()}"
+    assert not ask_to_stop(name), "nobody listens"
+    watchdog = DriveWatchdog(port[1], DEVICES, SECONDS, port=name)
+    try:
+        watchdog.beat()
+        begin = time.monotonic()
+        assert not watchdog.asked and ask_to_stop(name)
+        assert time.monotonic() - begin < 0.5
+        assert watchdog.asked and not watchdog.tripped, "it goes on to watch"
+        assert first_frame(port, 0.0) == FRAME
+        assert ask_to_stop(name), "again"
+    finally:
+        watchdog.close()
+    assert not ask_to_stop(name)
+
+
 def test_a_gamepads_button(tmp_path: Path) -> None:
     device = tmp_path / "js0"
     os.mkfifo(device)
@@ -152,13 +170,20 @@ def test_the_space_bar(monkeypatch: pytest.MonkeyPatch) -> None:
         now = [100.0]
         monkeypatch.setattr("aloft.hal.bear.watchdog.time.monotonic", lambda: now[0])
         assert not switch.held()
-        for key, held in ((b"x", False), (b" ", True)):
+        for key, pause, held in (
+            (b"x", 0.0, False),
+            (b" ", 0.0, False),  # a key that is pressed repeats after half a second only
+            (b" ", 0.5, False),
+            (b" ", 0.09, True),
+            (b"  ", 0.09, True),
+        ):
+            now[0] += pause
             os.write(ours, key)
             assert select.select([theirs], [], [], 60.0)[0]
             assert switch.held() is held
-        now[0] += 0.6
+        now[0] += 0.09
         assert switch.held()
-        now[0] += 0.2
+        now[0] += 0.02
         assert not switch.held(), "it no longer repeats itself"
         switch.close()
         assert termios.tcgetattr(theirs) == before and os.get_blocking(theirs)

@@ -288,7 +288,7 @@ def test_platform_and_step_tell_the_ground_under_each_point() -> None:
 
 def test_ground_may_be_described_as_a_floor_and_boxes() -> None:
     scene = {"floor": "-50 cm", "boxes": [{"x": [-0.6, 0.08], "top": 0, "bottom": -0.5}]}
-    described = bench(scene=scene).block.params.build_scene()  # type: ignore[attr-defined]
+    described = bench(scene=scene).block.params.build_scene(None)  # type: ignore[attr-defined]
     assert described.height(0.0, 0.0) == 0.0
     assert described.floor == -0.5
     with pytest.raises(ValidationError, match=r"must have an extent along x: 0.1 to 0 m"):

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aloft import load
 from aloft.logs import RecordingError, read
 from aloft.logs.file.format import Header
 from aloft.logs.file.header import header_of
+from aloft.logs.recording.recorder import Recorder
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameter_change import ParameterChange
@@ -116,6 +118,14 @@ def test_signals_are_described_without_their_code(bound: BoundGraph, tmp_path: P
     assert run.rows.shape == (0, header.bus.size)
     with pytest.raises(KeyError, match=r"no signal 'a/b.reals'; the nearest are a/b.y.reals"):
         run["a/b.reals"]
+
+
+def test_a_port_of_one_field_stands_for_its_field(tmp_path: Path) -> None:
+    graph = load("rate: 10 Hz\nduration: 1 s\nblocks:\n  wave: {use: blocks.SineWave}\n")
+    result = graph.run(sinks=[Recorder(tmp_path / "a.rrd")])
+    recorded = read(tmp_path / "a.rrd")
+    assert np.array_equal(recorded["wave.y"], recorded["wave.y.value"])
+    assert np.array_equal(result.signal("wave.y"), recorded["wave.y"])
 
 
 def test_what_is_no_recording_is_said_so(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from aloft.logs.recording.writer import write_recording
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.regression import capture, write_test
 from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError
-from aloft.runtime.loading import load
+from aloft.runtime.loading import load, load_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
@@ -141,3 +141,15 @@ def test_what_cannot_be_made_a_test(recorded: KeptRun) -> None:
         capture(other, "total", 10, 20)
     *_, difference = capture(other, "total", 4, 20)
     assert difference is not None and difference.tick == 5
+
+
+def test_a_block_in_the_background_is_refused() -> None:
+    text = GRAPH.replace(
+        'use: "adder:Adder", with: {n: 2}',
+        "use: blocks.Gain, with: {n: 2}, background: {latency: 40 ms}",
+    )
+    graph = load_text(text, "graph.yaml")
+    keyframes = Keyframes(5)
+    kept = KeptRun.of(Executor(graph, sinks=[keyframes]).run(10), keyframes)
+    with pytest.raises(ReplayError, match="block 'total' works in the background"):
+        capture(kept, "total", 2, 8)

@@ -64,6 +64,7 @@ class Slow(Block):
         stop_at: int = parameter(-1, text="the tick in which it ends the run")
         sleep_at: int = parameter(-1, text="the tick in which it sleeps")
         sleep: float = parameter(60.0, text="how long", unit="s")
+        broken: bool = parameter(False, text="whether it cannot be set up")
         die_at: int = parameter(-1, text="the tick in which its process is killed")
 
     params: Params
@@ -74,6 +75,8 @@ class Slow(Block):
     total = State(Number, text="the sum")
 
     def setup(self) -> None:
+        if self.params.broken:
+            raise BlockError("the spring is missing")
         self.total.value[()] = 1.0
         self.pair.vector[:] = 5.0  # of which a run writes a part only
 

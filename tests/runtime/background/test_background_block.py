@@ -185,6 +185,16 @@ def test_an_error_of_the_block_is_named_when_its_outputs_are_due(tmp_path: Path)
     )
 
 
+def test_a_block_that_cannot_be_set_up_ends_the_run_before_its_first_tick() -> None:
+    background, _ = both("Slow", 4, params={"broken": True})
+    result = run(background)
+    assert (result.exit_code, result.ticks) == (ExitCode.RUN_FAILED, 0)
+    assert re.fullmatch(
+        r"block 'block' failed in start: its worker \(process \d+\) failed with RunError: "
+        "block 'block' failed in setup: the spring is missing", result.reason,
+    )  # fmt: skip
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
 def test_a_crash_of_the_worker_ends_the_run_in_good_order(tmp_path: Path) -> None:
     file = tmp_path / "motor"

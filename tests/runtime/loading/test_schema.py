@@ -1,6 +1,7 @@
 """The JSON Schema for editors: it takes what loads, and refuses what an editor should mark."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,18 @@ def test_shipped_graphs_are_valid(validator: Draft7Validator, path: Path) -> Non
     tree = read_file(path, str(path), problems)
     assert tree is not None
     assert [e.message for e in validator.iter_errors(plain(tree))] == []
+
+
+PAGES = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(ROOT).as_posix())
+def test_the_graphs_on_the_pages_are_valid(validator: Draft7Validator, page: Path) -> None:
+    for text in re.findall(r"```yaml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+        tree = read_value(text, "f", Problems())
+        data: Any = None if tree is None else plain(tree)
+        if isinstance(data, dict) and {"blocks", "wires"} & set(data):
+            assert [e.message for e in validator.iter_errors(data)] == []
 
 
 GOOD = """

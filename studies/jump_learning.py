@@ -1,0 +1,150 @@
+"""Learns from a robot's own jumps what the next one needs, from one run at a time.
+
+What a run says of itself is compared with its plan, by the robot's own estimates and never by a simulator's
+truth, so a recording of a real robot will do:
+
+- how far the middle of the feet moved from its planned place, which is corrected by the velocity. The
+  estimator is a few centimetres off after a flight, because it cannot change what it has already said; a
+  robot that rests before and after knows better (``moved_feet``);
+- the torso's roll and pitch after touchdown, the middle between their extremes, and its heading, which
+  are corrected by the angular momentum at lift-off.
+
+The answer of a landing to a correction is that of ``studies/landing_rehearsal``, which learns the same from
+many simulated worlds. What is learnt is kept as ``planner/library/learnt`` says, and ``blocks.JumpPlan``
+takes it into use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.linear_algebra import inverse, product
+from ..planner.library.learnt import LARGEST, Lesson, launch_of
+from ..planner.library.rehearsed import Vector
+from ..planner.task.plan import PlannedJump
+from .landing_rehearsal import AFTER, LEARNT, angles_of, response
+from .rehearsal import LEVER
+
+BEFORE = 0.1
+"""s before lift-off in which the feet stand where they stood at the start."""
+STANDING = 10
+"""Ticks before the plan begins to move."""
+FURTHER = 1.4
+"""A change of the velocity at lift-off moves the feet by more than the flight alone says: the centre of
+mass has moved in the thrust already, and the landing places the feet ahead of it."""
+SETTLED = 0.15
+"""s after touchdown from which on the feet stand in their new place."""
+MOST_TILT = 0.35
+"""A tilt [rad] beyond this says no more than that it was too much."""
+Signals = Callable[[str], Array]
+"""The values of a signal in every tick, by its name."""
+
+
+def lesson_of(
+    signals: Signals, plan: PlannedJump, mass: float, applied: tuple[Vector, Vector],
+    measured_place: tuple[float, float] | None = None,
+) -> Lesson | None:  # fmt: skip
+    """What one run teaches; ``None`` where its task cannot be learnt, or it never flew and landed.
+
+    Args:
+        signals: of the run.
+        plan: what the robot was to do.
+        mass: of the robot [kg].
+        applied: the learnt corrections that this run had, of velocity and angular momentum.
+        measured_place: by how much the feet moved, ahead and to the left [m], where somebody has
+            measured it; by default the robot's estimate.
+    """
+    launch = launch_of(plan.task)
+    missed = None if launch is None else landing_error(signals, measured_place)
+    if launch is None or missed is None:
+        return None
+    answer = response(plan, mass)
+    answer[:2] *= FURTHER
+    needed = np.zeros(6)
+    needed[LEARNT] = product(inverse(answer), missed)
+    needed = np.array(applied[0] + applied[1]) - needed
+    unit = mass * LEVER * float(plan.com[0, 2])
+    limit = LARGEST * np.array([1.0] * 3 + [unit] * 3)
+    x, y, z, kx, ky, kz = np.clip(needed, -limit, limit).round(5).tolist()
+    ahead, left, roll, pitch, yaw = missed.round(5).tolist()
+    return Lesson(
+        plan.task.name, launch, (x, y, z), (kx, ky, kz), (ahead, left), (roll, pitch, yaw)
+    )
+
+
+def landing_error(signals: Signals, measured_place: tuple[float, float] | None) -> Array | None:
+    """Actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad], (5,).
+
+    The torso is planned to be level. ``None`` without a flight and a landing.
+    """
+    time = np.asarray(signals("plan.reference.time"), np.float64)
+    lifted = float(signals("plan.reference.lift_off_time")[0])
+    landed = float(signals("plan.reference.touchdown_time")[0])
+    loaded = np.asarray(signals("contacts.state.active").any(axis=1), np.bool_)
+    flying = int(np.searchsorted(time, 0.5 * (lifted + landed)))
+    start = int(np.searchsorted(time, lifted - BEFORE))
+    if flying >= len(time) or loaded[flying] or not loaded[flying:].any():
+        return None
+    first = flying + int(np.argmax(loaded[flying:]))
+    if time[-1] < time[first] + SETTLED:
+        return None
+    until, settled = (int(np.searchsorted(time, time[first] + late)) for late in (AFTER, SETTLED))
+    angles = angles_of(np.asarray(signals("estimator.base.orientation"), np.float64))
+    planned = angles_of(np.asarray(signals("plan.reference.orientation"), np.float64))
+    after = angles[first:until]
+    roll, pitch = 0.5 * (after.min(axis=0) + after.max(axis=0))[:2]
+    due = min(int(np.searchsorted(time, landed)), len(time) - 1)
+    ahead, left = _moved(signals("plan.reference.foot_position"), start, due)
+    if measured_place is None:
+        com = np.asarray(signals("plan.reference.com"), np.float64)
+        moving = int(np.argmax(np.abs(com - com[0]).max(axis=1) > 1e-6))
+        resting = max(0, moving - STANDING)
+        x, y, _ = moved_feet(signals, resting, settled, float(time[1] - time[0]))
+        turned = float(angles[0, 2] - planned[0, 2])  # where the robot looked at the start
+        cos, sin = np.cos(turned), np.sin(turned)
+        measured_place = (cos * x + sin * y, cos * y - sin * x)
+    yaw = float((angles[first, 2] - angles[0, 2]) - (planned[due, 2] - planned[0, 2]))
+    yaw = float(np.arctan2(np.sin(yaw), np.cos(yaw)))
+    tilt = np.clip([roll, pitch, yaw], -MOST_TILT, MOST_TILT)
+    return np.array([measured_place[0] - ahead, measured_place[1] - left, *tilt])
+
+
+def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:
+    """By how much the middle of the feet moves between two ticks in both of which they stand [m, world], (3,).
+
+    The specific force is integrated twice, in the axes of the estimated orientation. At both ends the
+    estimator knows the velocity from the legs; what the first integral misses of the last one is the mean
+    error of the acceleration, and taken away.
+    """
+    rotation = rotation_matrices(np.asarray(signals("estimator.base.orientation"), np.float64))
+    force = np.asarray(signals("robot.imu.specific_force"), np.float64)
+    speed = np.asarray(signals("estimator.base.linear_velocity"), np.float64)
+    acceleration = product(rotation[start + 1 : end + 1], force[start + 1 : end + 1, :, None])[
+        ..., 0
+    ]
+    velocity = speed[start] + period * np.cumsum(acceleration, axis=0)
+    share = np.arange(1, len(velocity) + 1)[:, None] / len(velocity)
+    velocity += share * (speed[end] - velocity[-1])
+    feet = np.asarray(signals("dynamics.terms.foot_position"), np.float64).mean(axis=1)
+    beside = feet - np.asarray(signals("ahead.base.position"), np.float64)
+    return np.asarray(period * velocity.sum(axis=0) + beside[end] - beside[start])
+
+
+def rotation_matrices(quaternions: Array) -> Array:
+    """The matrices of quaternions x, y, z, w, (n, 4) to (n, 3, 3)."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _moved(feet: Array, start: int, end: int) -> tuple[float, float]:
+    """By how much the middle of the feet (ticks, feet, 3) moves between two ticks [m]."""
+    x, y, _ = (np.asarray(feet[end]) - np.asarray(feet[start])).mean(axis=0)
+    return float(x), float(y)
