@@ -255,7 +255,7 @@ class LandingHeuristic(Block):
         period: float,
     ) -> None:
         flying, landing = phase.phase == Phase.FLIGHT, phase.phase == Phase.LANDING
-        if not memory.started:
+        if not memory.started or reference.time < 0.0:  # the plan has not begun
             find_origin(reference, terms, memory)
         remember_touchdown(reference, flying, memory)
         overdue = flying and reference.phase > Phase.FLIGHT
