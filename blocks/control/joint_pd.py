@@ -75,7 +75,11 @@ class JointPDParams(Parameters):
         0.0, ge=0.0, le=20.0, text="gain of the soft stops, as a multiple of the flight gains"
     )
     friction: PerJoint = live_parameter(
-        PerJoint(0.0), unit="N m", ge=0.0, text="further joint friction to compensate"
+        PerJoint(0.0), unit="N m",
+        text="joint friction to compensate beyond the description's; negative: less",
+    )  # fmt: skip
+    damping: PerJoint = live_parameter(
+        PerJoint(0.0), unit="N m s/rad", text="joint damping to compensate, likewise"
     )
     friction_share: float = live_parameter(
         0.0, ge=0.0, le=1.0, text="share of the motors' friction and damping to compensate"
@@ -141,6 +145,8 @@ class JointPD(Block):
     stand; one that takes a step (``CaptureStep``) follows the whole-body controller instead.
     Gains, targets and torques change linearly from one set to the other within ``blend``.
 
+    During HANG all joints have the flight gains towards the planned angles.
+
     **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
     gains towards their held angle. Joints that belong to no leg and are not held, or that are
     ``released``, follow the whole-body controller while any leg stands; while all legs swing they have the flight gains
@@ -154,7 +160,7 @@ class JointPD(Block):
     planned feet relative to the centre of mass.
 
     **Friction.** The torque that compensates ``friction_share`` of the friction and damping of the
-    robot's motors, and all of ``friction``, is added in the direction in which each joint moves.
+    robot's motors, and all of ``friction`` and ``damping``, is added in the direction in which each joint moves.
 
     **Soft stops.** A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is
     pushed back: by ``stop_gain`` times its flight stiffness towards that margin, and by a damping
@@ -215,7 +221,7 @@ class JointPD(Block):
         constants.stance_stiffness[:] = np.where(held, stiffness, p.stance_stiffness.resolve(robot))
         constants.stance_damping[:] = np.where(held, damping, p.stance_damping.resolve(robot))
         constants.friction[:] = p.friction.resolve(robot) + p.friction_share * motors.friction
-        constants.viscous_friction[:] = p.friction_share * motors.damping
+        constants.viscous_friction[:] = p.damping.resolve(robot) + p.friction_share * motors.damping
         constants.compensates = bool(constants.friction.any() or constants.viscous_friction.any())
         constants.blend_rate = self.period / p.blend if p.blend > self.period else 1.0
 
@@ -240,7 +246,8 @@ class JointPD(Block):
             acceleration = wbc.acceleration[wbc.acceleration.shape[0] - n :]
             integrate_accelerations(acceleration, joints, follower, params.leak, period)
         find_stance_targets(legs, joints, follower, params, constants, scratch)
-        find_flight_targets(legs, reference, constants, scratch)
+        hangs = phase.phase == Phase.HANG
+        find_flight_targets(legs, reference, hangs, constants, scratch)
         command.mode = CommandMode.ACTIVE
         flies = phase.phase == Phase.FLIGHT and reference.phase == Phase.FLIGHT
         for i in range(command.torque.shape[0]):
@@ -271,6 +278,7 @@ def blend_legs(
     least = 1.0 if follower.airborne.shape[0] > 0 else 0.0
     for foot in range(follower.airborne.shape[0]):
         swings = phase.phase == Phase.FLIGHT or phase.phase == Phase.LANDING
+        swings = swings or phase.phase == Phase.HANG
         for point in range(constants.foot_of_point.shape[0]):
             pushes = phase.stance[point] or phase.stepping[point]
             if constants.foot_of_point[point] == foot and pushes:
@@ -388,15 +396,17 @@ def find_stance_targets(
 def find_flight_targets(
     legs: JointTarget,
     reference: JumpReference,
+    hangs: bool,
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg."""
+    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg, or for
+    all joints of a robot that hangs."""
     position, velocity = scratch.flight_position, scratch.flight_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i]:
             position[i], velocity[i] = constants.held_angle[i], 0.0
-        elif not constants.free[i]:
+        elif not constants.free[i] and not hangs:
             position[i], velocity[i] = legs.position[i], legs.velocity[i]
         elif constants.planned:
             position[i], velocity[i] = reference.joint_position[i], reference.joint_velocity[i]
