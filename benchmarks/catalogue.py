@@ -19,6 +19,7 @@ from .driver import driver
 from .frontier.frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.jumps import jumps
+from .jumps.real_robot import real_robot
 from .links.link_delays import link_delays
 from .links.links import links
 from .loading import loading
@@ -43,16 +44,17 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "link_delays": link_delays,
     "agreement": agreement,
     "jumps": jumps,
+    "real_robot": real_robot,
     "frontier": frontier,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("agreement", "jumps", "frontier", "link_delays")
+LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays")
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
-    "seeds": ("frontier", "link_delays"),
+    "seeds": ("frontier", "link_delays", "real_robot"),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick",),

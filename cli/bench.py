@@ -67,7 +67,7 @@ def bench(
         int | None, typer.Option(help="The seed by which they are drawn.", min=0)
     ] = None,
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the trial for 'frontier' and 'link_delays'.")
+        str, typer.Option(help="Seeds of the trial for 'frontier', 'link_delays' and 'real_robot'.")
     ] = "",
     jitter: Annotated[
         str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")

@@ -59,6 +59,7 @@ def told_values(
         | _ages(params, errors, draw)
         | _motors(block, params, robot, errors, draw)
         | _joints(params, robot, errors, draw)
+        | _pack(params)
     )
 
 
@@ -128,3 +129,10 @@ def _by_joint(robot: RobotDescription, values: Sequence[float] | Array) -> dict[
 
 def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _pack(params: SimulatorParameters) -> dict[str, Any]:
+    """The pack's resistance, so that its sag under load is no fault."""
+    if params.battery is None:
+        return {}
+    return {"safety.pack_resistance": params.battery.resistance}
