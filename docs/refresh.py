@@ -30,6 +30,7 @@ from result_tables import (
     direction_table,
     effects_table,
     frontier_table,
+    ground_table,
     impulse_table,
     quarter_table,
     results_sentence,
@@ -248,6 +249,26 @@ def write_effects(file: Path) -> None:
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
 
 
+def write_ground(*files: Path) -> None:
+    """Landings on single unevennesses that nobody is told of."""
+    refresh(DOCS / "ground.md", "ground", ground_table(_runs_of(files), "ground"))
+
+
+def write_uneven(*files: Path) -> None:
+    """Jumps in the trial ``uneven``."""
+    refresh(DOCS / "ground.md", "uneven", ground_table(_runs_of(files), "task"))
+
+
+def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
+    """All runs of studies, of which ``files`` are the summaries."""
+    from pyarrow import parquet
+
+    return [
+        run for file in files
+        for run in parquet.read_table(file.with_name("runs.parquet")).to_pylist()
+    ]  # fmt: skip
+
+
 def write_late(file: Path) -> None:
     """Late sensors, told and not told."""
     refresh(DOCS / "real_robots.md", "late", effects_table(read_json(file)["rows"]))
@@ -284,6 +305,7 @@ PAGES = {
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "excerpts": Page(write_excerpts),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
+    "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
     "landing": Page(
         write_landing,
         f"{STUDIES}push_polar.yaml and push_polar_12cm.yaml",
@@ -299,6 +321,7 @@ PAGES = {
     "tasks": Page(write_tasks, f"{STUDIES}tasks.yaml", "results/tasks/summary.json"),
     "tick": Page(write_tick, "aloft bench tick --tsid FOLDER --since COMMIT --json > FILE", "FILE"),
     "twin": Page(write_twin, f"{STUDIES}twin.yaml", "results/twin/summary.json"),
+    "uneven": Page(write_uneven, f"{STUDIES}uneven.yaml", "results/uneven/summary.json"),
 }
 
 

@@ -434,6 +434,34 @@ def effects_table(rows: Sequence[Row]) -> str:
     )
 
 
+UPRIGHT = 12.0
+"""A robot whose torso leans by less at the end is upright [deg]."""
+
+
+def ground_table(runs: Sequence[Row], of: str) -> str:
+    """One row for each value of the column ``of``, one column an arm: how many succeed, how many end upright."""
+    groups: dict[str, dict[str, list[Row]]] = {}
+    for run in runs:
+        groups.setdefault(run[of], {}).setdefault(
+            run["arm"].replace("default", "shipped"), []
+        ).append(run)
+    arms = list(dict.fromkeys(arm for group in groups.values() for arm in group))
+    return table(
+        ("", *(f"{arm}: {what}" for arm in arms for what in ("success", "upright"))),
+        [(name, *(cell for arm in arms for cell in _landed(group.get(arm, ()))))
+         for name, group in groups.items()],
+    )  # fmt: skip
+
+
+def _landed(runs: Sequence[Row]) -> tuple[str, str]:
+    """How many runs succeed, and how many end upright."""
+    if not runs:
+        return "-", "-"
+    tilts = [run["final_tilt_deg"] for run in runs]
+    upright = sum(tilt is not None and tilt < UPRIGHT for tilt in tilts)
+    return f"{sum(run['success'] for run in runs)} of {len(runs)}", str(upright)
+
+
 def equally_likely(first: int, second: int) -> float:
     """The probability of a split at least as uneven as ``first`` to ``second`` between two sides that
     are equally likely: McNemar's exact test, on both sides."""

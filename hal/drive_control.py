@@ -124,6 +124,10 @@ class DriveGains(Parameters):
         text="if no motor gains give these joints' gains: refuse them, or take the nearest and let "
         "the driver add what is lost at the rate of the bus",
     )
+    sit_down_speed: float = parameter(
+        0.0, unit="m/s", ge=0.0, le=0.5,
+        text="how fast a robot that stands at the end sits down before it is damped; zero: not",
+    )  # fmt: skip
     motor_model: MotorModel = parameter(
         MotorModel(), text="how the motors differ from their nominal torque constants"
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from ..blocks.signals import (
+    CommandMode,
     ContactSwitches,
     DrivePhase,
     ImuReading,
@@ -17,9 +18,7 @@ from ..blocks.signals import (
     RobotHealth,
 )
 from ..blocks.signals.robot import HEALTHY
-from ..mathematics.arrays import (
-    Indices1D,
-)
+from ..mathematics.arrays import Indices1D
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..robots.description import RobotDescription
@@ -29,6 +28,10 @@ from ..runtime.language.parameters import Parameters
 from ..runtime.language.signals import Signal
 from ..runtime.language.steps import signal_call
 from .sensors.sensor import MountedSensor, mounted_sensors
+from .sitting import SitDown, SittingPath, sitting_path, stands
+
+STOP_CYCLES = 5
+"""How many stop cycles the runtime makes."""
 
 
 @kernel
@@ -93,6 +96,10 @@ class Robot(Block, ABC):
     Errors: ``open`` raises what the link raises, with the name of the device. When the link is lost
     during a run, the driver reports it by ``request_stop`` after its time-out.
     """
+
+    _stops = 0
+    _path: SittingPath | None = None
+    _way_down: SitDown | None = None
 
     outside: ClassVar[Literal["no", "simulated", "real"]] = "real"
 
@@ -183,6 +190,8 @@ class Robot(Block, ABC):
 
     def start(self) -> None:
         """Open the robot."""
+        if self._sitting_speed > 0.0:
+            self._path = sitting_path(self.robot)  # at the end there is no time for it
         self.open()
 
     def wait(self) -> int:
@@ -190,8 +199,47 @@ class Robot(Block, ABC):
         return 0
 
     def stop_cycle(self) -> None:
-        """Put all drives into damping for one cycle."""
-        self.damp()
+        """Put all drives into damping for one cycle. A robot that stands sits down in the cycles before the
+        last, if its parameters have a ``sit_down_speed``."""
+        self._stops += 1
+        if self._stops == 1 and self._path is not None and self._can_sit_down(self._path):
+            self.waits_for_others = True  # the way takes as long as it takes, and is no hang
+            for _, values in self.command:
+                values.flags.writeable = True  # the block that wrote it has run for the last time
+            self._way_down = SitDown(
+                self.robot, self._path, self._sitting_speed, self.period, self.joints
+            )
+        way, self._way_down = self._way_down, None  # a call that fails is the last part of the way
+        if way is not None and self._stops < STOP_CYCLES and self._go_down(way):
+            self._way_down = way
+            return
+        for _ in range(1 if way is None else STOP_CYCLES):
+            self.damp()
+
+    def _go_down(self, way: SitDown) -> bool:
+        """Go a part of the way down; says whether the drives have followed."""
+        parts = STOP_CYCLES - 1
+        for tick in range((self._stops - 1) * way.ticks // parts, self._stops * way.ticks // parts):
+            self.read()
+            if self.health.state != DrivePhase.DRIVING:
+                return False
+            way.command(tick + 1, self.command)
+            self.write()
+            self.advance()
+            self.wait()
+        return True
+
+    def _can_sit_down(self, path: SittingPath) -> bool:
+        """Whether the robot is to sit down, and stands on driven legs."""
+        if len(path.pose) < 2 or self.command.mode != CommandMode.ACTIVE:
+            return False
+        self.emit()
+        driven = self.health.state == DrivePhase.DRIVING
+        return driven and stands(self.robot, self.imu, self.joints, self.contacts)
+
+    @property
+    def _sitting_speed(self) -> float:
+        return float(getattr(self.params, "sit_down_speed", 0.0))
 
     @abstractmethod
     def open(self) -> None:

@@ -20,6 +20,7 @@ from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_scratch
 from aloft.runtime.language.steps import as_record
+from aloft.runtime.language.terrain import Ground, HeightField, Terrain
 
 from .robots.limbed_robots import quadruped
 
@@ -156,7 +157,18 @@ MODEL = records(
 FRAME = frames.Frame(NORMAL(3), np.eye(3), NORMAL(6), NORMAL((6, 16)), NORMAL(6))
 POINT = records({"position": NORMAL(3), "velocity": NORMAL(3), "acceleration": NORMAL(3)})
 TREE = body_tree(find_robot("bruce"))
+TERRAIN = Terrain(
+    -0.2,
+    (Ground((0.0, 0.0, -0.1), (1.0, 1.0, 0.1), (0.2, -0.1)),),
+    (HeightField((-1.0, -1.0), (0.0, 0.0), ((0.0, 0.1, 0.05), (0.02, 0.0, 0.07))),),
+).surface
 UNUSED = {
+    "aloft.mathematics.ground_surface.height_of_slope": (
+        TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
+    ),
+    "aloft.mathematics.ground_surface.height_of_field": (
+        TERRAIN.fields[0], TERRAIN.heights, -0.3, -0.6, np.zeros(3),
+    ),
     "aloft.blocks.control.frames.move_model": (*MODEL, TREE, body_motion(10)),
     "aloft.blocks.control.frames.update_frame": (
         MODEL[0], TREE, body_motion(10), 5, np.array([0.1, -0.2, 0.3]), FRAME,

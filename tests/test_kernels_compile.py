@@ -68,7 +68,6 @@ NOT_HOT = {
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.check_slope": "checks a scene, when a graph is loaded",
-    "hal.simulated.tiles._covers": "makes a scene, when a run is loaded",
     "hal.simulated.stance._solve_positive": "before a run, by MuJoCo's linear algebra",
     "hal.simulated.stance._two_digits": "before a run, of the holding gains",
     "hal.simulated.stance._solve_normal": "before a run, by MuJoCo's linear algebra",

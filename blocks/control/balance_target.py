@@ -187,7 +187,7 @@ class BalanceTarget(Block):
         middle_point(reference.foot_position, scratch.planned_middle)
         planned = planned_heading(reference, constants)
         heading = measured_heading(reference, terms, planned, constants, scratch)
-        if not memory.started:
+        if not memory.started or reference.time < 0.0:  # the plan has not begun
             memory.standing_height = reference.com[2]
             memory.heading = heading - planned
             turn_about_vertical(scratch.planned_middle, memory.heading, scratch.vector)

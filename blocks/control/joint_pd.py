@@ -141,6 +141,8 @@ class JointPD(Block):
     stand; one that takes a step (``CaptureStep``) follows the whole-body controller instead.
     Gains, targets and torques change linearly from one set to the other within ``blend``.
 
+    During HANG all joints have the flight gains towards the planned angles.
+
     **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
     gains towards their held angle. Joints that belong to no leg and are not held, or that are
     ``released``, follow the whole-body controller while any leg stands; while all legs swing they have the flight gains
@@ -240,7 +242,8 @@ class JointPD(Block):
             acceleration = wbc.acceleration[wbc.acceleration.shape[0] - n :]
             integrate_accelerations(acceleration, joints, follower, params.leak, period)
         find_stance_targets(legs, joints, follower, params, constants, scratch)
-        find_flight_targets(legs, reference, constants, scratch)
+        hangs = phase.phase == Phase.HANG
+        find_flight_targets(legs, reference, hangs, constants, scratch)
         command.mode = CommandMode.ACTIVE
         flies = phase.phase == Phase.FLIGHT and reference.phase == Phase.FLIGHT
         for i in range(command.torque.shape[0]):
@@ -271,6 +274,7 @@ def blend_legs(
     least = 1.0 if follower.airborne.shape[0] > 0 else 0.0
     for foot in range(follower.airborne.shape[0]):
         swings = phase.phase == Phase.FLIGHT or phase.phase == Phase.LANDING
+        swings = swings or phase.phase == Phase.HANG
         for point in range(constants.foot_of_point.shape[0]):
             pushes = phase.stance[point] or phase.stepping[point]
             if constants.foot_of_point[point] == foot and pushes:
@@ -388,15 +392,17 @@ def find_stance_targets(
 def find_flight_targets(
     legs: JointTarget,
     reference: JumpReference,
+    hangs: bool,
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg."""
+    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg, or for
+    all joints of a robot that hangs."""
     position, velocity = scratch.flight_position, scratch.flight_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i]:
             position[i], velocity[i] = constants.held_angle[i], 0.0
-        elif not constants.free[i]:
+        elif not constants.free[i] and not hangs:
             position[i], velocity[i] = legs.position[i], legs.velocity[i]
         elif constants.planned:
             position[i], velocity[i] = reference.joint_position[i], reference.joint_velocity[i]

@@ -245,6 +245,16 @@ def start(
 
 
 @kernel
+def forget(estimate: BaseEstimate) -> None:
+    """Let the next tick be the first one again; what has been learnt of the sensors stays."""
+    estimate.started = False
+    estimate.position[:] = 0.0
+    estimate.velocity[:] = 0.0
+    estimate.anchored[:] = False
+    estimate.flight_ticks = 0
+
+
+@kernel
 def watch_motion(
     estimate: BaseEstimate,
     legs: LegKinematics,

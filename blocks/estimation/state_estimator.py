@@ -24,6 +24,7 @@ from .inertial_estimator import (
     InertialScratch,
     LegKinematics,
     count_standing,
+    forget,
     forget_samples,
     is_unaccelerated,
     learn_bias,
@@ -38,6 +39,7 @@ class GroundTrust(Signal):
     """How far points and ground are trusted."""
 
     gate = Field(unit="m/s", text="how fast a standing point may seem to move")
+    touched = Field(dtype="bool", text="whether a point has ever had contact")
     flown = Field(dtype="bool", text="whether all points have lost contact since the start")
     facing = Field(dtype="bool", text="whether the feet's heading has been noted")
     heading = Field(unit="rad", frame="world", text="where the feet point while they stand")
@@ -100,7 +102,7 @@ class StateEstimator(InertialEstimator):
     then on the CoM falls freely, and the base follows from the joints. That does not drift, but it
     also does not notice a push.
 
-    It starts at the first sample, with the robot standing on level ground: the world's origin is
+    It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground: the world's origin is
     midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
     the height of the ground is known only through the anchors. The block never waits and raises no
@@ -126,6 +128,9 @@ class StateEstimator(InertialEstimator):
         constants: InertialConstants,
         scratch: InertialScratch,
     ) -> None:
+        trust.touched = trust.touched or count_standing(legs.points.active) > 0
+        if estimate.started and not trust.touched:  # in a gantry every tick is the first one
+            forget(estimate)
         airborne = estimate.started and count_standing(legs.points.active) == 0
         fastest = predict(imu, joints, estimate, legs, constants, scratch)
         if airborne and trust.aligned > 0:

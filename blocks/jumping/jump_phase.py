@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class PhaseCondition(IntEnum):
     """Another flight is planned, and the plan is in its thrust."""
     LOST_CONTACT = 8
     """No point has had contact for too long."""
+    STANDS = 9
+    """All points have had contact for long enough."""
 
 
 class PhaseTransition(NamedTuple):
@@ -55,6 +57,7 @@ class PhaseTransition(NamedTuple):
 
 
 TRANSITIONS = (
+    PhaseTransition(Phase.HANG, PhaseCondition.STANDS, Phase.STAND),
     PhaseTransition(Phase.STAND, PhaseCondition.LOST_CONTACT, Phase.FAULT),
     PhaseTransition(Phase.STAND, PhaseCondition.LIFT_OFF_DUE, Phase.FLIGHT),
     PhaseTransition(Phase.STAND, PhaseCondition.PLAN_THRUSTS, Phase.THRUST),
@@ -78,12 +81,14 @@ without transitions, such as FAULT, lasts to the end of the run."""
 TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
 """The transitions as an array (n, 3), for the kernel."""
 
-NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED, AHEAD = range(7)
+NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED, AHEAD, STOOD = range(8)
 """Elements of ``times`` [s]: the plan's time; how long the phase has lasted; the planned lift-off
 and touchdown of the next flight, the one under way or the last; the predicted time to touchdown;
-how long no point has had contact; and by how much the controller works ahead of time."""
+how long no point has had contact; by how much the controller works ahead of time; and how long all
+points have had contact."""
 
 LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT, EARLY_LANDING = range(6)
+STAND_TIME = 6
 """Elements of ``limits``: the parameters of ``JumpPhase`` of these names."""
 
 LEAST_AHEAD = 0.0015
@@ -121,6 +126,7 @@ def find_conditions(
     holds[PhaseCondition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
     holds[PhaseCondition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
     holds[PhaseCondition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+    holds[PhaseCondition.STANDS] = times[STOOD] >= limits[STAND_TIME]
 
 
 @kernel
@@ -141,6 +147,7 @@ class PhaseMemory(Signal):
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or last")
     touchdown_time = Field(unit="s", text="planned touchdown of that flight")
     unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
+    stood = Field(unit="s", text="how long all points have had contact")
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
 
@@ -150,6 +157,7 @@ class JumpPhase(Block):
     ============  =====================================================================
     phase         ends
     ============  =====================================================================
+    HANG          when all points have had contact for ``stand_time``; only with ``start: standing``
     STAND, SQUAT  at the planned times
     THRUST        at the planned lift-off; up to ``late_lift_off`` later while any point
                   still has contact; in its second half at once when no point has had
@@ -183,11 +191,24 @@ class JumpPhase(Block):
     act a later than that, and until then legs that are stiff for flight turn the torso by their
     hips. The legs may be ready some milliseconds too early, which matters less.
 
+    **Start.** With ``start: clock`` the robot stands when the run begins. With ``start: standing`` it may
+    hang in a gantry: the legs are held in the planned pose until the robot has been put down and stands on
+    all its points. A ``TriggeredJumpPlan`` begins then.
+
     The block does not judge tilt, torques or sensors (``SafetyMonitor`` does), and it never goes
     back to an earlier phase except for another planned flight.
     """
 
     class Params(Parameters):
+        start: Literal["clock", "standing"] = parameter(
+            "clock", text="whether the robot stands from the first tick on, or is put down first"
+        )
+        stand_time: float = parameter(
+            0.3,
+            unit="s",
+            gt=0.0,
+            text="how long it must stand on all points before the plan begins",
+        )
         late_lift_off: float = live_parameter(
             0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
         )
@@ -226,13 +247,13 @@ class JumpPhase(Block):
         """What follows from the robot and the parameters."""
 
         transitions = Field((len(TRANSITIONS), 3), dtype="int64", text="rows of TRANSITIONS")
-        limits = Field(6, text="see LATE_LIFT_OFF")
+        limits = Field(7, text="see LATE_LIFT_OFF")
         foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
 
     class Scratch(Signal):
         """What a step computes on its way."""
 
-        times = Field(7, unit="s", text="see NOW")
+        times = Field(8, unit="s", text="see NOW")
         holds = Field(
             len(PhaseCondition), dtype="bool", text="the conditions that hold in this tick"
         )
@@ -255,11 +276,13 @@ class JumpPhase(Block):
         p = self.params
         self.constants.limits[:] = (
             p.late_lift_off, p.early_lift_off, p.touchdown_share, p.landing_time, p.lost_contact,
-            p.early_landing,
+            p.early_landing, p.stand_time,
         )  # fmt: skip
 
     def start(self) -> None:
         self.memory.touchdown = -1.0
+        if self.params.start == "standing":
+            self.memory.phase = Phase.HANG
 
     @kernel
     @staticmethod
@@ -277,6 +300,10 @@ class JumpPhase(Block):
     ) -> None:
         now, before, times = reference.time, memory.phase, scratch.times
         shortest = count_unloaded(contacts.active, period, memory.unloaded)
+        if count_unloaded_points(contacts.active) == 0:
+            memory.stood += period
+        else:
+            memory.stood = 0.0
         if before < Phase.FLIGHT:
             memory.lift_off_time = reference.lift_off_time
             memory.touchdown_time = reference.touchdown_time
@@ -295,6 +322,7 @@ class JumpPhase(Block):
         if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
             shortest = min(shortest, times[IN_PHASE])
         times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, delay.ahead
+        times[STOOD] = memory.stood
         find_conditions(times, constants.limits, reference.phase, another, scratch.holds)
         after = next_phase(constants.transitions, before, scratch.holds)
         if after != before:
@@ -324,6 +352,15 @@ def count_unloaded(active: Flags1D, period: float, unloaded: Array1D) -> float:
         unloaded[i] = 0.0 if active[i] else unloaded[i] + period
         shortest = min(shortest, unloaded[i])
     return shortest
+
+
+@kernel
+def count_unloaded_points(active: Flags1D) -> int:
+    """The number of points without contact."""
+    count = 0
+    for i in range(active.shape[0]):
+        count += 0 if active[i] else 1
+    return count
 
 
 @kernel
@@ -368,7 +405,7 @@ def choose_stance(
             any_planned = any_planned or planned[i]
             any_stance = any_stance or stance[i]
         for i in range(stance.shape[0]):
-            if phase == Phase.FLIGHT:
+            if phase == Phase.FLIGHT or phase == Phase.HANG:
                 stance[i] = False
             elif any_planned:
                 stance[i] = planned[i]

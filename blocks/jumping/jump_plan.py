@@ -22,7 +22,7 @@ from ...runtime.language.block import Block, Context, Input, Metric, Output, Sta
 from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
-from ..signals import DelayEstimate, DynamicsTerms, JumpReference
+from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from .plan_progress import (
     PlanProgress,
     ProgressConstants,
@@ -58,6 +58,7 @@ class JumpPlan(Block):
     of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
     without the features that only ``full`` has: impacts, margins and limits of the motors.
 
+    The plan begins with the run; that of a ``TriggeredJumpPlan`` when the robot has been put down.
     At the start the robot stands still for ``stand_time``; at the end it stays where the plan
     ended. Between the plan's knots the reference is read from a table of 2 ms steps
     (``planner/library/reference_table``); accelerations and torques are read ``lead`` ahead of
@@ -303,15 +304,10 @@ class JumpPlan(Block):
         constants: ProgressConstants,
         clock: Clock,
     ) -> None:
-        lead = delay.delay if constants.lead < 0.0 else constants.lead
-        early = min(delay.ahead, lead)
-        time = clock.base_period * clock.tick - progress.late + early
-        read_table(table, time, lead - early, constants.period, reference)
-        if constants.follows_motion:
-            follow_thrust(time, terms, reference, progress, params, constants)
-            follow_fall(time, terms, reference, progress, params, constants)
-        if constants.follows_turn:
-            follow_turn(time, terms, reference, rotation, progress, constants)
+        now = clock.base_period * clock.tick
+        follow_plan(
+            now, terms, delay, reference, progress, table, rotation, params, constants
+        )  # fmt: skip
 
     def metrics(self) -> Mapping[str, Metric]:
         report = self._report
@@ -360,6 +356,63 @@ class JumpPlan(Block):
         kept = library.path_of(task)
         self.files_read = (kept,) if kept is not None else ()
         return plan
+
+
+@kernel
+def follow_plan(
+    now: float,
+    terms: DynamicsTerms,
+    delay: DelayEstimate,
+    reference: JumpReference,
+    progress: PlanProgress,
+    table: TableRows,
+    rotation: FlightRotation,
+    params: ProgressParameters,
+    constants: ProgressConstants,
+) -> None:
+    """Read the plan at the time ``now`` [s] of the run, and keep it in time with the robot."""
+    lead = delay.delay if constants.lead < 0.0 else constants.lead
+    early = min(delay.ahead, lead)
+    time = now - progress.late + early
+    read_table(table, time, lead - early, constants.period, reference)
+    if constants.follows_motion:
+        follow_thrust(time, terms, reference, progress, params, constants)
+        follow_fall(time, terms, reference, progress, params, constants)
+    if constants.follows_turn:
+        follow_turn(time, terms, reference, rotation, progress, constants)
+
+
+class TriggeredJumpPlan(JumpPlan):
+    """A ``JumpPlan`` that begins when the robot stands, and not with the run.
+
+    While the ``phase`` of the tick before is HANG the reference is the beginning of the plan, and
+    ``reference.time`` is negative. Wire it with ``{from: phase.phase, delay: 1, initial: {phase: -1}}``.
+    """
+
+    phase = Input(PhaseState, text="the phase; the plan begins after HANG")
+
+    @kernel
+    @staticmethod
+    def step(  # type: ignore[override]  # it has another port
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        phase: PhaseState,
+        reference: JumpReference,
+        progress: PlanProgress,
+        table: TableRows,
+        rotation: FlightRotation,
+        params: JumpPlan.Params,
+        constants: ProgressConstants,
+        clock: Clock,
+    ) -> None:
+        now = clock.base_period * clock.tick
+        if phase.phase == Phase.HANG:
+            progress.late = now + clock.base_period
+            read_table(table, -constants.period, 0.0, constants.period, reference)
+            return
+        follow_plan(
+            now, terms, delay, reference, progress, table, rotation, params, constants
+        )  # fmt: skip
 
 
 def plan_library(params: JumpPlan.Params, robot: RobotDescription) -> PlanLibrary:

@@ -54,6 +54,10 @@ SLOWEST_DESCENT = 0.3
 """The least speed of descent [m/s] by which a change of the legs' length changes the time."""
 
 
+SEEK_TIME = 0.05
+"""A foot that seeks the ground aims as far below where it is as it moves in this time [s]."""
+
+
 def _three(value: object) -> object:
     """One number stands for all three axes."""
     return (value,) * 3 if isinstance(value, int | float) else value
@@ -105,6 +109,11 @@ class LandingParams(PredictionGains):
     retraction_time: float = live_parameter(
         0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
     )
+    seek_speed: float = live_parameter(
+        0.0, unit="m/s", ge=0.0, le=2.0,
+        text="downward speed of a foot that has not touched after the touchdown of another; 0: it stays "
+        "at the height of the lowest foot",
+    )  # fmt: skip
 
 
 class LandingMemory(PredictionMemory):
@@ -246,7 +255,7 @@ class LandingHeuristic(Block):
         period: float,
     ) -> None:
         flying, landing = phase.phase == Phase.FLIGHT, phase.phase == Phase.LANDING
-        if not memory.started:
+        if not memory.started or reference.time < 0.0:  # the plan has not begun
             find_origin(reference, terms, memory)
         remember_touchdown(reference, flying, memory)
         overdue = flying and reference.phase > Phase.FLIGHT
@@ -291,6 +300,10 @@ class LandingHeuristic(Block):
                 place[:2] = memory.goal[foot, :2] - terms.com[:2]
                 place[2] = lowest - terms.com[2]
                 speed[:] = -terms.com_velocity
+                if params.seek_speed > 0.0:
+                    below = params.seek_speed * SEEK_TIME
+                    place[2] = terms.foot_position[foot, 2] - below - terms.com[2]
+                    speed[2] -= params.seek_speed
             else:
                 place[:] = memory.planned[foot]
             convert_to_body(foot, reference.foot_yaw[foot], terms, feet, scratch)

@@ -94,6 +94,8 @@ class JumpScore(Block):
     and speeds; soles need not be flat, and neither load share nor support count. The ground under a
     contact point may be so far above or below the ``landing_height``.
 
+    A jump begins with its plan: a robot that is put down from a gantry before is not judged.
+
     The run ends 0.1 s after the rest has been judged. Not judged, but counted: solver failures,
     share of saturated motor samples, peak torque and speed. Metrics: ``success``, ``reason`` (the
     first failed criterion with its figures) and the figures themselves; of the angular momentum at
@@ -144,6 +146,8 @@ class JumpScore(Block):
     ) -> bool:
         now, first = clock.base_period * clock.tick, record.ticks == 0
         scratch.ending = Ending.NONE
+        if constants.planned and reference.time < 0.0:
+            return False
         record_robot(now, truth, wbc, record, balls, constants)
         if constants.planned:
             record_reference(now, first, reference, record, series)
@@ -176,7 +180,9 @@ class JumpScore(Block):
         """The judgement and its figures."""
         record = self.record
         if record.ticks == 0:
-            return {"success": False, "reason": "the run had no ticks"}
+            waits = self.constants.planned and self.reference.time < 0.0
+            reason = "the plan has not begun" if waits else "the run had no ticks"
+            return {"success": False, "reason": reason}
         planned = bool(self.constants.planned)
         failure = first_failure(record, self._criteria, planned)
         made = int(self.series.made) + int(record.touchdown_time != NEVER)

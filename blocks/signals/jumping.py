@@ -13,6 +13,8 @@ from ...runtime.language.signals import Field, Signal
 class Phase(IntEnum):
     """What the robot is doing, in the order of a jump."""
 
+    HANG = -1
+    """It hangs in a gantry, or is put down, and does not carry itself yet."""
     STAND = 0
     SQUAT = 1
     THRUST = 2

@@ -37,6 +37,10 @@ class BearParameters(DriveParameters):
     graph_timeout: float = parameter(
         0.025, unit="s", gt=0, le=2.0, text="after so long the watchdog's process damps the drives"
     )
+    sit_down_speed: float = parameter(
+        0.15, unit="m/s", ge=0.0, le=0.5,
+        text="how fast a robot that stands at the end sits down before it is damped; zero: not",
+    )  # fmt: skip
     latency: float = parameter(
         0.0, unit="s", ge=0, le=0.1, text="with virtual time: delay from sensing to the exchange"
     )

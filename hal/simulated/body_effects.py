@@ -47,6 +47,29 @@ class CableParameters(Parameters):
     weight: float = parameter(0.0, unit="N", ge=0.0, text="what hangs of it on the robot")
 
 
+class GantryParameters(Parameters):
+    """A gantry: the robot hangs from a rope at its base when the run begins, and is let down."""
+
+    height: float = parameter(0.04, unit="m", ge=0.0, le=1.0, text="of the soles above the ground")
+    lower_after: float | None = parameter(
+        0.5, unit="s", ge=0.0,
+        text="when it is let down, from the first command on; none: when somebody says so",
+    )  # fmt: skip
+    speed: float | None = parameter(
+        0.08, unit="m/s", gt=0.0, text="at which it is let down; none: it is dropped"
+    )
+    slack: float = parameter(
+        0.5, unit="m", ge=0.0, text="by which the rope is too long to pull once the robot stands"
+    )
+    rope: float = parameter(1.0, unit="m", gt=0.0, text="length of the rope while the robot hangs")
+    above_com: float = parameter(
+        0.15, unit="m", ge=0.0, text="where it is tied to the base: above the robot's CoM"
+    )
+    stretch: float = parameter(
+        0.005, unit="m", gt=0.0, text="by which the robot's weight makes it longer"
+    )
+
+
 class BatteryParameters(Parameters):
     """A pack; the defaults are estimates for four lithium-polymer cells of 2.2 A h."""
 

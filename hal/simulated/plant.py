@@ -42,6 +42,7 @@ from .base import BASES
 from .battery import Battery, spread_voltage
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
+from .gantry import Gantry
 from .gears import YieldingGears
 from .imu_effects import ImuModel
 from .mujoco_model import body_name, build_world, number_of_soles
@@ -302,6 +303,7 @@ class Plant:
             **ImuModel.dimensions(params.imu, params.timestep),
             **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
             "n_rotors": 0 if params.gears is None else len(robot.joints),
+            "n_gantry": 0 if params.gantry is None else 4,
             "n_battery": 0 if params.battery is None else 4,
             "n_late_switches": 0 if params.switches == SwitchEffects() else len(robot.contacts),
         }
@@ -348,6 +350,11 @@ class Plant:
         )
         self._step1, self._step2 = step_calls(model, data)
         self.forces = ExternalForces(model, data, self._robot)
+        self.gantry = None
+        if self._params.gantry is not None and base.velocities:
+            self.gantry = Gantry(
+                self._params.gantry, self._robot, model, data, physics, self._params.timestep
+            )
 
     def stand(self, step: CallSequence, hold: Callable[[Array, Array], None]) -> None:
         """Stand on the ground and settle, up to the first instant of the control clock.
@@ -368,10 +375,15 @@ class Plant:
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
         place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
+        if self.gantry is not None and params.gantry is not None:
+            base.shift(np.array([0.0, 0.0, params.gantry.height]))
+            mujoco.mj_kinematics(model, data)
+            self.gantry.begin()
         rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
         pose = self.position.copy()
         self._begin_sensing()
-        torque = holding_torque(model, data, base, robot)
+        hangs = self.gantry is not None
+        torque = holding_torque(model, data, base, robot, hangs)
         hold(self.position + self.sensors.encoder_offset, torque)
         phase = 0.0
         if params.random_start_phase:
@@ -384,8 +396,9 @@ class Plant:
         self.clear_record()
         self._settle(step, observed)
         load = self.record.load[:, 3] / -observed
-        StartCheck(model, data, base, robot).check(load, pose, torque, rotation)
-        centre_on_origin(data, base, robot)
+        StartCheck(model, data, base, robot, hangs).check(load, pose, torque, rotation)
+        if not hangs:
+            centre_on_origin(data, base, robot)
         self.data.time = 0.0
         steps = round(self._period / params.timestep)
         self.physics.step[()] = -steps
@@ -395,6 +408,8 @@ class Plant:
         for sensor in self.sensors.mounted:
             sensor.reset()
         self._settle(step, steps)
+        if self.gantry is not None:
+            self.gantry.lower(self.physics.step)
 
     def _begin_sensing(self) -> None:
         """Let encoders and IMU begin anew."""
@@ -440,11 +455,15 @@ class Plant:
             one.append(self.drives.producing(self.position, turning, requested, torque))
         if self.gears is not None:
             one.append(self.gears.turning(self.position, self.velocity, torque))
+        if self.gantry is not None:
+            one.append(self.forces.releasing())
         if push is not None and self._params.cable is not None:
             release, pull = self.forces.pulling(self._params)
             one += [release, self.forces.pushing(push), pull]
         elif push is not None:
             one.append(self.forces.pushing(push))
+        if self.gantry is not None:
+            one.append(self.gantry.pulling(step))
         one += [
             self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
             *self._seeing,

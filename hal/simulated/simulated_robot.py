@@ -21,6 +21,7 @@ from . import scenes
 from .body_effects import (
     BatteryParameters,
     CableParameters,
+    GantryParameters,
     JointEffects,
     LinkEffects,
     SoleParameters,
@@ -169,6 +170,9 @@ class SimulatorParameters(DriveGains):
         None, text="soles of rubber; none: as stiff as all else"
     )
     cable: CableParameters | None = parameter(None, text="a cable that pulls at the base")
+    gantry: GantryParameters | None = parameter(
+        None, text="a gantry in which the robot hangs at the start; none: it stands"
+    )
     floor_tilt: float = parameter(
         0.0, unit="rad", ge=0.0, le=0.2,
         text="by which the whole scene leans, in a drawn direction; the truth is told in its frame",

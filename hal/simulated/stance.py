@@ -94,14 +94,16 @@ def place_standing(
         )
 
 
-def holding_torque(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> Array:
+def holding_torque(
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, hangs: bool = False
+) -> Array:
     """The joint torques [N m] (n_joints,) that hold the robot still in its present pose, with the
-    smallest contact forces that carry its weight."""
+    smallest contact forces that carry its weight, or with none where it ``hangs`` by its base."""
     import mujoco
 
     mujoco.mj_forward(model, data)
     size = base.velocities
-    if size == 0 or not robot.contacts:
+    if size == 0 or hangs or not robot.contacts:
         return np.array(data.qfrc_bias[size:])
     below = depth_of_contacts(robot)
     jacobian = np.zeros((3 * len(robot.contacts), model.nv))
@@ -237,13 +239,16 @@ class StartCheck:
         model, data: the simulator's model and data, after settling.
         base: how the robot's base is held.
         robot: its description.
+        hangs: whether a gantry carries it, in which it may swing.
     """
 
     def __init__(
-        self, model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription
-    ) -> None:
+        self, model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription,
+        hangs: bool = False,
+    ) -> None:  # fmt: skip
         self._model, self._data, self._base, self._robot = model, data, base, robot
-        self._standing = bool(robot.contacts) and base.velocities > 0
+        self._hangs = hangs
+        self._standing = bool(robot.contacts) and base.velocities > 0 and not hangs
 
     def check(self, load: Array, wanted: Array, torque: Array, rotation: Array) -> None:
         """Raise ``StartError`` if the robot does not stand.
@@ -343,6 +348,8 @@ class StartCheck:
         speeds = self._data.qvel[self._base.velocities :]
         text = "joint {name} moves at {value:.2g} {unit}"
         found = self._joints(speeds, MOST_JOINT_SPEED, text, "rad/s", "m/s")
+        if self._hangs:
+            return found
         size = self._base.velocities
         linear = math.hypot(*self._data.qvel[: min(size, 2) if size == 3 else min(size, 3)])
         self._base.refresh()

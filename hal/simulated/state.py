@@ -42,6 +42,7 @@ class PhysicsState(Signal):
     rotor_speed = Field("n_rotors", unit="rad/s", text="of them")
     switch_closed = Field("n_late_switches", dtype="bool", text="behind debouncing and sticking")
     switch_waits = Field("n_late_switches", dtype="int64", text="steps that a change has lasted")
+    gantry = Field("n_gantry", text="rope paid out, and to be; step when; distance of its ends")
     battery = Field("n_battery", text="voltage, charge gone, voltage to recover, current")
 
 

@@ -243,6 +243,8 @@ class Twin:
         if not self.released and self.drives.enabled.all() and self.drives.goals[:, 0].any():
             self.released = True
             self.zero = self.exchanges - 1
+            if self.plant.gantry is not None:
+                self.plant.gantry.lower(self.plant.physics.step)
 
     # -- what is measured --------------------------------------------------------------------
 

@@ -38,7 +38,7 @@ from .worker import views
 from .worker_link import WorkerLink
 
 STILL_COMPUTING = "its worker was still computing when the run had ended; it has no metrics"
-END_TIME = 2.0
+END_TIME = 1.0
 """Seconds that a worker has to end a run in real time."""
 
 
@@ -115,6 +115,18 @@ class BackgroundBlock(Block):
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Those of the block."""
         return cls._block_type.infer_units(params, inputs)
+
+    @classmethod
+    def example_parameters(cls) -> Mapping[str, Any]:
+        """Those of the block."""
+        return cls._block_type.example_parameters()
+
+    @classmethod
+    def example_inputs(
+        cls, rng: np.random.Generator, dimensions: Mapping[str, int]
+    ) -> Mapping[str, Mapping[str, Any]]:
+        """Those of the block."""
+        return cls._block_type.example_inputs(rng, dimensions)
 
     def setup(self) -> None:
         """Take the initial outputs; nothing is under way."""

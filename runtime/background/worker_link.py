@@ -30,6 +30,11 @@ class WorkerError(AloftError):
     """A worker has died, or hangs."""
 
 
+def parameter_text(params: Parameters) -> str:
+    """Parameters as JSON that reads back as the same."""
+    return params.model_dump_json(round_trip=True, by_alias=True)
+
+
 class WorkerLink:
     """A worker's process, and the memory that it shares with this one.
 
@@ -70,7 +75,7 @@ class WorkerLink:
         try:
             os.set_blocking(theirs, False)
             task = WorkerTask(
-                use, params.model_dump_json(), replace(context, clock=clock), shared, theirs, slots,
+                use, parameter_text(params), replace(context, clock=clock), shared, theirs, slots,
                 inputs, results, look_every,
             )  # fmt: skip
             self._process = ChildProcess(
@@ -108,7 +113,7 @@ class WorkerLink:
 
     def change(self, params: Parameters) -> None:
         """Let the worker take over parameters, for the jobs that are asked for after this."""
-        text = params.model_dump_json().encode()
+        text = parameter_text(params).encode()
         self._send(CHANGE, len(text), text)
 
     def _send(self, kind: int, number: int = 0, text: bytes = b"") -> None:

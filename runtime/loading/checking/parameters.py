@@ -198,7 +198,7 @@ def entries(blocks: Mapping[str, Block]) -> tuple[ParameterEntry, ...]:
 
 def plain_parameters(params: Parameters) -> dict[str, Any]:
     """Parameters as plain data, as a graph file has them; reading them back gives the same."""
-    return params.model_dump(mode="json", round_trip=True)
+    return params.model_dump(mode="json", round_trip=True, by_alias=True)
 
 
 def adjust(blocks: Mapping[str, Block], settings: Overrides) -> Adjustment:

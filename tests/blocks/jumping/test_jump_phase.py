@@ -297,15 +297,15 @@ def test_a_landing_that_never_finds_the_ground_is_a_fault():
     assert phase(bench) == Phase.FAULT
 
 
-LIMITS = np.array([0.02, 0.01, 0.5, 0.35, 0.2, 1.5])
+LIMITS = np.array([0.02, 0.01, 0.5, 0.35, 0.2, 1.5, 0.3])
 
 
 def conditions(
     now=0.0, in_phase=0.0, lift_off=1.0, touchdown=1.3, remaining=0.0, unloaded=0.0,
-    planned=Phase.STAND, another=False, limits=LIMITS, ahead=0.0,
+    planned=Phase.STAND, another=False, limits=LIMITS, ahead=0.0, stood=0.0,
 ):  # fmt: skip
     holds = np.zeros(len(PhaseCondition), bool)
-    times = np.array([now, in_phase, lift_off, touchdown, remaining, unloaded, ahead])
+    times = np.array([now, in_phase, lift_off, touchdown, remaining, unloaded, ahead, stood])
     find_conditions(times, limits, int(planned), another, holds)
     return {condition for condition in PhaseCondition if holds[condition]}
 
@@ -324,6 +324,7 @@ def test_of_several_the_first_in_the_table_is_taken():
     holds = np.ones(len(PhaseCondition), bool)
     found = {phase: Phase(next_phase(TABLE, int(phase), holds)) for phase in Phase}
     assert found == {
+        Phase.HANG: Phase.STAND,
         Phase.STAND: Phase.FAULT, Phase.SQUAT: Phase.FAULT, Phase.THRUST: Phase.FAULT,
         Phase.FLIGHT: Phase.LANDING, Phase.LANDING: Phase.FAULT, Phase.RECOVER: Phase.FAULT,
         Phase.FAULT: Phase.FAULT,
@@ -331,7 +332,7 @@ def test_of_several_the_first_in_the_table_is_taken():
 
 
 def test_every_phase_but_the_first_can_be_reached():
-    assert {t.following for t in TRANSITIONS} == set(Phase) - {Phase.STAND}
+    assert {t.following for t in TRANSITIONS} == set(Phase) - {Phase.HANG}
 
 
 def test_when_the_conditions_hold():
@@ -363,3 +364,26 @@ def test_when_the_conditions_hold():
     assert C.THRUSTS_AGAIN in conditions(planned=Phase.THRUST, another=True)
     assert C.THRUSTS_AGAIN not in conditions(planned=Phase.THRUST)
     assert C.LOST_CONTACT in conditions(unloaded=0.21)
+    assert C.STANDS in conditions(stood=0.3) and C.STANDS not in conditions(stood=0.29)
+
+
+def test_a_robot_that_is_put_down_stands_once_all_its_points_have_carried_load() -> None:
+    bench = make(start="standing", stand_time=0.1)
+    bench.set("reference", time=-0.002, phase=Phase.STAND, contact=True)
+
+    def step(active: list[bool], ticks: int) -> list[int]:
+        bench.set("contacts", active=active)
+        seen = []
+        for _ in range(ticks):
+            bench.step()
+            seen.append(phase(bench))
+        return seen
+
+    assert set(step([False] * 4, 500)) == {Phase.HANG}
+    assert not bench.get("phase").stance.any()
+    assert set(step([True, True, False, True], 500)) == {Phase.HANG}
+    assert set(step([True] * 4, 40)) == {Phase.HANG}
+    assert set(step([True, False, True, True], 1)) == {Phase.HANG}
+    seen = step([True] * 4, 52)
+    assert seen[48] == Phase.HANG and seen[51] == Phase.STAND
+    assert bench.get("phase").stance.all()

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.jump_plan import JumpPlan
+from aloft.blocks.jumping.jump_plan import JumpPlan, TriggeredJumpPlan
 from aloft.blocks.signals import Phase
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.read_task import read_task
@@ -168,3 +168,30 @@ def test_the_delay_is_the_parameter_or_the_one_at_the_input() -> None:
     ahead, given, later = pushes(), pushes(lead="6 ms"), pushes(lead="0 ms")
     assert ahead == given
     np.testing.assert_allclose(ahead[:-3], later[3:], atol=1e-9)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.004])
+def test_after_the_trigger_it_is_the_plan_of_a_run_that_begins(ahead: float) -> None:
+    late = BlockBench(
+        TriggeredJumpPlan,
+        {"solve": False, "task": "tasks/in_situ_12cm.yaml"},
+        robot="bruce",
+        rate=500.0,
+    )
+    usual = BlockBench(
+        JumpPlan, {"solve": False, "task": "tasks/in_situ_12cm.yaml"}, robot="bruce", rate=500.0
+    )
+    for bench in (late, usual):
+        bench.set("delay", delay=0.005, ahead=ahead)
+    late.set("phase", phase=Phase.HANG)
+    for _ in range(300):
+        late.step()
+        assert float(late.get("reference").time) < 0.0
+    late.set("phase", phase=Phase.STAND)
+    for _ in range(800):
+        late.step()
+        usual.step()
+        mine, other = late.get("reference"), usual.get("reference")
+        assert float(mine.time) == pytest.approx(float(other.time), abs=1e-9)
+        assert mine.phase == other.phase
+        assert mine.com == pytest.approx(other.com, abs=1e-9)

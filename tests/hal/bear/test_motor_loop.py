@@ -283,7 +283,7 @@ def supervised(**values: object) -> tuple[Supervision, SimpleNamespace, SimpleNa
     """A supervision, and measurements and an exchange in which nothing is wrong."""
     measured = SimpleNamespace(
         voltage=np.full(10, 14.8), temperature=np.full(10, 25.0), position=np.zeros(10),
-        velocity=np.zeros(10), current=np.zeros(10),
+        velocity=np.zeros(10), current=np.zeros(10), sag=lambda: 0.0,
     )  # fmt: skip
     bulk = SimpleNamespace(
         ages=np.zeros(10, dtype=np.int64), error_bytes=np.full(10, 0x80, dtype=np.uint8),

@@ -24,7 +24,7 @@ N = len(ROBOT.joints)
 STEP = 0.0005
 SIZES = dict.fromkeys(
     ("n_integration", "n_random", "n_imu_filters", "n_imu_slots", "n_imu_axes", "n_encoder_slots",
-     "n_sensed_joints", "n_real_motors", "n_rotors", "n_late_switches", "n_battery"), 0,
+     "n_sensed_joints", "n_real_motors", "n_rotors", "n_late_switches", "n_battery", "n_gantry"), 0,
 )  # fmt: skip
 
 

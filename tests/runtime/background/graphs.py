@@ -6,6 +6,7 @@ from typing import Any
 from aloft.files.nodes import text_of
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load_text
+from aloft.runtime.running.executor import run
 
 PLACE = Path(__file__).parent / "graph.yaml"
 
@@ -66,3 +67,8 @@ def both(
         text = "".join(f"{key}: {text_of(value)}\n" for key, value in graph.items())
         graphs.append(load_text(text, PLACE))
     return graphs[0], graphs[1]
+
+
+def run_hash_of(gain: float) -> str:
+    """The hash of a run with that gain."""
+    return run(both("Slow", 6, params={"gain": gain})[0]).run_hash

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.running.stepping import SteppedRun
 from aloft.runtime.testing.allocations import count_array_allocations
 from aloft.runtime.testing.spread import run_spread
+from aloft.studies.batch.jobs import job_results
 
 from ..links.example_graphs import endpoints
-from .graphs import PLACE, both
+from .graphs import PLACE, both, run_hash_of
 
 COMMON = ("wave.y.value", "sum.y.value", "motor.y.value")
 
@@ -272,3 +274,12 @@ blocks:
         episodes.append(steps)
     environment.close()
     assert episodes[0] == episodes[1] and episodes[0][-1] != episodes[0][0] == [0.0]
+
+
+@pytest.mark.long
+def test_processes_of_a_study_give_the_same_bytes() -> None:
+    expected = [run_hash_of(share) for share in (1, 2, 3)]
+    with closing(job_results(run_hash_of, [1, 2, 3], workers=2)) as results:
+        found = {result.index: result.value or result.error for result in results}
+    assert [found[k] for k in range(3)] == expected
+    assert len(set(expected)) == 3

@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.runtime.language.stages import LinkPolicy, MachineSpec
+from aloft.runtime.language.stages import LinkPolicy, LinkSettings, MachineSpec
 from aloft.runtime.links.observer import ROW_HEADER, Observer, StatusPublisher, read_row
 from aloft.runtime.links.part import BoundPart, run_part
-from aloft.runtime.placement.placed import PlacedGraph, place
+from aloft.runtime.placement.placed import PlacedGraph, place, spread
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.transports.keys import make_keys, secured
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port
+from ..background.graphs import both
 from .test_free_running import free, wait_for
 
 
@@ -97,6 +98,23 @@ def test_statuses_and_signals_of_all_parts(stack: ExitStack) -> None:
     for tick, row in rows[:4]:
         np.testing.assert_array_equal(np.frombuffer(row, np.uint8), log.rows()[tick])
     assert wait_for(lambda: observer.state_of("far") == "silent")
+
+
+@pytest.mark.long
+def test_late_results_of_a_background_block_are_shown(stack: ExitStack) -> None:
+    background, _ = both(
+        "Slow", 40, params={"sleep_at": 10}, ticks=60_000, background={"late": "hold"},
+        clock={"kind": "paced"},
+    )  # fmt: skip
+    machines = {name: f"tcp/127.0.0.1:{free_port()}" for name in ("control", "thinking")}
+    graph = spread(background, machines, {"block": "thinking"})
+    placed = place(replace(graph, links=LinkSettings("free", LinkPolicy(60.0, "hold"))))
+    observer = stack.enter_context(Observer(placed))
+    running = Running(placed)
+    stack.callback(running.end)
+    assert observer.wait_for(tuple(machines), 60.0) == ()
+    assert wait_for(lambda: observer.statuses["thinking"]["late_results"] > 10)
+    assert observer.statuses["control"]["late_results"] == 0
 
 
 def test_over_tls_an_observer_sees_and_a_stranger_does_not(

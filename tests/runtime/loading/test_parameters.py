@@ -3,8 +3,9 @@
 import pytest
 
 from aloft.files.problems import LoadError
+from aloft.runtime.language.registry import find_block
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading.checking.parameters import adjust, entries
+from aloft.runtime.loading.checking.parameters import adjust, entries, plain_parameters
 from aloft.runtime.loading.load import load_text
 from aloft.runtime.running.memory import BoundGraph
 
@@ -65,3 +66,9 @@ def test_what_is_not_live_is_refused_with_the_way_out(graph: BoundGraph) -> None
 
 def test_a_size_cannot_change(graph: BoundGraph) -> None:
     assert "would change the size of source.y.value" in report(graph, "source.value=[1.0]")
+
+
+def test_plain_parameters_read_back_as_the_same() -> None:
+    kind = find_block("blocks.StateMachine")  # keys of its transitions are words of Python
+    params = kind.Params.model_validate(kind.example_parameters())
+    assert kind.Params.model_validate(plain_parameters(params)) == params

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from aloft.runtime.drawing.diagram import diagram
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load_text
 from aloft.runtime.loading.picture import mermaid, table, table_json
@@ -114,3 +115,15 @@ def test_mermaid_draws_a_box_around_a_subgraph(tmp_path: Path) -> None:
         '  b0 -->|"y to u<br/>Vector"| b1\n'
         '  b1 -->|"y to u<br/>Vector"| b2\n'
     )
+
+
+def test_a_block_in_the_background_says_its_latency(tmp_path: Path) -> None:
+    text = GRAPH.replace("rate: 50 Hz}", "rate: 50 Hz, background: {latency: 60 ms}}")
+    (tmp_path / "picture_parts.py").write_text(PARTS)
+    checked = load_text(text, tmp_path / "graph.yaml")
+    rows = {row.path: row for row in table(checked)}
+    assert (rows["slow"].background, rows["slow"].machine) == ("60 ms", "Moore")
+    assert {row.background for path, row in rows.items() if path != "slow"} == {""}
+    line = '  b2(["slow<br/>blocks.Gain<br/>50 Hz<br/>in the background, 60 ms"])\n'
+    assert line in mermaid(checked)
+    assert diagram(checked).nodes["slow"].use == "blocks.Gain, 60 ms behind"
