@@ -17,6 +17,8 @@ from .motor_identification import (
 from .robot_description import RobotDescription
 from .sensor_identification import IdentifiedSensors, identify_sensors
 
+COMPENSATED = 0.8
+"""The share of the friction that is compensated: with more a joint may creep."""
 USUAL_DELAY = 0.002
 """From sensing to torque where a run does not tell it [s]."""
 BALANCE = 0.003
@@ -133,6 +135,10 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
         return f"{1e3 * bounded(value, 0.0, 0.02):.3f} ms  # +- {1e3 * value.std:.3f} ms"
 
     ages = (found.gyro_age, found.accelerometer_age, found.velocity_age)
+
+    def share(value: Value) -> str:
+        return f"{bounded(value, 0.0, 0.5):.4f}  # +- {value.std:.4f}"
+
     delay = USUAL_DELAY if found.delay is None else found.delay.value
     oldest = max(0.0, *(each.value for each in ages))
     lines = [
@@ -149,14 +155,13 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
         *_rows(found.play, {name: bounded(v, 0.0) for name, v in found.play.items()}),
         "  robot.motor_model.torque_constant:",
         *_rows(found.torque_constant),
-        f"  robot.motor_model.saturation: {bounded(found.saturation, 0.0, 0.5):.4f}  # +- {found.saturation.std:.4f}",
-        f"  robot.motor_model.load_friction: {bounded(found.load_friction, 0.0, 0.5):.4f}"
-        f"  # +- {found.load_friction.std:.4f}",
-        "  joint_pd.friction:  # beyond the description's [N m]",
+        f"  robot.motor_model.saturation: {share(found.saturation)}",
+        f"  robot.motor_model.load_friction: {share(found.load_friction)}",
+        "  joint_pd.friction:  # 80 % of what is beyond the description's [N m]",
         *_rows(
             found.friction,
             {
-                joint.name: max(0.0, found.friction[joint.name].value - float(known))
+                joint.name: COMPENSATED * max(0.0, found.friction[joint.name].value - float(known))
                 for joint, known in zip(robot.joints, robot.motors.friction, strict=True)
             },
         ),

@@ -123,9 +123,7 @@ def identify_motors(
     places = np.cumsum([_LINK * links, 1, n, n, n, n])
     constants = slice(int(places[-2]), int(places[-1]))
     with_mean = np.concatenate([rows[..., : constants.start], rows[..., constants] @ differences, rows[..., constants.stop :]], axis=2)  # fmt: skip
-    solution, covariance, _ = fit(
-        with_mean, right, prior, EVERY * motion.period, CORRELATED
-    )
+    solution, covariance, _ = fit(with_mean, right, prior, EVERY * motion.period, CORRELATED)
     left = np.sqrt(((right - with_mean @ solution) ** 2).mean(axis=0))
     back = np.zeros((rows.shape[2], len(solution)))
     back[: constants.start, : constants.start] = np.eye(constants.start)
@@ -272,7 +270,9 @@ def _motion(
     speeds = shifted(speeds, sensors.velocity_age.value / period)
     rotation = np.array([each.value for each in sensors.imu_rotation])
     place = np.array([each.value for each in sensors.imu_position])
-    turning = shifted(smooth(motion.angular_velocity[span], period), sensors.gyro_age.value / period)
+    turning = shifted(
+        smooth(motion.angular_velocity[span], period), sensors.gyro_age.value / period
+    )
     turning = turning - turning.mean(axis=0)
     turning = turning - np.cross(turning, rotation)
     # A mean over the tick before is half a tick older than a sample.

@@ -116,10 +116,15 @@ def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> Identified
     period = motion.period
     moves = base_motion(robot, position, motion.velocity[span])
     base = smooth(moves, period)
-    gyro, force = smooth(motion.angular_velocity[span], period), smooth(motion.specific_force[span], period)
+    gyro, force = (
+        smooth(motion.angular_velocity[span], period),
+        smooth(motion.specific_force[span], period),
+    )
     turn, gyro_late, gyro_left = _gyroscope(base[:, 3:6], gyro, period)
     angle = np.array([each.value for each in turn])
-    place, force_late, force_left = _accelerometer(base, gyro, force, angle, gyro_late.value, period)
+    place, force_late, force_left = _accelerometer(
+        base, gyro, force, angle, gyro_late.value, period
+    )
     joint = velocity_age
     # The base's velocity comes from the joints' and is as old as they are; the accelerometer's mean over a tick
     # is half a tick older than a sample.
@@ -195,7 +200,9 @@ def base_motion(robot: RobotDescription, position: Array, velocity: Array) -> Ar
     return out
 
 
-def _gyroscope(base: Array, gyro: Array, period: float) -> tuple[tuple[Estimate, ...], Estimate, float]:
+def _gyroscope(
+    base: Array, gyro: Array, period: float
+) -> tuple[tuple[Estimate, ...], Estimate, float]:
     """Angle and age of the gyroscope beside the joints' velocities."""
     inner = _inner(len(base), period)
     angle, late = np.zeros(3), 0.0

@@ -99,11 +99,17 @@ def _measured(
         signals = {key: run[name] for key, name in names.items()}
         return signals, 1.0 / run.header.base_rate, run.header.robot
     except KeyError as error:
-        raise AloftError(f"{source}: {error.args[0]}; --robot and --command name the blocks") from error
+        raise AloftError(
+            f"{source}: {error.args[0]}; --robot and --command name the blocks"
+        ) from error
 
 
 def _found(
-    signals: dict[str, Any], period: float, robot: RobotDescription, mass: float | None, source: Path
+    signals: dict[str, Any],
+    period: float,
+    robot: RobotDescription,
+    mass: float | None,
+    source: Path,
 ) -> Calibration:
     import numpy as np
 
@@ -111,14 +117,12 @@ def _found(
     from ...robots.identification import IdentificationError, MeasuredRun
 
     motion = MeasuredRun(
-        period, *(signals[key] for key in ("position", "velocity", "torque", "rate", "force")),
-        np.zeros((len(signals["position"]), 3)), signals["closed"],
+        period, signals["position"], signals["velocity"], signals["torque"], signals["rate"],
+        signals["force"], np.zeros((len(signals["position"]), 3)), signals["closed"],
     )  # fmt: skip
     feedback = (signals["stiffness"] != 0.0).any(axis=1) | (signals["damping"] != 0.0).any(axis=1)
     try:
-        return calibrate_robot(
-            robot, motion, signals["voltage"], signals["asked"], feedback, mass
-        )
+        return calibrate_robot(robot, motion, signals["voltage"], signals["asked"], feedback, mass)
     except IdentificationError as error:
         raise AloftError(f"{source}: {error}") from error
 
