@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .shared.bring_up import bring_up
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
 from .shared.robot_bench import add_bench_verbs
@@ -33,6 +34,7 @@ robot = typer.Typer(
 
 add_bench_verbs(robot)
 robot.command("calibrate")(calibrate)
+robot.command("bring-up")(bring_up)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]

@@ -359,8 +359,12 @@ class RobotDescription(Part):
     @cached_property
     def rotor_matrix(self) -> Array:
         """The rotors' inertia as seen by the joints [kg m^2], (n_joints, n_joints)."""
+        return self.rotor_matrix_of(1.0)
+
+    def rotor_matrix_of(self, factor: Array | float) -> Array:
+        """The same with a factor on the inertia of each rotor, (n_motors,)."""
         matrix = self.joint_to_motor
-        return product(matrix.T * self.motors.rotor_inertia, matrix)
+        return product(matrix.T * (self.motors.rotor_inertia * factor), matrix)
 
     @cached_property
     def joint_to_motor(self) -> NDArray[np.float64]:

@@ -35,8 +35,11 @@ ROUNDS = 2
 """The fit is repeated with what was found, so that what was neglected is small."""
 TURNING, CROSSING = 0.1, 0.005
 """A rotor is at three quarters of its play at this torque [N m], and crosses it in this time [s]."""
-CORRELATED = 1.0 / (2.0 * CUTOFF)
-"""Filtered errors are independent after this time [s]."""
+CORRELATED = 3.0 / (2.0 * CUTOFF)
+"""Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
+cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
+LEAST_AGE, LEAST_PLAY = 3e-4, 1.5e-3
+"""No age [s] and no play [rad] is claimed to be known better."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> Identified
 
 
 def _sum(first: Estimate, second: Estimate, more: float = 0.0) -> Estimate:
-    return Estimate(first.value + second.value + more, math.hypot(first.std, second.std))
+    return Estimate(first.value + second.value + more, math.hypot(first.std, second.std, LEAST_AGE))
 
 
 def play_positions(torque: Array, period: float) -> Array:
@@ -172,10 +175,12 @@ def _encoders(
     found, covariance, left = fit(rows, right[inner], prior, period)
     std = np.sqrt(np.diag(covariance))
     play = {
-        joint.name: Estimate(max(0.0, float(found[1 + 3 * k])), float(std[1 + 3 * k]))
+        joint.name: Estimate(
+            max(0.0, float(found[1 + 3 * k])), math.hypot(std[1 + 3 * k], LEAST_PLAY)
+        )
         for k, joint in enumerate(robot.joints)
     }
-    return play, Estimate(float(found[0]), float(std[0])), left
+    return play, Estimate(float(found[0]), math.hypot(std[0], LEAST_AGE)), left
 
 
 def base_motion(robot: RobotDescription, position: Array, velocity: Array) -> Array:

@@ -31,12 +31,22 @@ from ...mathematics.rotations import normalise, rotate_back, to_matrix
 from ...robots.kinematics import ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
-from ...runtime.language.parameters import Parameters
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, DynamicsTerms, JointState, JointTorque, MassEstimate
 
 LEAST_SCALE, LEAST_OFFSET = 1e-4, 2e-5
 """The steps in which the model's mass (as a share) and its torso's CoM [m] change."""
+
+
+class DynamicsParameters(Parameters):
+    """The parameters of ``Dynamics``."""
+
+    rotor_inertia: PerJoint = parameter(
+        PerJoint(1.0), ge=0.0,
+        text="factor on the rotor inertia of each motor, by the name of its joint",
+    )  # fmt: skip
 
 
 class DynamicsConstants(Signal):
@@ -92,9 +102,11 @@ class Dynamics(Block):
     of the feet, loaded or not.
     """
 
+    Params = DynamicsParameters
     Constants = DynamicsConstants
     Scratch = DynamicsScratch
     needs = ("floating base",)
+    params: DynamicsParameters
     constants: DynamicsConstants
 
     base = Input(BaseState, text="pose and velocity of the base")
@@ -115,7 +127,7 @@ class Dynamics(Block):
             constants.point[k] = contact.position
         for ball in ball_feet(robot):
             constants.radius[ball.point], constants.centre[ball.point] = ball.radius, ball.centre
-        constants.rotors[:] = robot.rotor_matrix
+        constants.rotors[:] = robot.rotor_matrix_of(self.params.rotor_inertia.resolve(robot))
         constants.mass, constants.torso_com[:] = robot.total_mass, self.tree.com[0]
 
     @kernel

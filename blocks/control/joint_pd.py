@@ -75,7 +75,11 @@ class JointPDParams(Parameters):
         0.0, ge=0.0, le=20.0, text="gain of the soft stops, as a multiple of the flight gains"
     )
     friction: PerJoint = live_parameter(
-        PerJoint(0.0), unit="N m", ge=0.0, text="further joint friction to compensate"
+        PerJoint(0.0), unit="N m",
+        text="joint friction to compensate beyond the description's; negative: less",
+    )  # fmt: skip
+    damping: PerJoint = live_parameter(
+        PerJoint(0.0), unit="N m s/rad", text="joint damping to compensate, likewise"
     )
     friction_share: float = live_parameter(
         0.0, ge=0.0, le=1.0, text="share of the motors' friction and damping to compensate"
@@ -156,7 +160,7 @@ class JointPD(Block):
     planned feet relative to the centre of mass.
 
     **Friction.** The torque that compensates ``friction_share`` of the friction and damping of the
-    robot's motors, and all of ``friction``, is added in the direction in which each joint moves.
+    robot's motors, and all of ``friction`` and ``damping``, is added in the direction in which each joint moves.
 
     **Soft stops.** A joint nearer than ``stop_margin`` to its limit, on the ground or in the air, is
     pushed back: by ``stop_gain`` times its flight stiffness towards that margin, and by a damping
@@ -217,7 +221,7 @@ class JointPD(Block):
         constants.stance_stiffness[:] = np.where(held, stiffness, p.stance_stiffness.resolve(robot))
         constants.stance_damping[:] = np.where(held, damping, p.stance_damping.resolve(robot))
         constants.friction[:] = p.friction.resolve(robot) + p.friction_share * motors.friction
-        constants.viscous_friction[:] = p.friction_share * motors.damping
+        constants.viscous_friction[:] = p.damping.resolve(robot) + p.friction_share * motors.damping
         constants.compensates = bool(constants.friction.any() or constants.viscous_friction.any())
         constants.blend_rate = self.period / p.blend if p.blend > self.period else 1.0
 

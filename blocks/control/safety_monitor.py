@@ -122,6 +122,7 @@ class SafetyState(Signal):
     invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
     stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
     motor_torque = Field("n_joints", unit="N m", text="measured torques of the motors")
+    heat = Field("n_joints", unit="J", text="the windings' heat so far")
     fault_place = Field(dtype="int64", text="index of the motor or switch that was at fault")
     fault_value = Field(text="what it measured, in the unit of its signal")
 
@@ -137,6 +138,7 @@ class SafetyConstants(Signal):
     lowest_voltage = Field(unit="V", text="zero: not judged")
     torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of the motors")
     largest_current = Field(unit="A", text="infinite: not judged")
+    heating = Field(text="heat of a winding in a tick for its squared torque [J/(N m)^2]")
     tilt_ticks = Field(dtype="int64", text="how many ticks the base may lean too far")
     joint_ticks = Field(dtype="int64", text="how many a joint may be beyond its limits")
     health_ticks = Field(dtype="int64", text="how many a drive may be beyond a limit")
@@ -207,6 +209,7 @@ class SafetyMonitor(Block):
         constants.damping[:] = peak / _DAMPED_SPEED if given[2] is None else given[2].resolve(robot)
         constants.lowest_voltage = p.lowest_voltage or 0.0
         constants.torque_to_motor[:] = robot.torque_to_motor
+        constants.heating = p.winding_resistance / p.torque_constant**2 * period
         constants.largest_current = p.largest_current or np.inf
         constants.tilt_ticks = round(p.tilt_hold / period)
         constants.joint_ticks = round(p.joint_hold / period)
@@ -230,6 +233,7 @@ class SafetyMonitor(Block):
         clock: Clock,
     ) -> bool:
         fault = judge_motion(desired, base, joints, wbc, state, params, constants)
+        heat_windings(joints, state, constants)
         place, value = 0, 0.0
         if health.state > DrivePhase.OFF and health.state < DrivePhase.DAMPED:
             found, drive = judge_health(health, joints, state, params, constants)
@@ -258,6 +262,10 @@ class SafetyMonitor(Block):
     def metrics(self) -> Mapping[str, Metric]:
         fault = SafetyFault(int(self.state.fault))
         result: dict[str, Metric] = {"safety_fault": fault.name.lower()}
+        hottest = int(np.argmax(self.state.heat))
+        if self.state.heat[hottest] > 0.0:
+            result["most_heated_winding"] = self.robot.transmission.motors[hottest]
+            result["winding_heat_j"] = float(self.state.heat[hottest])
         if fault != SafetyFault.NONE:
             period = self.context.clock.base_period
             result["safety_fault_time_s"] = int(self.state.fault_tick) * period
@@ -407,6 +415,15 @@ def judge_health(
 
 
 @kernel
+def heat_windings(joints: JointState, state: SafetyState, constants: SafetyConstants) -> None:
+    """Add the copper heat of this tick to every winding's."""
+    multiply_vector(constants.torque_to_motor, joints.torque, state.motor_torque)
+    for k in range(state.heat.shape[0]):
+        torque = state.motor_torque[k]
+        state.heat[k] += constants.heating * torque * torque
+
+
+@kernel
 def sag_under_load(
     health: RobotHealth,
     joints: JointState,
@@ -417,7 +434,6 @@ def sag_under_load(
     """By how much [V] the pack's voltage is below that without load, from the work of the motors and
     the heat of their windings."""
     count = health.voltage.shape[0]
-    multiply_vector(constants.torque_to_motor, joints.torque, state.motor_torque)
     power, total = 0.0, 0.0
     for k in range(count):
         current = state.motor_torque[k] / params.torque_constant

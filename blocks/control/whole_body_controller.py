@@ -30,6 +30,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.steps import PythonCall, signal_call
 from ..signals import (
@@ -143,6 +144,10 @@ class WholeBodyController(KernelBlock):
         torque_margin: float = live_parameter(
             0.97, gt=0.0, le=1.0, text="share of the limits that is used"
         )
+        peak_torque: PerJoint = live_parameter(
+            PerJoint(1.0), gt=0.0,
+            text="factor on the peak torque of each motor, by the name of its joint",
+        )  # fmt: skip
         friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction cones")
         force_min: float = live_parameter(
             0.0, unit="N", ge=0.0, text="least normal force of a point"
@@ -320,7 +325,7 @@ class WholeBodyController(KernelBlock):
         weights.acceleration[0], weights.force[0] = p.acceleration_weight, p.force_weight
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
-        peak = self.robot.motors.peak_torque
+        peak = p.peak_torque.resolve(self.robot) * self.robot.motors.peak_torque
         np.multiply(p.torque_margin, peak, out=self._motors.peak)
         changed = {kind: self._task_params(kind) for kind in PHASE_KINDS}
         for kind, params in changed.items():

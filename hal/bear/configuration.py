@@ -148,6 +148,10 @@ class DriveSettings(Parameters):
     highest_temperature: float = parameter(
         75.0, gt=0, le=125.0, text="of a winding [deg C]; beyond it all drives are damped"
     )
+    jump_heating: float = parameter(
+        5.0, ge=0, le=100.0,
+        text="what a jump heats a winding [deg C]: too hot for one more, nothing is enabled",
+    )  # fmt: skip
 
 
 class MotorSettings(Parameters):

@@ -159,8 +159,11 @@ def check_ready(loop: MotorLoop, standing: Array, names: tuple[str, ...]) -> Non
                 f"{name} has {voltage:.1f} V instead of {drives.lowest_voltage:g} to "
                 f"{drives.highest_voltage:g} V"
             )
-        if measured.temperature.item(k) > drives.highest_temperature:
-            wrong.append(f"{name} has {measured.temperature.item(k):.0f} deg C")
+        if measured.temperature.item(k) > drives.highest_temperature - drives.jump_heating:
+            wrong.append(
+                f"{name} has {measured.temperature.item(k):.0f} deg C: with {drives.jump_heating:g} "
+                f"of a jump more than {drives.highest_temperature:g}"
+            )
         if not abs(angle - standing.item(k)) <= farthest:
             wrong.append(
                 f"{name} is at {angle:.2f} rad and stands at {standing.item(k):.2f}: more than "

@@ -96,3 +96,19 @@ def test_wrong_files(tmp_path: Path) -> None:
 def test_the_schema_is_one() -> None:
     schema = json.loads(run_here("robot", "schema").stdout)
     assert set(schema["required"]) == {"robot", "bus", "board", "motors"}
+
+
+def test_bring_up_on_the_twin(tmp_path: Path) -> None:
+    path = tmp_path / "bench.yaml"
+    path.write_text(yaml.safe_dump(Hardware.for_twin(ROBOT).model_dump(mode="json")))
+    text = run_here("robot", "bring-up", str(path), code=2)
+    assert "give --yes" in text.stdout + text.stderr
+    found = json.loads(run_here("robot", "bring-up", str(path), "--yes", "--json").stdout)
+    assert found["success"] and found["steps"][-1]["step"] == "switches"
+    again = json.loads(run_here("robot", "bring-up", str(path), "--yes", "--json").stdout)
+    assert again["steps"] == []
+
+
+def test_bring_up_asks_nobody_on_a_twin_only(file: tuple[str, TwinServer]) -> None:
+    done = run_here("robot", "bring-up", file[0], "--yes", code=2)
+    assert "whose two ports are `twin`" in done.stdout + done.stderr

@@ -290,6 +290,20 @@ def test_sensors_that_are_not_to_be_trusted(bad, ticks, reason, text):
     assert bench.clock.stop_reason == text
 
 
+def test_it_says_what_a_run_heats():
+    bench = make(winding_resistance=0.2, torque_constant=0.35)
+    torque = np.zeros(10)
+    torque[KNEE] = 3.5
+    bench.set("joints", torque=torque)
+    bench.step(500)
+    motors = ROBOT.torque_to_motor @ torque
+    metrics = bench.block.metrics()
+    hottest = int(np.argmax(np.abs(motors)))
+    assert metrics["most_heated_winding"] == ROBOT.transmission.motors[hottest]
+    expected = 0.2 * np.abs(motors).max() ** 2 / 0.35**2 * 500 * bench.block.period
+    assert metrics["winding_heat_j"] == pytest.approx(expected)
+
+
 PACK = {
     "lowest_voltage": 13.2, "brown_out_voltage": 10.0, "pack_resistance": 0.05,
     "winding_resistance": 0.2, "torque_constant": 0.35,

@@ -92,6 +92,10 @@ def hot(twin: Twin) -> None:
     twin.actuators[8].status["winding_temperature"] = 76.0
 
 
+def too_hot_for_a_jump(twin: Twin) -> None:
+    twin.actuators[8].status["winding_temperature"] = 71.0
+
+
 def emergency_stop(twin: Twin) -> None:
     twin.actuators[8].stopped = True
     twin.advance()
@@ -110,6 +114,7 @@ def stays_off(twin: Twin) -> None:
     [
         (low_voltage, r"the drives are not enabled: left_knee_motor has 12\.0 V instead of 13 to"),
         (hot, "the drives are not enabled: left_knee_motor has 76 deg C"),
+        (too_hot_for_a_jump, "left_knee_motor has 71 deg C: with 5 of a jump more than 75"),
         (emergency_stop, r"drive left_knee_motor \(address 9\): "),
         (stays_off, "drives cannot be enabled: left_knee_motor: it does not say why"),
     ],
@@ -227,7 +232,8 @@ def ready(**changes: object) -> SimpleNamespace:
     drives, farthest = settings.drives, settings.soft_start.farthest
     voltage = np.tile([drives.lowest_voltage, drives.highest_voltage], 5)
     measured = SimpleNamespace(
-        voltage=voltage, temperature=np.full(10, drives.highest_temperature),
+        voltage=voltage,
+        temperature=np.full(10, drives.highest_temperature - drives.jump_heating),
         position=np.tile([farthest, -farthest], 5),
     )  # fmt: skip
     return SimpleNamespace(hardware=settings, measured=measured)

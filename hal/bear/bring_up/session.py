@@ -1,0 +1,176 @@
+"""What the steps of a bring-up share: the devices, the person who helps, findings and the journal."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import yaml
+
+from ....mathematics.arrays import Array
+from ....robots.robot_description import RobotDescription
+from ..bus import BearBus
+from ..configuration import Hardware
+from ..sense_board import SenseBoard
+
+PACKET_TIME = 0.001
+"""From a packet of the sensor board to the next [s]."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a person is to do, until it is done.
+
+    Attributes:
+        act: ``measure``, ``move`` a joint, ``stops`` of a joint, take a ``pose``, ``place`` or
+            ``turn`` the robot, ``press`` a switch.
+        target: of what: a length, a joint, a side, an axis, a contact point.
+        text: the instruction in words.
+    """
+
+    act: Literal["measure", "move", "stops", "pose", "place", "turn", "press"]
+    target: str
+    text: str
+
+
+class Operator(Protocol):
+    """The person beside the robot, or a test in its place."""
+
+    def do(self, request: Request, observe: Callable[[], None]) -> None:
+        """Do it, and call ``observe`` all the while, the last time when it is done."""
+
+    def measure(self, request: Request) -> float:
+        """Measure something with a rule or a scale; the number in the unit of the text."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that is not as it should be.
+
+    Attributes:
+        place: the key of the hardware's file, or the part.
+        expected, found, fix: what should be, what is, and what to do.
+        mended: whether the step wrote the right value into the file.
+    """
+
+    place: str
+    expected: str
+    found: str
+    fix: str
+    mended: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.place}: expected {self.expected}, found {self.found}; {self.fix}"
+
+
+@dataclass
+class Outcome:
+    """What a step found out."""
+
+    values: dict[str, Any] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the next step may follow."""
+        return all(finding.mended for finding in self.findings)
+
+    def add(self, place: str, expected: str, found: str, fix: str, mended: bool = False) -> None:
+        """Note a finding."""
+        self.findings.append(Finding(place, expected, found, fix, mended))
+
+
+class Session:
+    """A robot on the bench: its file, its devices, and who stands beside it.
+
+    Nothing that it offers switches a drive on.
+    """
+
+    def __init__(
+        self, file: Path, robot: RobotDescription, bus: BearBus, board: SenseBoard, operator: Operator,
+    ) -> None:  # fmt: skip
+        self.file, self.robot, self.bus, self.board = file, robot, bus, board
+        self.operator = operator
+        self.hardware = Hardware.read(file, robot)
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The robot's motors, in the order of the description."""
+        return self.robot.transmission.motors
+
+    def raw_positions(self) -> Array:
+        """What every drive's encoder says now [rad], (n_motors,)."""
+        ids = [self.hardware.motors[name].id for name in self.motors]
+        return np.array([self.bus.read(k, "present_position")["present_position"] for k in ids])
+
+    def joint_positions(self) -> Array:
+        """The joints' angles by the file's signs and offsets [rad], (n_joints,)."""
+        settings = [self.hardware.motors[name] for name in self.motors]
+        sign = np.array([float(motor.sign) for motor in settings])
+        zero = np.array([motor.zero for motor in settings])
+        return np.linalg.solve(
+            self.robot.joint_to_motor, sign * self.raw_positions() - zero
+        )  # fmt: skip
+
+    def do(self, request: Request, observe: Callable[[], None] = lambda: None) -> None:
+        """Have the operator do something."""
+        self.operator.do(request, observe)
+
+    def write(
+        self, changes: dict[str, dict[str, Any]], board: dict[str, Any] | None = None
+    ) -> None:
+        """Change keys of motors and of the board in the file, and read it again.
+
+        The file as it was stays beside it, with the ending ``.before``; comments are lost.
+        """
+        text = self.file.read_text(encoding="utf-8")
+        data = yaml.safe_load(text)
+        for name, keys in changes.items():
+            data["motors"][name] |= keys
+        data["board"] |= board or {}
+        before = self.file.with_name(self.file.name + ".before")
+        if not before.exists():
+            _write(before, text)
+        _write(self.file, yaml.safe_dump(data, sort_keys=False))
+        self.hardware = Hardware.read(self.file, self.robot)
+
+
+class Journal:
+    """The record of all steps, beside the hardware's file: ``NAME.bring_up.json``."""
+
+    def __init__(self, hardware: Path) -> None:
+        self.path = hardware.with_suffix(".bring_up.json")
+        self.entries: list[dict[str, Any]] = []
+        if self.path.exists():
+            self.entries = json.loads(self.path.read_text(encoding="utf-8"))["steps"]
+
+    def add(self, step: str, outcome: Outcome) -> dict[str, Any]:
+        """Note a step's outcome, and write the file."""
+        entry = {
+            "step": step,
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "passed": outcome.passed,
+            "values": outcome.values,
+            "findings": [asdict(finding) for finding in outcome.findings],
+        }
+        self.entries.append(entry)
+        _write(self.path, json.dumps({"steps": self.entries}, indent=2) + "\n")
+        return entry
+
+    def passed(self, step: str) -> bool:
+        """Whether this step passed the last time."""
+        last = [entry for entry in self.entries if entry["step"] == step]
+        return bool(last) and bool(last[-1]["passed"])
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a whole file or nothing."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, path)

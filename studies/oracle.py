@@ -1,0 +1,130 @@
+"""What a perfect calibration would tell the controller of a simulated robot, from the simulator's own draws.
+
+It bounds what a calibration can give: the values are exact, or wrong by errors of a given size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..hal.random_streams import Purpose, stream
+from ..hal.simulated.imu_effects import draw_delays, draw_place
+from ..hal.simulated.simulated_robot import SimulatorParameters
+from ..hal.simulated.variation import draw_variation
+from ..mathematics.arrays import Array
+from ..robots.description import RobotDescription
+from ..runtime.graph import Graph
+
+CONSUMER = "controllers/late_sensors.yaml"
+"""The file that a graph includes so that its controller takes what is told."""
+
+
+class Errors(NamedTuple):
+    """Standard deviations of what is told: shares of friction and of torque constants, ages [s], the IMU's
+    place [m] and angle [rad]."""
+
+    friction: float = 0.0
+    torque_constant: float = 0.0
+    age: float = 0.0
+    position: float = 0.0
+    rotation: float = 0.0
+
+
+EXACT = Errors()
+CALIBRATED = Errors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
+"""What the calibration is meant to reach."""
+
+
+def told_values(
+    graph: Graph, errors: Errors = EXACT, block: str = "robot", seed: int = 0
+) -> dict[str, Any]:
+    """The parameters of the controller, as overrides of the graph.
+
+    Args:
+        graph: with the simulated robot and ``CONSUMER``; its seed must be set.
+        block: the simulated robot.
+        seed: draws the errors.
+    """
+    spec = next(each for each in graph.checked.blocks if each.path == block)
+    params, robot = spec.params, graph.checked.robot
+    if robot is None or not isinstance(params, SimulatorParameters):
+        raise TypeError(f"{block} is no simulated robot")
+    draw = np.random.default_rng(seed)
+    return (
+        _imu(params, errors, draw)
+        | _ages(params, errors, draw)
+        | _motors(block, params, robot, errors, draw)
+        | _joints(params, robot, errors, draw)
+    )
+
+
+def _imu(params: SimulatorParameters, errors: Errors, draw: np.random.Generator) -> dict[str, Any]:
+    place, angle = map(np.array, draw_place(params.imu, params.seed))
+    return {
+        "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
+        "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),
+    }
+
+
+def _ages(params: SimulatorParameters, errors: Errors, draw: np.random.Generator) -> dict[str, Any]:
+    """The ages of the readings [s], and the delay that the controller must bridge."""
+    imu, encoders, band = params.imu, params.encoders, params.motors.current_bandwidth
+    gyro, accelerometer = draw_delays(imu, params.seed)
+    if imu.bandwidth is not None:  # of second order, maximally flat
+        filtered = math.sqrt(0.5) / (math.pi * imu.bandwidth)
+        gyro, accelerometer = gyro + filtered, accelerometer + filtered
+    ages = np.array([
+        gyro, accelerometer, encoders.delay, encoders.delay + encoders.velocity_filter,
+    ])  # fmt: skip
+    ages = np.maximum(0.0, ages + errors.age * draw.normal(size=4))
+    names = ("rate", "force", "position", "velocity")
+    loop = 0.0 if band is None else 1.0 / (2.0 * math.pi * band)
+    return {f"timing.{name}": float(age) for name, age in zip(names, ages, strict=True)} | {
+        "delay.told": float(params.latency + loop + ages.max())
+    }
+
+
+def _motors(
+    block: str,
+    params: SimulatorParameters,
+    robot: RobotDescription,
+    errors: Errors,
+    draw: np.random.Generator,
+) -> dict[str, Any]:
+    motors, n = params.motors, len(robot.joints)
+    spread = stream(params.seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
+    constant = motors.torque_constant * (1.0 + motors.torque_constant_spread * spread)
+    constant = constant * (1.0 + errors.torque_constant * draw.normal(size=n))
+    return {
+        f"{block}.motor_model.torque_constant": _named(robot.transmission.motors, constant),
+        f"{block}.motor_model.saturation": motors.saturation,
+        f"{block}.motor_model.load_friction": motors.load_friction,
+        "wbc.peak_torque": _by_joint(robot, constant * (1.0 - motors.saturation)),
+    }
+
+
+def _joints(
+    params: SimulatorParameters, robot: RobotDescription, errors: Errors, draw: np.random.Generator
+) -> dict[str, Any]:
+    variation, n = draw_variation(params, robot), len(robot.joints)
+    factor = np.array([variation.factor(variation.friction_of_joint, k) for k in range(n)])
+    factor = params.joint_friction * factor * (1.0 + errors.friction * draw.normal(size=n))
+    rotors = [variation.factor(variation.rotor_inertia, k) for k in range(n)]
+    return {
+        "joint_pd.friction": _by_joint(robot, (factor - 1.0) * robot.motors.friction),
+        "joint_pd.damping": _by_joint(robot, (factor - 1.0) * robot.motors.damping),
+        "timing.play": params.encoders.backlash,
+        "dynamics.rotor_inertia": _by_joint(robot, rotors),
+    }
+
+
+def _by_joint(robot: RobotDescription, values: Sequence[float] | Array) -> dict[str, float]:
+    return _named([joint.name for joint in robot.joints], values)
+
+
+def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
