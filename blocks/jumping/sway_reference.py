@@ -14,6 +14,7 @@ from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.parameters import ThreeNumbers, parameter
 from .guided_motion import (
+    NEVER,
     GuidedBody,
     GuidedMotion,
     GuidedParameters,
@@ -21,7 +22,6 @@ from .guided_motion import (
     MotionRecorder,
     check_limits,
 )
-from .stand_reference import NEVER
 
 _RATIOS = (1.0, 1.29, 0.83, 1.13, 0.71, 0.91)
 """The frequencies of x, y, z, roll, pitch and yaw, as multiples of one: they never repeat together."""
