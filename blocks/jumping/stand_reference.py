@@ -22,6 +22,7 @@ from .guided_motion import (
     check_limits,
 )
 
+
 class StandReference(GuidedReference):
     """The whole body stands as its description says, and with a ``squat_depth`` squats and rises.
 
