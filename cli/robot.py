@@ -15,6 +15,7 @@ from .shared.bring_up import bring_up
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
 from .shared.robot_bench import add_bench_verbs
+from .shared.robot_calibration import calibrate
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,6 +33,7 @@ robot = typer.Typer(
 )
 
 add_bench_verbs(robot)
+robot.command("calibrate")(calibrate)
 robot.command("bring-up")(bring_up)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]

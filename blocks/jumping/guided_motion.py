@@ -44,6 +44,8 @@ _STEP = 0.002
 """Longest step of the integration [s]."""
 _RETURN_RATE = 2.0
 """The rate at which redundant joints return to their standing position [1/s]."""
+NEVER = 1e6
+"""The time [s] of a lift-off that is not planned."""
 ROWS_OF_FOOT = {FootKind.POINT: 3, FootKind.LINE: 5, FootKind.FLAT: 6}
 """The number of velocities that a foot on the ground constrains."""
 

@@ -13,6 +13,7 @@ from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.parameters import parameter
 from .guided_motion import (
+    NEVER,
     GuidedBody,
     GuidedMotion,
     GuidedParameters,
@@ -20,9 +21,6 @@ from .guided_motion import (
     MotionRecorder,
     check_limits,
 )
-
-NEVER = 1e6
-"""The time [s] of a lift-off that is not planned."""
 
 
 class StandReference(GuidedReference):

@@ -1,4 +1,4 @@
-"""The verbs of ``aloft robot`` for a robot on a bench: look, calibrate, move one motor, stop."""
+"""The verbs of ``aloft robot`` for a robot on a bench: look, find the zero pose, move one motor, stop."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _STATES = {0: "off", 1: "on", 2: "off after an error", 3: "damping"}
 
 def add_bench_verbs(robot: typer.Typer) -> None:
     """Add the verbs to the group."""
-    for verb in (scan, status, watch, calibrate, jog, estop):
+    for verb in (scan, status, watch, zero, jog, estop):
         robot.command(verb.__name__)(verb)
     robot.command("schema")(schema)
 
@@ -110,7 +110,7 @@ def watch(
         assert np.isfinite(measured.joint_position).all()
 
 
-def calibrate(
+def zero(
     file: HardwareFile,
     standing: Annotated[
         bool,

@@ -43,7 +43,7 @@ def test_status_and_watch(file: tuple[str, TwinServer]) -> None:
 
 
 def test_calibrate_prints_what_the_file_needs(file: tuple[str, TwinServer]) -> None:
-    text = run_here("robot", "calibrate", file[0], "--standing").stdout
+    text = run_here("robot", "zero", file[0], "--standing").stdout
     motors = yaml.safe_load(text)["motors"]
     assert list(motors) == list(ROBOT.transmission.motors)
     assert all(abs(motor["offset"]) < 0.05 for motor in motors.values())

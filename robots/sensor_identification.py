@@ -1,0 +1,322 @@
+"""What a robot that sways over standing feet tells of its IMU and its encoders.
+
+The feet stand still, so the joints' velocities say how the base moves, and the IMU's readings follow::
+
+    w(t) = w_b + w_b x p - d w_b' + b              p: the IMU's angle, d: its age, b: its bias
+    f(t) = f_b + f_b x p + w' x r + w x (w x r) - d f_b' + s f_b + b
+
+for the velocity w_b and the specific force f_b of the base's origin; r is the IMU's place, s are errors
+of scale. An encoder on the motor, before a gear with play, differs from the joint by half of the play on the side
+of the torque, and turns once a turn by its eccentricity. Everything is linear in what is unknown, and
+all signals pass the same filter, forwards and backwards, which takes noise away and no time.
+
+The IMU's angle is found from the gyroscope. The accelerometer's vertical is the gyroscope's, integrated.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+from ..mathematics.constants import GRAVITY
+from .identification import Estimate, IdentificationError, MeasuredRun
+from .pinocchio_model import build_pinocchio_model
+from .robot_description import RobotDescription
+
+CUTOFF = 12.0
+"""Of the filter that all signals pass [Hz]."""
+EDGE = 0.3
+"""The time at both ends that the filter spoils [s]."""
+ROUNDS = 2
+"""The fit is repeated with what was found, so that what was neglected is small."""
+TURNING, CROSSING = 0.1, 0.005
+"""A rotor is at three quarters of its play at this torque [N m], and crosses it in this time [s]."""
+CORRELATED = 3.0 / (2.0 * CUTOFF)
+"""Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
+cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
+LEAST_AGE, LEAST_PLAY = 3e-4, 1.5e-3
+"""No age [s] and no play [rad] is claimed to be known better."""
+
+
+@dataclass(frozen=True)
+class IdentifiedSensors:
+    """What was found.
+
+    Attributes:
+        imu_position: from the base's origin [m, base].
+        imu_rotation: the rotation vector from the base's axes to the IMU's [rad].
+        gyro_age, accelerometer_age, velocity_age: of the readings, beside those of the joints' angles [s].
+        play: of the gear before each encoder, by joint [rad].
+        residuals: root mean squares of what is not explained, by sensor [rad/s, m/s^2].
+    """
+
+    imu_position: tuple[Estimate, ...]
+    imu_rotation: tuple[Estimate, ...]
+    gyro_age: Estimate
+    accelerometer_age: Estimate
+    velocity_age: Estimate
+    play: dict[str, Estimate]
+    residuals: dict[str, float]
+
+
+def smooth(values: Array, period: float, cutoff: float = CUTOFF) -> Array:
+    """Columns after a low-pass filter that goes forwards and backwards."""
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(3, 2.0 * cutoff * period, output="sos")
+    return np.asarray(sosfiltfilt(sections, values, axis=0))
+
+
+def slope(values: Array, period: float) -> Array:
+    """The time derivatives of columns."""
+    return np.asarray(np.gradient(values, period, axis=0))
+
+
+def shifted(values: Array, ticks: float) -> Array:
+    """Columns as they are so many ticks later, between the ticks linearly."""
+    n = np.arange(len(values), dtype=np.float64)
+    return np.array([np.interp(n + ticks, n, column) for column in values.T]).T
+
+
+def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
+    """The longest time in which every foot has a closed switch, up to bounces of some ticks."""
+    window = max(3, round(0.2 / motion.period))
+    feet = sorted({contact.foot for contact in robot.contacts})
+    loaded = np.ones(len(motion.closed), dtype=np.bool_)
+    for foot in feet:
+        own = [k for k, contact in enumerate(robot.contacts) if contact.foot == foot]
+        loaded &= motion.closed[:, own].any(axis=1)
+    share = np.convolve(loaded, np.ones(window) / window, mode="same")
+    firm = np.concatenate([[False], share > 0.3, [False]])
+    edges = np.flatnonzero(np.diff(firm.astype(np.int64)))
+    spans = edges.reshape(-1, 2)
+    if not len(spans):
+        raise IdentificationError("the robot never stands on all its feet")
+    start, end = max(spans.tolist(), key=lambda s: s[1] - s[0])
+    if (end - start) * motion.period < 3.0:
+        raise IdentificationError(
+            "the robot stands for less than 3 s on all its feet: let it sway (blocks.SwayReference)"
+        )
+    return slice(start, end)
+
+
+def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> IdentifiedSensors:
+    """Fit the IMU's place, angle and ages, the age of the joints' velocities, and the encoders' play.
+
+    Raises:
+        IdentificationError: the robot does not sway on standing feet for long enough.
+    """
+    span = standing_span(robot, motion)
+    torque = motion.torque[span]
+    play, velocity_age, encoder_left = _encoders(robot, motion, span)
+    ends = play_positions(torque, motion.period)
+    width = np.array([each.value for each in play.values()])
+    position = motion.position[span] - 0.5 * width * ends
+    period = motion.period
+    moves = base_motion(robot, position, motion.velocity[span])
+    base = smooth(moves, period)
+    gyro, force = (
+        smooth(motion.angular_velocity[span], period),
+        smooth(motion.specific_force[span], period),
+    )
+    turn, gyro_late, gyro_left = _gyroscope(base[:, 3:6], gyro, period)
+    angle = np.array([each.value for each in turn])
+    place, force_late, force_left = _accelerometer(
+        base, gyro, force, angle, gyro_late.value, period
+    )
+    joint = velocity_age
+    # The base's velocity comes from the joints' and is as old as they are; the accelerometer's mean over a tick
+    # is half a tick older than a sample.
+    return IdentifiedSensors(
+        place, turn, _sum(gyro_late, joint), _sum(force_late, joint, -0.5 * period), joint, play,
+        {"velocity": encoder_left, "gyroscope": gyro_left, "accelerometer": force_left},
+    )  # fmt: skip
+
+
+def _sum(first: Estimate, second: Estimate, more: float = 0.0) -> Estimate:
+    return Estimate(first.value + second.value + more, math.hypot(first.std, second.std, LEAST_AGE))
+
+
+def play_positions(torque: Array, period: float) -> Array:
+    """Where in its play each rotor is, from -1 to 1, by the torques."""
+    ends = np.tanh(torque / TURNING)
+    out, share = np.empty_like(ends), -math.expm1(-period / CROSSING)
+    here = ends[0]
+    for k, end in enumerate(ends):
+        here = here + share * (end - here)
+        out[k] = here
+    return out
+
+
+def _encoders(
+    robot: RobotDescription, motion: MeasuredRun, span: slice
+) -> tuple[dict[str, Estimate], Estimate, float]:
+    """The play of every joint and the age of the velocities beside the angles, and what is left [rad/s]."""
+    period, n = motion.period, len(robot.joints)
+    angle = smooth(motion.position[span], period)
+    speed = smooth(motion.velocity[span], period)
+    bend = slope(speed, period)
+    crossing = slope(smooth(play_positions(motion.torque[span], period), period), period)
+    right = slope(angle, period) - speed
+    inner = _inner(len(angle), period)
+    count = 1 + 3 * n
+    rows = np.zeros((inner.stop - inner.start, n, count))
+    for joint in range(n):
+        rows[:, joint, 0] = bend[inner, joint]
+        own = 1 + 3 * joint
+        rows[:, joint, own] = 0.5 * crossing[inner, joint]
+        rows[:, joint, own + 1] = np.cos(angle[inner, joint]) * speed[inner, joint]
+        rows[:, joint, own + 2] = np.sin(angle[inner, joint]) * speed[inner, joint]
+    prior = np.array([0.01, *np.tile([0.01, 0.004, 0.004], n)])
+    found, covariance, left = fit(rows, right[inner], prior, period)
+    std = np.sqrt(np.diag(covariance))
+    play = {
+        joint.name: Estimate(
+            max(0.0, float(found[1 + 3 * k])), math.hypot(std[1 + 3 * k], LEAST_PLAY)
+        )
+        for k, joint in enumerate(robot.joints)
+    }
+    return play, Estimate(float(found[0]), math.hypot(std[0], LEAST_AGE)), left
+
+
+def base_motion(robot: RobotDescription, position: Array, velocity: Array) -> Array:
+    """The base's velocity over standing feet, linear and angular in its own frame, and the middle of
+    the contact points in it, (n, 9)."""
+    import pinocchio as pin
+
+    built = build_pinocchio_model(robot)
+    data: Any = built.model.createData()
+    q, out = np.zeros(built.model.nq), np.zeros((len(position), 9))
+    q[6] = 1.0
+    for k, (angles, speeds) in enumerate(zip(position, velocity, strict=True)):
+        q[7:] = angles
+        pin.computeJointJacobians(built.model, data, q)
+        pin.updateFramePlacements(built.model, data)
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = np.vstack(
+            [pin.getFrameJacobian(built.model, data, f, world)[:3] for f in built.contact_frames]
+        )
+        out[k, :6] = np.linalg.lstsq(jacobian[:, :6], -jacobian[:, 6:] @ speeds, rcond=None)[0]
+        out[k, 6:] = np.mean([data.oMf[f].translation for f in built.contact_frames], axis=0)
+    return out
+
+
+def _gyroscope(
+    base: Array, gyro: Array, period: float
+) -> tuple[tuple[Estimate, ...], Estimate, float]:
+    """Angle and age of the gyroscope beside the joints' velocities."""
+    inner = _inner(len(base), period)
+    angle, late = np.zeros(3), 0.0
+    left, covariance = 0.0, np.eye(10)
+    for _ in range(ROUNDS):
+        moved = shifted(base, -late / period)
+        turned = moved + np.cross(moved, angle)
+        rows = np.zeros((len(base), 3, 10))
+        rows[:, :, :3] = -_cross(moved).transpose(0, 2, 1)
+        rows[:, :, 3] = -slope(moved, period)
+        rows[:, :, 4:7] = np.eye(3)
+        for axis in range(3):
+            rows[:, axis, 7 + axis] = moved[:, axis]
+        prior = np.array([0.03, 0.03, 0.03, 0.01, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02])
+        found, covariance, left = fit(rows[inner], (gyro - turned)[inner], prior, period)
+        angle, late = angle + found[:3], late + float(found[3])
+    std = np.sqrt(np.diag(covariance))
+    return _three(angle, std[:3]), Estimate(late, float(std[3])), left
+
+
+def _accelerometer(
+    base: Array, gyro: Array, force: Array, angle: Array, gyro_late: float, period: float
+) -> tuple[tuple[Estimate, ...], Estimate, float]:
+    """Place and age of the accelerometer beside the joints' velocities."""
+    turning = shifted(gyro, gyro_late / period)
+    turning = turning - np.cross(turning, angle)
+    turning = turning - (turning - base[:, 3:6])[_inner(len(base), period)].mean(axis=0)
+    up, tilts, drifts = _vertical(turning, period)
+    bend = slope(turning, period)
+    # The feet rock a little on the ground: the gyroscope sees it, and the joints do not.
+    moving = base[:, :3] - np.cross(turning - base[:, 3:6], base[:, 6:])
+    linear = slope(moving, period) + np.cross(turning, moving)
+    at_origin = smooth(linear + GRAVITY * up, period)
+    inner = _inner(len(base), period)
+    late, left, covariance, place = 0.0, 0.0, np.eye(15), np.zeros(3)
+    for _ in range(ROUNDS):
+        lever = _cross(bend) + np.einsum("kij,kjl->kil", _cross(turning), _cross(turning))
+        here = at_origin + lever @ place
+        felt = shifted(here + np.cross(here, angle), -late / period)
+        rows = np.zeros((len(base), 3, 15))
+        rows[:, :, :3] = lever
+        rows[:, :, 3] = -slope(felt, period)
+        rows[:, :, 4:7] = np.eye(3)
+        for axis in range(3):
+            rows[:, axis, 7 + axis] = felt[:, axis]
+        rows[:, :, 10:12] = GRAVITY * tilts
+        rows[:, :, 12:15] = GRAVITY * drifts
+        prior = np.array([0.02] * 3 + [0.01] + [0.1] * 3 + [0.02] * 3 + [0.1] * 2 + [0.005] * 3)
+        found, covariance, left = fit(rows[inner], (force - felt)[inner], prior, period)
+        place, late = place + found[:3], late + float(found[3])
+    std = np.sqrt(np.diag(covariance))
+    return _three(place, std[:3]), Estimate(late, float(std[3])), left
+
+
+def _vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
+    """The vertical in the base's frame by integration from level; how it changes with the tilt at first
+    (n, 3, 2), and with biases of the gyroscope (n, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    n = len(turning)
+    up, tilts, drifts = np.zeros((n, 3)), np.zeros((n, 3, 2)), np.zeros((n, 3, 3))
+    turned, drift = np.eye(3), np.zeros((3, 3))  # from the base's axes to the world's
+    for k in range(n):
+        up[k] = turned[2]
+        tilts[k] = (turned.T @ _cross(np.array([0.0, 0.0, 1.0])))[:, :2]
+        drifts[k] = turned.T @ _cross(np.array([0.0, 0.0, 1.0])) @ drift
+        drift = drift + turned * period
+        middle = turning[k] if k + 1 == n else 0.5 * (turning[k] + turning[k + 1])
+        turned = turned @ Rotation.from_rotvec(middle * period).as_matrix()
+    return up, tilts, drifts
+
+
+def fit(
+    rows: Array, right: Array, prior: Array, period: float, correlated: float = CORRELATED
+) -> tuple[Array, Array, float]:
+    """Least squares with a ``prior`` standard deviation of every unknown around zero.
+
+    Residuals are ``correlated`` for that time [s] and have, row by row, a size of their own.
+
+    Returns:
+        What was found, its covariance, and the root mean square of what is left.
+    """
+    weight = np.ones(right.shape[1])
+    share = min(1.0, period / correlated)
+    found = np.zeros(rows.shape[2])
+    inverse = np.diag(prior**2)
+    for _ in range(3):
+        weighted = rows / weight[:, None]
+        normal = share * np.einsum("kra,krb->ab", weighted, weighted) + np.diag(prior**-2.0)
+        inverse = np.linalg.inv(normal)
+        found = inverse @ (share * np.einsum("kra,kr->a", weighted, right / weight))
+        left = right - rows @ found
+        weight = np.maximum(np.sqrt((left**2).mean(axis=0)), 1e-9)
+    return found, inverse, float(np.sqrt((left**2).mean()))
+
+
+def _inner(count: int, period: float) -> slice:
+    edge = round(EDGE / period)
+    return slice(edge, count - edge)
+
+
+def _three(values: Array, std: Array) -> tuple[Estimate, ...]:
+    return tuple(Estimate(float(a), float(b)) for a, b in zip(values, std, strict=True))
+
+
+def _cross(vectors: Array) -> Array:
+    """The matrices of cross products with vectors (..., 3)."""
+    out = np.zeros((*vectors.shape, 3))
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = z, -y, x
+    return out

@@ -1,0 +1,104 @@
+"""Two robots are drawn, and found: every error is within its interval.
+
+Where the feet do not stand nothing is found, and the values become a fragment of a graph.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import aloft
+from aloft.hal.simulated.imu_effects import draw_delays
+from aloft.hal.simulated.variation import draw_variation
+from aloft.robots.calibration import Calibration, calibrate_robot, fragment
+from aloft.robots.description import find_robot
+from aloft.robots.identification import IdentificationError, MeasuredRun
+from aloft.robots.sensor_identification import shifted, smooth, standing_span
+
+GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
+ROBOT = find_robot("bruce")
+
+
+def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
+    graph = aloft.load(GRAPH).with_seed(seed)
+    result = graph.run()
+    assert result.success, result.reason
+    read = result.signal
+    motion = MeasuredRun(
+        result.period, read("robot.joints.position"), read("robot.joints.velocity"),
+        read("robot.joints.torque"), read("robot.imu.angular_velocity"),
+        read("robot.imu.specific_force"), np.zeros((result.ticks, 3)),
+        read("robot.contacts.closed"),
+    )  # fmt: skip
+    found = calibrate_robot(
+        ROBOT, motion, read("robot.health.voltage"), read("safety.command.torque"),
+        np.ones(result.ticks, dtype=np.bool_),
+    )  # fmt: skip
+    params = next(block.params for block in graph.checked.blocks if block.path == "robot")
+    drawn = draw_variation(params, ROBOT)
+    gyro, _ = draw_delays(params.imu, seed)
+    factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
+    return found, {
+        "place": drawn.imu.place, "angle": drawn.imu.to_axes,
+        "gyro": gyro + math.sqrt(0.5) / (math.pi * params.imu.bandwidth),
+        "friction": np.array(factors) * ROBOT.motors.friction,
+        "resistance": params.battery.resistance, "voltage": params.battery.open_voltage,
+    }  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [97001, 97002])
+def test_a_drawn_robot_is_found(seed: int) -> None:
+    found, true = found_and_true(seed)
+    for value, place in zip(found.imu_position, true["place"], strict=True):
+        assert value.value == pytest.approx(place, abs=max(0.003, 3.0 * value.std))
+    for value, angle in zip(found.imu_rotation, true["angle"], strict=True):
+        assert value.value == pytest.approx(angle, abs=max(0.006, 3.0 * value.std))
+    assert found.gyro_age.value == pytest.approx(true["gyro"], abs=1e-3)
+    assert found.open_voltage is not None and found.resistance is not None
+    assert found.open_voltage.value == pytest.approx(true["voltage"], rel=0.01)
+    assert found.resistance.value == pytest.approx(true["resistance"], rel=0.1)
+    for (name, value), friction in zip(found.friction.items(), true["friction"], strict=True):
+        assert value.value == pytest.approx(friction, abs=3.0 * value.std), name
+    values = yaml.safe_load(fragment(ROBOT, found, "a run"))["set"]
+    assert set(values["timing.play"]) == {joint.name for joint in ROBOT.joints}
+    assert set(values["robot.motor_model.torque_constant"]) == set(ROBOT.transmission.motors)
+
+
+def standing(ticks: int) -> MeasuredRun:
+    still = np.zeros((ticks, 10))
+    return MeasuredRun(
+        0.002, np.tile(ROBOT.standing_position, (ticks, 1)), still, still, np.zeros((ticks, 3)),
+        np.tile([0.0, 0.0, 9.81], (ticks, 1)), np.zeros((ticks, 3)),
+        np.ones((ticks, len(ROBOT.contacts)), dtype=np.bool_),
+    )  # fmt: skip
+
+
+def test_a_robot_in_the_air_or_that_stands_too_short_is_refused() -> None:
+    motion = standing(2000)
+    assert standing_span(ROBOT, motion) == slice(0, 2000)
+    with pytest.raises(IdentificationError, match="never stands"):
+        standing_span(ROBOT, replace(motion, closed=np.zeros_like(motion.closed)))
+    with pytest.raises(IdentificationError, match="less than 3 s"):
+        standing_span(ROBOT, standing(1000))
+
+
+def test_one_bouncing_switch_ends_no_stance() -> None:
+    motion = standing(2000)
+    motion.closed[::2, 0] = False
+    assert standing_span(ROBOT, motion) == slice(0, 2000)
+
+
+def test_the_filter_is_not_late_and_a_shift_is() -> None:
+    time = 0.002 * np.arange(2000)
+    wave = np.sin(2.0 * math.pi * time)[:, None]
+    inner = slice(200, -200)
+    np.testing.assert_allclose(smooth(wave, 0.002)[inner], wave[inner], atol=1e-3)
+    later = np.sin(2.0 * math.pi * (time + 0.003))[:, None]
+    np.testing.assert_allclose(shifted(wave, 1.5)[inner], later[inner], atol=1e-3)
