@@ -65,6 +65,8 @@ NOT_HOT = {
     "mathematics.whole_body_solution.active_set_program": "memory, when a block is set up",
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
+    "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
+    "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.check_slope": "checks a scene, when a graph is loaded",
