@@ -120,9 +120,9 @@ def load_all():
         importlib.import_module(".".join(("aloft", *path.relative_to(ROOT).with_suffix("").parts)))
 
 
-def run_jump(changes=None, duration=None):
+def run_jump(changes=None, duration=None, graph="jump.yaml"):
     """A jump, or its first part; whether it would succeed does not matter."""
-    result = aloft.load(ROOT / "graphs/jump.yaml", changes or {}).run(duration=duration)
+    result = aloft.load(ROOT / "graphs" / graph, changes or {}).run(duration=duration)
     assert result.error is None, result.error
 
 
@@ -200,7 +200,10 @@ def calls():
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
         run_jump(weak, duration=0.1)
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
+        run_jump({"robot.motor_model.load_friction": 0.05}, 0.02, "from_gantry.yaml")
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
+        mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
+        run_alone("blocks.SensorAlignment", find_robot("bruce"), play=0.01, **mounted)
         gears = {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}
         run_alone("hal.MujocoRobot", find_robot("bruce"), gears=gears)
         for name in known_names():  # blocks that none of these graphs has
