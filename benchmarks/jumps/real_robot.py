@@ -1,18 +1,21 @@
 """Jumps of simulated robots as a bench finds them: untold, calibrated, and learning from jump to jump.
 
-Each seed draws one robot by ``graphs/trials/real.yaml``. What a calibration would tell the controller comes from
-the simulator's own draws, with errors of the size that a calibration is meant to reach (``studies/oracle``).
-A robot that learns (``studies/jump_learning``) makes smaller jumps first, and then each jump several times with
+Each seed draws one robot by ``graphs/trials/real.yaml``. It is calibrated by ``aloft robot calibrate``, from its own
+motion alone; or the controller is told what the simulator drew, with errors of the size that a calibration is
+meant to reach (``studies/oracle``). A robot that learns (``studies/jump_learning``) makes smaller jumps first, and then each jump several times with
 fresh noise; it sees its own estimates alone. A run lands if ``blocks.JumpScore`` says so.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 from ...planner.library.learnt import LearntJumps, launch_of
 from ...planner.library.library import PlanLibrary, shipped_folder
@@ -37,32 +40,35 @@ SERIES: Mapping[str, Mapping[str, float]] = {
     "ahead 20 cm": {"rise": 0.12, "distance_x": 0.2},
 }
 """The jumps that are counted, as changes of ``graphs/jump.yaml``'s task."""
+ARMS: Mapping[str, tuple[Literal["nothing", "calibration", "draws"], bool]] = {
+    "nothing told": ("nothing", False),
+    "calibrated": ("calibration", False),
+    "learning, nothing told": ("nothing", True),
+    "calibrated and learning": ("calibration", True),
+    "told within the calibration's goals, learning": ("draws", True),
+}
 TIMES = 5
 """How often a robot that learns makes each of them."""
 MISSED_GOAL = 0.05
 """The largest good share of robots that do not land."""
+FOLDER = Path("results") / "real_robot"
+"""Where the fragments of calibrations go."""
 _NOISES = 1000
 
 
 @dataclass(frozen=True)
 class RobotJob:
-    """A robot by its seed; whether its controller is told of it, and whether it learns."""
+    """A robot by its seed; where what its controller is told of it comes from, and whether it learns."""
 
     seed: int
-    told: bool
+    told: Literal["nothing", "calibration", "draws"]
     learns: bool
 
 
 def real_robot(seeds: Sequence[int] = SEEDS) -> list[Row]:
     """Rows: for each jump the share that lands, untold, calibrated, and learning, the first and last time."""
-    arms = {
-        "nothing told": (False, False),
-        "calibrated": (True, False),
-        "learning, nothing told": (False, True),
-        "calibrated and learning": (True, True),
-    }
-    jobs = [RobotJob(seed, *arm) for arm in arms.values() for seed in seeds]
-    landed: dict[tuple[bool, bool], list[list[list[bool]]]] = {arm: [] for arm in arms.values()}
+    jobs = [RobotJob(seed, *arm) for seed in seeds for arm in ARMS.values()]
+    landed: dict[tuple[str, bool], list[list[list[bool]]]] = {arm: [] for arm in ARMS.values()}
     with closing(job_results(jumps_of, jobs)) as results:
         for result in results:
             if result.error:
@@ -71,7 +77,7 @@ def real_robot(seeds: Sequence[int] = SEEDS) -> list[Row]:
             landed[job.told, job.learns].append(result.value)
     rows = []
     for number, name in enumerate(SERIES):
-        for title, arm in arms.items():
+        for title, arm in ARMS.items():
             robots = [runs[number] for runs in landed[arm]]
             rows.append(_row(f"{name}, {title}", robots, arm[1]))
     return rows
@@ -107,11 +113,27 @@ def graph_of(job: RobotJob, task: Mapping[str, float], number: int) -> Graph:
     """The graph of a robot's jump, with noise of its own."""
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
+    if job.told == "calibration":
+        include.append(calibrated(job.seed))
     sets: dict[str, Any] = {
         "plan.task": dict(task), "robot.seed": job.seed, "robot.noise_seed": _NOISES * job.seed + number,
     }  # fmt: skip
     graph = load_cell(graphs / "jump.yaml", include, sets, graphs / "bench.yaml")
-    return graph.changed(told_values(graph, CALIBRATED, seed=job.seed)) if job.told else graph
+    if job.told == "draws":
+        return graph.changed(told_values(graph, CALIBRATED, seed=job.seed))
+    return graph
+
+
+@cache
+def calibrated(seed: int) -> Path:
+    """The fragment that a calibration of the robot writes. Raises ``CalledProcessError``."""
+    folder = FOLDER.absolute()
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"robot_{seed}.yaml"
+    graph = str(shipped_folder() / "calibrate.yaml")
+    words = ["robot", "calibrate", graph, "--set", f"robot.seed={seed}", "--out", str(file)]
+    subprocess.run([sys.executable, "-m", "aloft", *words], check=True, capture_output=True)
+    return file
 
 
 @cache
