@@ -7,7 +7,6 @@ from typing import Any
 
 from ....files.nodes import MapNode, plain, text_of
 from ....files.problems import Code, Problems, listing, nearest
-from ...background.background_block import Background, background_block_type
 from ...language.block import Block
 from ..reading.graph_file import BackgroundKeys, read_section
 from .block_check import BlockDraft
@@ -31,6 +30,8 @@ def move_to_background(draft: BlockDraft, base_rate: float, problems: Problems) 
     if latency is None or len(problems) > found:
         return
     late = {"late": given["late"]} if "late" in given else {}
+    from ...background.background_block import Background, background_block_type
+
     background = Background(latency, initial=initial, **late)
     draft.block_type = background_block_type(kind, background)
 

@@ -270,7 +270,7 @@ blocks:
     episodes = []
     for _ in range(2):
         environment.reset(seed=1)
-        steps = [environment.step(np.array([0.1 * k]))[0].tolist() for k in range(20)]
+        steps = [environment.step(np.array([0.05 * k]))[0].tolist() for k in range(20)]
         episodes.append(steps)
     environment.close()
     assert episodes[0] == episodes[1] and episodes[0][-1] != episodes[0][0] == [0.0]
