@@ -51,7 +51,7 @@ def test_the_controllers_own_limits_act_before_the_drivers() -> None:
     low = {"kind": "low_voltage", "start": 0.05, "value": 13.1, "target": "left_knee_motor"}
     graph = aloft.load(GRAPHS / "jump_twin.yaml", {"robot.faults": [low]})
     result = Executor(graph.checked, log=False).run()
-    text = "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V"
+    text = "drive left_knee_motor: 13.1 V is below lowest_voltage, 13.2 V without load"
     assert not result.success and result.reason == f"safety: {text}"
     assert result.metrics["safety_fault"] == "voltage" and result.metrics["safety_reason"] == text
     assert 0.05 < float(result.metrics["safety_fault_time_s"]) < 0.08  # type: ignore[arg-type]
