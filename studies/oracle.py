@@ -23,7 +23,7 @@ CONSUMER = "controllers/late_sensors.yaml"
 """The file that a graph includes so that its controller takes what is told."""
 
 
-class Errors(NamedTuple):
+class CalibrationErrors(NamedTuple):
     """Standard deviations of what is told: shares of friction and of torque constants, ages [s], the IMU's
     place [m] and angle [rad]."""
 
@@ -34,13 +34,13 @@ class Errors(NamedTuple):
     rotation: float = 0.0
 
 
-EXACT = Errors()
-CALIBRATED = Errors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
+EXACT = CalibrationErrors()
+CALIBRATED = CalibrationErrors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
 """What the calibration is meant to reach."""
 
 
 def told_values(
-    graph: Graph, errors: Errors = EXACT, block: str = "robot", seed: int = 0
+    graph: Graph, errors: CalibrationErrors = EXACT, block: str = "robot", seed: int = 0
 ) -> dict[str, Any]:
     """The parameters of the controller, as overrides of the graph.
 
@@ -63,7 +63,9 @@ def told_values(
     )
 
 
-def _imu(params: SimulatorParameters, errors: Errors, draw: np.random.Generator) -> dict[str, Any]:
+def _imu(
+    params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
+) -> dict[str, Any]:
     place, angle = map(np.array, draw_place(params.imu, params.seed))
     return {
         "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
@@ -71,7 +73,9 @@ def _imu(params: SimulatorParameters, errors: Errors, draw: np.random.Generator)
     }
 
 
-def _ages(params: SimulatorParameters, errors: Errors, draw: np.random.Generator) -> dict[str, Any]:
+def _ages(
+    params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
+) -> dict[str, Any]:
     """The ages of the readings [s], and the delay that the controller must bridge."""
     imu, encoders, band = params.imu, params.encoders, params.motors.current_bandwidth
     gyro, accelerometer = draw_delays(imu, params.seed)
@@ -93,7 +97,7 @@ def _motors(
     block: str,
     params: SimulatorParameters,
     robot: RobotDescription,
-    errors: Errors,
+    errors: CalibrationErrors,
     draw: np.random.Generator,
 ) -> dict[str, Any]:
     motors, n = params.motors, len(robot.joints)
@@ -109,7 +113,10 @@ def _motors(
 
 
 def _joints(
-    params: SimulatorParameters, robot: RobotDescription, errors: Errors, draw: np.random.Generator
+    params: SimulatorParameters,
+    robot: RobotDescription,
+    errors: CalibrationErrors,
+    draw: np.random.Generator,
 ) -> dict[str, Any]:
     variation, n = draw_variation(params, robot), len(robot.joints)
     factor = np.array([variation.factor(variation.friction_of_joint, k) for k in range(n)])

@@ -141,7 +141,7 @@ def sense_joints(
         memory.encoder_velocity[k] += share * (scratch.late[k] - memory.encoder_velocity[k])
 
 
-class MotorModel(NamedTuple):
+class DrawnMotors(NamedTuple):
     """All motors: what maps their torques and speeds to joints and back, (n, n); ``constant`` (n,), the
     factor on their torque constants; ``saturation`` at the ``peak`` torque (n,) [N m]; the ``share`` of a new
     torque that passes the current loop in a step; ``limit`` (n,) [N m]; ``ripple`` [N m], ``periods`` in a
@@ -160,7 +160,7 @@ class MotorModel(NamedTuple):
     friction: float
 
 
-class TorqueScratch(NamedTuple):
+class ProducedTorque(NamedTuple):
     """Of the motors in a physics step: angle, speed, and the torque that is gained; of the joints the torque."""
 
     angle: Array1D
@@ -171,8 +171,8 @@ class TorqueScratch(NamedTuple):
 
 @kernel
 def produce_torque(
-    position: Array1D, velocity: Array1D, requested: Array1D, model: MotorModel,
-    scratch: TorqueScratch, memory: PhysicsState, torque: Array1D,
+    position: Array1D, velocity: Array1D, requested: Array1D, model: DrawnMotors,
+    scratch: ProducedTorque, memory: PhysicsState, torque: Array1D,
 ) -> None:  # fmt: skip
     """Change the joint ``torque`` [N m] from what the motors are asked for to what they give.
 
@@ -234,7 +234,7 @@ class DriveEffects:
         self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
         """By how much [s] a drive's loop is late beside that of an ideal drive."""
         limit = math.inf if motors.torque_limit is None else motors.torque_limit
-        self._motors = MotorModel(
+        self._motors = DrawnMotors(
             np.ascontiguousarray(robot.joint_to_motor),
             np.ascontiguousarray(robot.joint_to_motor.T), self.torque_constant,
             motors.saturation, np.array(robot.motors.peak_torque),
@@ -268,7 +268,7 @@ class DriveEffects:
         self, position: Array, velocity: Array, requested: Array, torque: Array
     ) -> KernelCall:
         """Makes of what is asked of the motors what they give; arguments as for ``produce_torque``."""
-        scratch = TorqueScratch(*(np.zeros(self._count) for _ in TorqueScratch._fields))
+        scratch = ProducedTorque(*(np.zeros(self._count) for _ in ProducedTorque._fields))
         return signal_call(
             produce_torque, position, velocity, requested, self._motors, scratch, self._memory,
             torque,

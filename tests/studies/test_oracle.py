@@ -9,7 +9,7 @@ import pytest
 
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import load_text
-from aloft.studies.oracle import CALIBRATED, CONSUMER, Errors, told_values
+from aloft.studies.oracle import CALIBRATED, CONSUMER, CalibrationErrors, told_values
 
 GRAPHS = Path(__file__).parents[2] / "graphs"
 
@@ -53,5 +53,5 @@ def test_errors_are_drawn_by_their_seed(told):
     graph = graph_of({})
     first, again, other = (told_values(graph, CALIBRATED, seed=n) for n in (1, 1, 2))
     assert first == again != other
-    assert told_values(graph, Errors()) == told
+    assert told_values(graph, CalibrationErrors()) == told
     graph_of(first)
