@@ -40,7 +40,7 @@ from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
-from ..robots.transmission import MotorGains, motor_gains
+from ..robots.transmission import SLIDING_SPEED, MotorGains, motor_gains
 from ..runtime.language.block import UnmetRequirement
 from ..runtime.language.parameters import Parameters, parameter
 from ..runtime.language.per_joint import PerJoint
@@ -55,8 +55,6 @@ _DAMPING_TIME = 0.025
 """The default damping as a time of the stiffness [s]."""
 
 
-_SLIDING = 0.2
-"""The speed [rad/s] at which the load friction of a gear has three quarters of its size."""
 _ROUNDS = 8
 """Fixed-point rounds in which the nominal torque is found: at 12 % saturation 1e-4 of it is left."""
 
@@ -248,7 +246,7 @@ class Gears(NamedTuple):
 def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> float:
     """The torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
     constant, peak = gears.constant[motor], gears.peak[motor]
-    lost = gears.load_friction * math.tanh(speed / _SLIDING)
+    lost = gears.load_friction * math.tanh(speed / SLIDING_SPEED)
     asked: float = torque / constant
     if gears.saturation > 0.0 or gears.load_friction > 0.0:
         for _ in range(_ROUNDS):
@@ -265,7 +263,7 @@ def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
     peak = gears.peak[motor]
     load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
     given: float = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
-    return given - gears.load_friction * abs(asked) * math.tanh(speed / _SLIDING)
+    return given - gears.load_friction * abs(asked) * math.tanh(speed / SLIDING_SPEED)
 
 
 class TorqueScratch(NamedTuple):

@@ -35,13 +35,12 @@ from .sensor_identification import (
     smooth,
     standing_span,
 )
+from .transmission import SLIDING_SPEED
 
 EVERY = 8
 """Of the filtered ticks every eighth is used."""
 SOFT_SPEED = 0.08
 """The joint speed at which most of the Coulomb friction acts [rad/s]."""
-SLIDING = 0.2
-"""The motor speed at which most of the load friction acts [rad/s]."""
 CORRELATED = 0.6
 """What the model lacks repeats for about so long [s]."""
 _DRAWS = 600
@@ -233,7 +232,7 @@ def _equations(
         by_link = np.hstack([regressor[:, _LINK * c : _LINK * (c + 1)] for c in carriers])
         sign = np.tanh(speeds[k] / SOFT_SPEED)
         motors = robot.torque_to_motor @ torque[k]
-        slides = np.abs(motors) * np.tanh(to_motor @ speeds[k] / SLIDING)
+        slides = np.abs(motors) * np.tanh(to_motor @ speeds[k] / SLIDING_SPEED)
         of_joints = np.hstack([
             (rotors @ bends[k])[:, None], np.diag(sign), np.diag(speeds[k]), np.eye(n),
             -to_motor.T * motors, (to_motor.T @ (motors**3 / peak**2))[:, None],

@@ -26,6 +26,7 @@ from ..mathematics.constants import GRAVITY
 from .identification import Estimate, IdentificationError, MeasuredRun
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
+from .transmission import PLAY_TIME, PLAY_TORQUE
 
 CUTOFF = 12.0
 """Of the filter that all signals pass [Hz]."""
@@ -33,8 +34,6 @@ EDGE = 0.3
 """The time at both ends that the filter spoils [s]."""
 ROUNDS = 2
 """The fit is repeated with what was found, so that what was neglected is small."""
-TURNING, CROSSING = 0.1, 0.005
-"""A rotor is at three quarters of its play at this torque [N m], and crosses it in this time [s]."""
 CORRELATED = 3.0 / (2.0 * CUTOFF)
 """Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
 cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
@@ -143,8 +142,8 @@ def _sum(first: Estimate, second: Estimate, more: float = 0.0) -> Estimate:
 
 def play_positions(torque: Array, period: float) -> Array:
     """Where in its play each rotor is, from -1 to 1, by the torques."""
-    ends = np.tanh(torque / TURNING)
-    out, share = np.empty_like(ends), -math.expm1(-period / CROSSING)
+    ends = np.tanh(torque / PLAY_TORQUE)
+    out, share = np.empty_like(ends), -math.expm1(-period / PLAY_TIME)
     here = ends[0]
     for k, end in enumerate(ends):
         here = here + share * (end - here)

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
 from ..mathematics.linear_algebra import inverse, product
@@ -84,16 +85,22 @@ def lesson_of(
     )
 
 
+def flight(signals: Signals) -> tuple[Array, float, float, NDArray[np.bool_], int]:
+    """The plan's time in every tick, its lift-off and touchdown [s], whether any point was loaded in every
+    tick, and the tick in the middle of the planned flight."""
+    time = np.asarray(signals("plan.reference.time"), np.float64)
+    lifted = float(signals("plan.reference.lift_off_time")[0])
+    landed = float(signals("plan.reference.touchdown_time")[0])
+    loaded = np.asarray(signals("contacts.state.active").any(axis=1), np.bool_)
+    return time, lifted, landed, loaded, int(np.searchsorted(time, 0.5 * (lifted + landed)))
+
+
 def landing_error(signals: Signals, measured_place: tuple[float, float] | None) -> Array | None:
     """Actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad], (5,).
 
     The torso is planned to be level. ``None`` without a flight and a landing.
     """
-    time = np.asarray(signals("plan.reference.time"), np.float64)
-    lifted = float(signals("plan.reference.lift_off_time")[0])
-    landed = float(signals("plan.reference.touchdown_time")[0])
-    loaded = np.asarray(signals("contacts.state.active").any(axis=1), np.bool_)
-    flying = int(np.searchsorted(time, 0.5 * (lifted + landed)))
+    time, lifted, landed, loaded, flying = flight(signals)
     start = int(np.searchsorted(time, lifted - BEFORE))
     if flying >= len(time) or loaded[flying] or not loaded[flying:].any():
         return None
@@ -123,14 +130,10 @@ def landing_error(signals: Signals, measured_place: tuple[float, float] | None) 
 
 def speed_error(signals: Signals) -> float:
     """Actual minus planned vertical velocity at lift-off [m/s], of a run that flew and landed."""
-    time = np.asarray(signals("plan.reference.time"), np.float64)
-    lifted = float(signals("plan.reference.lift_off_time")[0])
-    landed = float(signals("plan.reference.touchdown_time")[0])
-    loaded = np.asarray(signals("contacts.state.active").any(axis=1), np.bool_)
-    flying = int(np.searchsorted(time, 0.5 * (lifted + landed)))
+    time, lifted, landed, loaded, flying = flight(signals)
     ticks = int(np.argmax(loaded[flying:])) + int(np.argmax(loaded[:flying][::-1]))
-    flight = ticks * float(time[1] - time[0])
-    return SPEED_OF_TIME * (flight + SHORTER - (landed - lifted))
+    without_contact = ticks * float(time[1] - time[0])
+    return SPEED_OF_TIME * (without_contact + SHORTER - (landed - lifted))
 
 
 def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:

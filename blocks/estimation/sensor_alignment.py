@@ -10,6 +10,7 @@ from ...mathematics.arrays import Array1D, Array2D
 from ...mathematics.compiling.expressions import cross
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import exponential, rotate
+from ...robots.transmission import PLAY_TIME, PLAY_TORQUE
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
 from ...runtime.language.per_joint import PerJoint
@@ -18,12 +19,6 @@ from ..signals import ImuReading, JointState
 
 SAMPLES = 16
 """The number of samples that are remembered."""
-
-
-_TURNING = 0.1
-"""The torque [N m] that holds a rotor at three quarters of the width of its play."""
-_CROSSING = 0.005
-"""The time constant in which a rotor crosses its play [s]."""
 
 
 class SensorAlignmentParameters(Parameters):
@@ -176,9 +171,9 @@ def take_off_play(
     joints: JointState, constants: AlignmentConstants, memory: AlignmentMemory, period: float
 ) -> None:
     """Take off joint angles [rad] what the gears' play adds to them, by the measured torques."""
-    share = -math.expm1(-period / _CROSSING)
+    share = -math.expm1(-period / PLAY_TIME)
     for k in range(joints.position.shape[0]):
-        end = constants.play[k] * math.tanh(joints.torque[k] / _TURNING)
+        end = constants.play[k] * math.tanh(joints.torque[k] / PLAY_TORQUE)
         memory.play[k] += share * (end - memory.play[k])
         joints.position[k] -= memory.play[k]
 

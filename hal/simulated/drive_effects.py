@@ -24,19 +24,12 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
+from ...robots.transmission import PLAY_TIME, PLAY_TORQUE, SLIDING_SPEED
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
 from .state import PhysicsState
-
-_TURNING = 0.1
-"""The torque [N m] that holds a rotor at three quarters of the width of its play."""
-_CROSSING = 0.005
-"""The time constant in which a rotor crosses its play [s]: BRUCE's, 10 mrad wide, takes 6 ms at 1 N m. If it
-took none, the drive's loop around the encoder would chatter between both ends."""
-_SLIDING = 0.2
-"""The speed [rad/s] at which the load friction of a gear has three quarters of its size."""
 
 
 class EncoderEffects(Parameters):
@@ -123,7 +116,7 @@ def sense_joints(
     """
     for k in range(position.shape[0]):
         reading = position[k] + model.compliance * torque[k]
-        end = model.play * math.tanh(torque[k] / _TURNING)
+        end = model.play * math.tanh(torque[k] / PLAY_TORQUE)
         memory.encoder_play[k] += model.crossing * (end - memory.encoder_play[k])
         reading += memory.encoder_play[k]
         reading += model.eccentricity * math.sin(position[k] + model.phase[k])
@@ -189,7 +182,7 @@ def produce_torque(
         if model.peak[k] > 0.0:
             load = min(abs(given) / model.peak[k], 1.0)
         given *= model.constant[k] * (1.0 - model.saturation * load * load)
-        given -= model.friction * abs(given) * math.tanh(scratch.speed[k] / _SLIDING)
+        given -= model.friction * abs(given) * math.tanh(scratch.speed[k] / SLIDING_SPEED)
         if model.peak[k] > 0.0:
             turned = model.periods * scratch.angle[k] + model.phase[k]
             given += model.ripple * math.sin(turned)
@@ -223,7 +216,7 @@ class DriveEffects:
             np.full(n, round(encoders.delay / timestep)),
             -math.expm1(-timestep / time) if time > 0.0 else 1.0,
             encoders.eccentricity, turn * stream(seed, Purpose.ECCENTRICITY).random(n),
-            encoders.compliance, 0.5 * encoders.backlash, -math.expm1(-timestep / _CROSSING),
+            encoders.compliance, 0.5 * encoders.backlash, -math.expm1(-timestep / PLAY_TIME),
         )  # fmt: skip
         draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
         self.torque_constant = motors.torque_constant * (
