@@ -125,7 +125,9 @@ class ZenohTransport(NetworkTransport):
                         history=True,
                     )
                 )
-        self._keep(liveliness.declare_token(f"{self._prefix}/alive/{machine}/{self._session.zid()}"))
+        self._keep(
+            liveliness.declare_token(f"{self._prefix}/alive/{machine}/{self._session.zid()}")
+        )
 
     def _keep(self, declared: Any) -> None:
         self._declared.append(declared)
