@@ -53,7 +53,7 @@ class Variation:
 
     def metrics(self) -> dict[str, float]:
         """The extremes of what differs from link to link and from joint to joint, where it does."""
-        found = {}
+        found: dict[str, float] = {}
         for name, values in (
             ("link_length", self.link_length), ("static_friction", self.static_friction)
         ):  # fmt: skip
