@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import sys
+import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -86,6 +87,8 @@ class TerminalOperator:
         Raises:
             AloftError: nobody confirms in time, something else is typed, or standard input ended.
         """
+        if sys.stdin.isatty():  # what was typed before the text was read confirms nothing
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
         _say(f"  {request.text}; then press return, or type stop")
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:

@@ -43,10 +43,9 @@ def twin_session(file: Path, robot: RobotDescription, hand: RobotByHand) -> Sess
             tempfile.TemporaryDirectory() as folder,
         ):
             served = Path(folder) / file.name
-            served.write_text(
-                hardware.at_ports(server.bus_path, server.board_path), encoding="utf-8"
-            )
-            return run_on_robot(served, graph, {**settings, "robot.time": "virtual"})
+            text = hardware.at_ports(server.bus_path, server.board_path, virtual=True)
+            served.write_text(text, encoding="utf-8")
+            return run_on_robot(served, graph, settings, _recording(file, graph), virtual=True)
 
     return Session(file, robot, connect, hand, held_pace, run)
 
@@ -71,24 +70,38 @@ def port_session(file: Path, robot: RobotDescription, operator: Operator) -> Ses
 
     def run(graph: str, settings: Mapping[str, Any]) -> RunResult:
         virtual = Hardware.read(file, robot).bus.is_virtual
-        return run_on_robot(
-            file, graph, {**settings, "robot.time": "virtual" if virtual else "real"}
-        )
+        return run_on_robot(file, graph, settings, _recording(file, graph), virtual=virtual)
 
     return Session(file, robot, connect, operator, held_pace, run)
 
 
-def run_on_robot(file: Path, graph: str, settings: Mapping[str, Any]) -> RunResult:
-    """Run a shipped graph, armed, on the robot of this file of the hardware.
+def run_on_robot(
+    file: Path, graph: str, settings: Mapping[str, Any], recording: Path, *, virtual: bool
+) -> RunResult:
+    """Run a shipped graph, armed, on the robot of this file of the hardware, and record it.
+
+    In real time the robot says when a tick begins.
 
     Raises:
         AloftError: the graph and the file do not fit.
     """
+    from ...logs.recording.recorder import Recorder
     from ...runtime.graph import load
+    from ...runtime.language.stages import ClockSpec
 
-    armed = {"robot.hardware": str(file.resolve()), "robot.armed": True}
-    loaded = load(_GRAPHS / graph, {**armed, **settings})
-    return loaded.run(log=False)
+    on_robot = {
+        "robot.hardware": str(file.resolve()),
+        "robot.armed": True,
+        "robot.time": "virtual" if virtual else "real",
+    }
+    loaded = load(_GRAPHS / graph, {**on_robot, **settings})
+    clock = ClockSpec("free" if virtual else "robot")
+    return loaded.run(clock=clock, sinks=[Recorder(recording, keep=20)], log=False)
+
+
+def _recording(file: Path, graph: str) -> Path:
+    """Where the runs of a graph are recorded: beside the file of the hardware."""
+    return file.with_name(f"{file.stem}.{Path(graph).stem}.rrd")
 
 
 @contextmanager

@@ -312,12 +312,14 @@ class Hardware(Parameters):
         given = [self.motors[name].torque_constant for name in robot.transmission.motors]
         return np.array([each or self.drives.torque_constant for each in given])
 
-    def at_ports(self, bus: str, board: str) -> str:
-        """The text of a file that is as this one, of a twin in virtual time behind these ports."""
+    def at_ports(self, bus: str, board: str, *, virtual: bool) -> str:
+        """The text of a file that is as this one, of a twin behind these ports."""
         data = self.model_dump(mode="json")
-        data["bus"] |= {"port": bus, "time": "virtual", "reply_time": 5.0}
+        data["bus"] |= {"port": bus}
         data["board"] |= {"port": board}
         data["dead_man"] = {"kind": "none"}
+        if virtual:
+            data["bus"] |= {"time": "virtual", "reply_time": 5.0}
         return yaml.safe_dump(data, sort_keys=False)
 
     def missing_calibration(self) -> list[str]:

@@ -50,7 +50,9 @@ WRITTEN_ERROR = 0.5
 """The share up to which another torque constant is written into the file."""
 FRICTION_FACTOR = 2.0
 """How many times the described friction a joint may have: more is a fault of its bearing or gear."""
-FRICTION_SPEED = 1.0
+FRICTION_ERROR = 0.5
+"""The share of the described friction that this test cannot tell: no more than that is compensated."""
+FRICTION_SPEED = 3.0
 """The speed at which frictions are compared, Coulomb and viscous together [rad/s]."""
 HOLD_TIME = 1.0
 """How long all drives hold the standing pose in the air [s]."""
@@ -197,7 +199,8 @@ def check_motors(session: Session) -> StepReport:
     for k, joint in enumerate(robot.joints):
         known = float(robot.motors.friction[k] + FRICTION_SPEED * robot.motors.damping[k])
         friction = found[joint.name].coulomb + FRICTION_SPEED * found[joint.name].viscous
-        extra[joint.name] = round(COMPENSATED * max(0.0, friction - known), 4)
+        more = friction - known
+        extra[joint.name] = round(COMPENSATED * more, 4) if more > FRICTION_ERROR * known else 0.0
         if friction > FRICTION_FACTOR * known:
             report.add(
                 f"friction of {joint.name}", f"about {known:.3f} N m", f"{friction:.3f} N m",

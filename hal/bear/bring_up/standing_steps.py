@@ -107,7 +107,7 @@ def _run(session: Session, graph: str, what: str, settings: Mapping[str, Any]) -
     if not result.success:
         report.add(
             "run", f"a robot that will {what}", result.reason,
-            "see its recording; mend what it names, or go back with --from",
+            "see its recording beside the file of the hardware; mend what it names, or go back with --from",
         )  # fmt: skip
     return report
 

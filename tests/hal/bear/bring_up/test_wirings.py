@@ -288,3 +288,10 @@ def test_the_table_of_the_page_has_every_wiring() -> None:
         for name, (_, step, text) in (WIRINGS | UNDER_POWER).items()
     ]
     assert table.strip().splitlines()[2:] == rows
+
+
+def test_the_page_has_every_step_in_order() -> None:
+    page = (Path(__file__).parents[4] / "docs/bring_up.md").read_text(encoding="utf-8")
+    table = page.split("| step | what it does |")[1].split("\n\n")[0]
+    first = [line.split("|")[1] for line in table.splitlines()[2:]]
+    assert " ".join(first).replace("`", "").replace(",", "").split() == [s.name for s in STEPS]
