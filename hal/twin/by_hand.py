@@ -15,7 +15,7 @@ from ...blocks.signals import ImuReading
 from ...mathematics.constants import GRAVITY
 from ...robots.robot_description import RobotDescription
 from ..bear.bring_up.session import PACKET_TIME, Request
-from ..simulated.body_effects import GantryParameters
+from ..simulated.effects import GantryParameters
 from ..simulated.simulated_robot import SimulatorParameters
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .twin import Twin

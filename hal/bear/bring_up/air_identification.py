@@ -36,8 +36,9 @@ class AirMotion(NamedTuple):
     def allocate(cls, robot: RobotDescription, count: int, on: list[int]) -> Self:
         """Room for a motion of ``count`` exchanges."""
         n = len(robot.joints)
-        wide = [np.zeros((count, n)) for _ in range(3)]
-        return cls(*wide, np.zeros((count, 3)), np.zeros((count, 3)), on)
+        position, velocity, torque = np.zeros((3, count, n))
+        rate, force = np.zeros((2, count, 3))
+        return cls(position, velocity, torque, rate, force, on)
 
 
 class JointFriction(NamedTuple):

@@ -233,7 +233,7 @@ def _wave(session: Session, j: int, next_cycle: Callable[[], bool]) -> AirMotion
         session.bus, hardware, [names[k] for k in on], hardware.soft_start.current,
         STIFFNESS / constant, DAMPING / constant, watched=names,
     ) as drives:  # fmt: skip
-        start = np.linalg.solve(to_motor, drives.position)
+        start = np.asarray(np.linalg.solve(to_motor, drives.position), dtype=np.float64)
         low, high = robot.joints[j].limits or (-math.inf, math.inf)
         reach = SWING + SLOW + 0.05
         middle = min(max(start.item(j), low + reach), high - reach)

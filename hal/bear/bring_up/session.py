@@ -98,8 +98,13 @@ class Devices(NamedTuple):
 class BringUpRun(Protocol):
     """The outcome of a graph's run."""
 
-    success: bool
-    reason: str
+    @property
+    def success(self) -> bool:
+        """Whether the run went as its graph intends."""
+
+    @property
+    def reason(self) -> str:
+        """Why it ended, or what failed."""
 
     @property
     def metrics(self) -> Mapping[str, Any]:
