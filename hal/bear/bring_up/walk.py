@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..bus import BusError
-from .session import Journal, Outcome, Session
-from .steps import STEPS, Step
+from .session import BringUpRecord, Session, StepReport
+from .steps import STEPS, BringUpStep
 
 
 class UnknownStepError(LookupError):
     """There is no such step."""
 
 
-def steps_from(journal: Journal, first: str | None) -> tuple[Step, ...]:
+def steps_from(record: BringUpRecord, first: str | None) -> tuple[BringUpStep, ...]:
     """The steps to do: from ``first``, or from the first that has not passed.
 
     Raises:
@@ -26,23 +26,23 @@ def steps_from(journal: Journal, first: str | None) -> tuple[Step, ...]:
             raise UnknownStepError(f"there is no step {first!r}: {', '.join(names)}")
         return STEPS[names.index(first) :]
     for k, step in enumerate(STEPS):
-        if not journal.passed(step.name):
+        if not record.passed(step.name):
             return STEPS[k:]
     return ()
 
 
 def walk(
-    session: Session, journal: Journal, first: str | None = None,
-    announce: Callable[[Step], None] = lambda step: None,
+    session: Session, record: BringUpRecord, first: str | None = None,
+    announce: Callable[[BringUpStep], None] = lambda step: None,
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
-    """Do the steps, note each in the journal, and yield its entry; the first that fails is the last."""
-    for step in steps_from(journal, first):
+    """Do the steps, note each in the record, and yield its entry; the first that fails is the last."""
+    for step in steps_from(record, first):
         announce(step)
         try:
-            outcome = step.run(session)
+            report = step.run(session)
         except BusError as error:
-            outcome = Outcome()
-            outcome.add("bus", "answers of all drives", str(error), "check cables; --from drives")
-        yield journal.add(step.name, outcome)
-        if not outcome.passed:
+            report = StepReport()
+            report.add("bus", "answers of all drives", str(error), "check cables; --from drives")
+        yield record.add(step.name, report)
+        if not report.passed:
             return
