@@ -42,12 +42,14 @@ from .robot import (
     RobotHealth,
     RobotTruth,
 )
+from .steering import CourseGoal, JumpCommand, PlanOutcome, PlanPart, PlanRequest
 
 __all__ = [
     "BaseState",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
+    "CourseGoal",
     "DelayEstimate",
     "DrivePhase",
     "DynamicsTerms",
@@ -59,10 +61,14 @@ __all__ = [
     "JointState",
     "JointTarget",
     "JointTorque",
+    "JumpCommand",
     "JumpReference",
     "MassEstimate",
     "Phase",
     "PhaseState",
+    "PlanOutcome",
+    "PlanPart",
+    "PlanRequest",
     "PointTarget",
     "RobotHealth",
     "RobotTruth",
