@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D
 from ...mathematics.kernel import kernel
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -51,6 +52,13 @@ class CommandSchedule(Block):
         )
 
     params: Params
+
+    @classmethod
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """The ``count`` of commands."""
+        assert isinstance(params, cls.Params)
+        return {"count": len(params.commands)}
+
     taken = Input(PlanRequest, text="the last request, by the number of its command")
     command = Output(JumpCommand, text="the command that holds; number zero: none yet")
     memory = State(CommandsGiven, text="how many have been given")

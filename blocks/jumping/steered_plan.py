@@ -7,11 +7,10 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Array2D, Flags1D, Flags2D
+from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, multiply, turn_about_vertical
 from ...planner.library.jump_table import (
-    COLUMNS,
     FlightRotation,
     TableRows,
     fed_forward,

@@ -13,8 +13,9 @@ RISE = 0.09
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 TOE_KNOTS = 4
 """Intervals of the part of the thrust on the toes, which is 40 ms long."""
-REACH = {"ahead": 0.32, "aside": 0.30, "turn": 0.87}
-"""The largest distance ahead or back and aside [m] and turn [rad]."""
+REACH = {"ahead": 0.32, "back": 0.14, "aside": 0.30, "turn": 0.87}
+"""The largest distance ahead, back and aside [m] and turn [rad]. Jumps further back with a turn are planned, but
+in the robust trial they land askew."""
 
 
 class HopRequest(NamedTuple):
@@ -27,8 +28,10 @@ class HopRequest(NamedTuple):
 
 
 def within_reach(wanted: HopRequest) -> HopRequest:
-    """The nearest request that a jump can do: in an ellipse, and within the largest turn."""
-    share = math.hypot(wanted.ahead / REACH["ahead"], wanted.aside / REACH["aside"])
+    """The nearest request that a jump can do: in half an ellipse ahead and half of one
+    back, and within the largest turn."""
+    along = REACH["ahead"] if wanted.ahead >= 0.0 else REACH["back"]
+    share = math.hypot(wanted.ahead / along, wanted.aside / REACH["aside"])
     shorter = max(share, 1.0)
     turn = min(max(wanted.turn, -REACH["turn"]), REACH["turn"])
     return HopRequest(wanted.ahead / shorter, wanted.aside / shorter, turn)

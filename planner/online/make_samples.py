@@ -16,8 +16,8 @@ from ..checking.validity import check_plan
 from ..solving.solve import solve_jump
 from ..task.files import PlanError
 from ..task.plan import PlannedJump
-from .hop_request import REACH, HopRequest, coarse, task_of
 from .hop_plans import samples_path
+from .hop_request import REACH, HopRequest, coarse, task_of
 from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
 
 COUNT = 48
