@@ -67,7 +67,10 @@ def bench(
         int | None, typer.Option(help="The seed by which they are drawn.", min=0)
     ] = None,
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the trial for 'frontier', 'link_delays' and 'real_robot'.")
+        str,
+        typer.Option(
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot' and 'courses'."
+        ),
     ] = "",
     jitter: Annotated[
         str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")

@@ -82,8 +82,10 @@ class CommandSchedule(Block):
         now = clock.base_period * clock.tick
         number = memory.given
         if number < rows.at.shape[0] and taken.command >= number and now >= rows.at[number]:
-            command.ahead = rows.jumps[number, 0]
-            command.aside = rows.jumps[number, 1]
-            command.turn = rows.jumps[number, 2]
             memory.given = number + 1
         command.number = memory.given
+        command.ahead, command.aside, command.turn = 0.0, 0.0, 0.0
+        if memory.given > 0:
+            command.ahead = rows.jumps[memory.given - 1, 0]
+            command.aside = rows.jumps[memory.given - 1, 1]
+            command.turn = rows.jumps[memory.given - 1, 2]

@@ -27,6 +27,11 @@ class PlanAnswer(Signal):
     time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
     rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference, side by side")
     contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jump = Field(3, unit="s", text="when thrust, flight and landing begin")
+    toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
+    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
     parts = Field(dtype="int64", text="how many parts it has")
     given = Field(dtype="int64", text="how many of them have been given")
     outcomes = Field(
@@ -67,19 +72,10 @@ class OnlinePlanner(Block):
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a robot without stored plans."""
-        from ...planner.online.hop_plans import samples_path
+        from ...planner.online.hop_plans import missing_plans
 
-        robot = context.robot
-        assert robot is not None
-        path = samples_path(robot.name)
-        if not path.is_file():
-            there = sorted(file.stem for file in path.parent.glob("*.npz"))
-            yield UnmetRequirement(
-                f"there are no stored plans of hops for {robot.name}",
-                expected=f"a robot with such plans: {', '.join(there)}",
-                found=robot.name,
-                fix=f"robot: {there[0]}, as a key of the graph" if there else "",
-            )
+        assert context.robot is not None
+        return missing_plans(context.robot)
 
     @classmethod
     def example_inputs(
@@ -112,18 +108,20 @@ class OnlinePlanner(Block):
                 HopRequest(float(request.ahead), float(request.aside), float(request.turn))
             )
             self._keep(found, number)
-        given = int(answer.given)
-        if given < int(answer.parts):
-            rows = slice(given * PART_ROWS, (given + 1) * PART_ROWS)
-            part.number, part.part, part.parts = number, given, int(answer.parts)
-            part.time[:] = answer.time[rows]
-            part.rows[:] = answer.rows[rows]
-            part.contact[:] = answer.contact[rows]
-            answer.given = given + 1
+        answer.given[()] = min(int(answer.given) + 1, int(answer.parts))
+        number = max(int(answer.given) - 1, 0)
+        rows = slice(number * PART_ROWS, (number + 1) * PART_ROWS)
+        part.number[()], part.part[()], part.parts[()] = answer.number, number, answer.parts
+        part.time[:] = answer.time[rows]
+        part.rows[:] = answer.rows[rows]
+        part.contact[:] = answer.contact[rows]
+        part.marks[:], part.jump[:] = answer.marks, answer.jump
+        part.toes_first[()], part.outcome[()] = answer.toes_first, answer.outcome
+        part.ahead[()], part.aside[()], part.turn[()] = answer.done
 
     def _keep(self, found: HopPlan, number: int) -> None:
-        """Write a plan's table into the state, and what holds for all of it into the output."""
-        answer, part = self.answer, self.part
+        """Write a plan's table into the state."""
+        answer = self.answer
         table = self._table(found.plan, self.robot)
         n = len(table.time)
         if n > PLAN_ROWS:
@@ -133,16 +131,16 @@ class OnlinePlanner(Block):
         answer.contact[:n] = contact
         for array in (answer.time, answer.rows, answer.contact):
             array[n:] = array[n - 1]
-        answer.number, answer.given = number, 0
-        answer.parts = -(-n // PART_ROWS)
+        answer.number[()], answer.given[()] = number, 0
+        answer.parts[()] = -(-n // PART_ROWS)
         answer.outcomes[found.outcome] += 1
-        part.marks[:] = table.squat_time, table.recover_time
-        part.jump[:] = table.thrust_time, table.lift_off_time, table.touchdown_time
+        answer.marks[:] = table.squat_time, table.recover_time
+        answer.jump[:] = table.thrust_time, table.lift_off_time, table.touchdown_time
         after = min(int(np.searchsorted(table.time, table.touchdown_time, side="right")), n - 1)
         loaded = answer.contact[after]
-        part.toes_first = bool(loaded.any() and not loaded.all())
-        part.outcome = int(found.outcome)
-        part.ahead, part.aside, part.turn = found.done
+        answer.toes_first[()] = bool(loaded.any() and not loaded.all())
+        answer.outcome[()] = int(found.outcome)
+        answer.done[:] = found.done
         self._times.append(found.solve_s + found.check_s)
 
     def metrics(self) -> Mapping[str, Metric]:

@@ -9,14 +9,14 @@ import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import mean_heading, multiply, turn_about_vertical
+from ...mathematics.rotations import mean_heading, turn_about_vertical
 from ...planner.library.jump_table import (
     FlightRotation,
     TableRows,
     fed_forward,
     integrate_rows,
 )
-from ...planner.online.hop_plans import standing_row
+from ...planner.online.hop_plans import missing_plans, standing_row
 from ...robots.description import RobotDescription
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
@@ -28,6 +28,7 @@ from ..signals import (
     DelayEstimate,
     DynamicsTerms,
     JumpCommand,
+    JumpFrame,
     JumpReference,
     Phase,
     PhaseState,
@@ -71,20 +72,21 @@ class FollowedPlan(Signal):
     touchdowns = Field(1, unit="s", text="when landing begins")
     toes_first = Field(1, dtype="bool", text="whether it lands on some of the points")
     began = Field(unit="s", text="time of the run at which it began")
-    origin = Field(3, unit="m", frame="world", text="middle of the feet then")
-    heading = Field(unit="rad", frame="world", text="their heading then")
 
 
 class SteeringState(Signal):
     """What ``SteeredPlan`` remembers besides its plans."""
 
     started = Field(dtype="bool", text="whether the first tick is over")
-    start = Field(2, unit="m", frame="world", text="middle of the feet in the first tick")
+    start = Field(2, unit="m", frame="world", text="middle of the feet when it first stood")
     start_heading = Field(unit="rad", frame="world", text="their heading then")
+    origin = Field(3, unit="m", frame="world", text="origin of the jump's frame")
+    heading = Field(unit="rad", frame="world", text="heading of that frame")
     goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
     goal_heading = Field(unit="rad", frame="world", text="their heading there")
     taken = Field(dtype="int64", text="number of the last command that was taken")
     requests = Field(dtype="int64", text="requests so far")
+    asked = Field(3, text="the last request: ahead, aside [m] and turn [rad]")
     jumps = Field(dtype="int64", text="plans begun so far")
     waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
     outcome = Field(dtype="int64", values=PlanOutcome, text="which plan is followed")
@@ -101,7 +103,8 @@ class SteeredPlan(Block):
     ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
     that cannot be done goes to the nearest place that can; from then on the goal is there.
 
-    The reference is in the world's axes. Its time is that of the run. Until the first plan begins the robot
+    Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
+    feet before the jump, with x ahead. It moves when a plan begins. The reference's time is that of the run. Until the first plan begins the robot
     stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
     told at ``JumpPlan``: by the speed and height that the thrust has reached.
 
@@ -128,9 +131,8 @@ class SteeredPlan(Block):
         """Room for a step."""
 
         values = Field("plan_width", text="columns of an instant")
-        middle = Field(3, unit="m", frame="world", text="of the feet")
-        turn = Field(4, text="quaternion of the heading")
-        vector = Field(3, text="a vector")
+        middle = Field(3, unit="m", frame="world", text="of the feet, in the estimator's world")
+        vector = Field(3, unit="m", text="the same in the jump's frame")
 
     Constants = ProgressConstants
     needs = ("floating base", "feet")
@@ -143,6 +145,7 @@ class SteeredPlan(Block):
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
     request = Output(PlanRequest, text="the jump that should be planned")
+    frame = Output(JumpFrame, text="where the jump begins in the estimator's world")
     goal = Output(CourseGoal, text="where the feet should be by all commands so far")
     received = State(ReceivedPlan, text="the next plan")
     followed = State(FollowedPlan, text="the plan that is followed")
@@ -158,7 +161,7 @@ class SteeredPlan(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report a robot whose feet have no direction."""
+        """Report a robot whose feet have no direction, or that has no stored plans."""
         robot = context.robot
         assert robot is not None
         kinds = [foot_shape(robot, foot)[0] for foot in range(len(robot.feet))]
@@ -170,6 +173,8 @@ class SteeredPlan(Block):
                 found=f"{robot.name} with point feet",
                 fix="robot: bruce, as a key of the graph",
             )
+            return
+        yield from missing_plans(robot)
 
     def setup(self) -> None:
         followed, feet = self.followed, len(self.robot.feet)
@@ -202,6 +207,7 @@ class SteeredPlan(Block):
         delay: DelayEstimate,
         reference: JumpReference,
         request: PlanRequest,
+        frame: JumpFrame,
         goal: CourseGoal,
         received: ReceivedPlan,
         followed: FollowedPlan,
@@ -216,25 +222,27 @@ class SteeredPlan(Block):
         clock: Clock,
     ) -> None:
         now = clock.base_period * clock.tick
-        middle_of(terms.foot_position, scratch.middle)
-        heading = mean_heading(terms.foot_rotation, counted)
+        middle_of(terms.foot_position, scratch.vector)
+        turn_about_vertical(scratch.vector, memory.heading, scratch.middle)
+        scratch.middle[:] = scratch.middle + memory.origin
+        heading = memory.heading + mean_heading(terms.foot_rotation, counted)
         stands = phase.phase == Phase.STAND and now >= params.settle_time
         if stands and not memory.started:
             begin(scratch.middle, heading, memory)
         if memory.waits:
-            receive(part, request.number, received)
+            receive(part, memory.requests, received)
         landed = phase.phase == Phase.LANDING and phase.time_since_touchdown >= params.ask_time
         rests = phase.phase == Phase.RECOVER
         if (stands or landed or rests) and not memory.waits and command.number > memory.taken:
-            ask(command, scratch.middle, heading, memory, request)
+            ask(command, scratch.middle, heading, memory)
             received.parts = 0
             received.whole = False
         rested = stands or (rests and phase.time_in_phase >= params.rest_time)
         if memory.waits and received.whole and rested:
             follow(received, followed, memory)
             followed.began = now
-            followed.origin[:] = scratch.middle
-            followed.heading = heading
+            memory.origin[:] = scratch.middle
+            memory.heading = heading
             integrate_rows(table)
             if memory.outcome != PlanOutcome.PLANNED:
                 memory.goal[:] = scratch.middle[:2]
@@ -245,12 +253,12 @@ class SteeredPlan(Block):
             now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
         )  # fmt: skip
         if memory.jumps > 0:
-            place(followed, reference, scratch)
-        else:
-            reference.time = now
-            scratch.middle[2] = 0.0
-            turn_reference(heading, reference, scratch)
-            shift_reference(scratch.middle, reference)
+            reference.time += followed.began
+            reference.lift_off_time += followed.began
+            reference.touchdown_time += followed.began
+        frame.origin[:] = memory.origin
+        frame.heading = memory.heading
+        tell_request(memory, request)
         tell_goal(memory, goal)
 
 
@@ -273,13 +281,7 @@ def begin(middle: Array1D, heading: float, memory: SteeringState) -> None:
 
 
 @kernel
-def ask(
-    command: JumpCommand,
-    middle: Array1D,
-    heading: float,
-    memory: SteeringState,
-    request: PlanRequest,
-) -> None:
+def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringState) -> None:
     """Move the goal on by a command, and ask for the jump from the feet's place to it."""
     move(memory, command.ahead, command.aside, command.turn)
     memory.taken = command.number
@@ -287,11 +289,18 @@ def ask(
     memory.waits = True
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
     cosine, sine = math.cos(heading), math.sin(heading)
-    request.ahead = cosine * x + sine * y
-    request.aside = cosine * y - sine * x
-    request.turn = memory.goal_heading - heading
-    request.turn = math.atan2(math.sin(request.turn), math.cos(request.turn))
-    request.command = command.number
+    turn = memory.goal_heading - heading
+    memory.asked[0] = cosine * x + sine * y
+    memory.asked[1] = cosine * y - sine * x
+    memory.asked[2] = math.atan2(math.sin(turn), math.cos(turn))
+
+
+@kernel
+def tell_request(memory: SteeringState, request: PlanRequest) -> None:
+    """Write the last request."""
+    request.ahead, request.aside = memory.asked[0], memory.asked[1]
+    request.turn = memory.asked[2]
+    request.command = memory.taken
     request.number = memory.requests
 
 
@@ -347,50 +356,6 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
     memory.outcome = received.outcome
     memory.waits = False
     memory.jumps += 1
-
-
-@kernel
-def place(followed: FollowedPlan, reference: JumpReference, scratch: SteeredPlan.Scratch) -> None:
-    """Put the plan to where the feet stood when it began."""
-    began = followed.began
-    reference.time += began
-    reference.lift_off_time += began
-    reference.touchdown_time += began
-    turn_reference(followed.heading, reference, scratch)
-    shift_reference(followed.origin, reference)
-
-
-@kernel
-def turn_reference(heading: float, reference: JumpReference, scratch: SteeredPlan.Scratch) -> None:
-    """Turn all that is in the world's axes about the vertical through the plan's origin."""
-    turn_about_vertical(reference.com, heading, scratch.vector)
-    reference.com[:] = scratch.vector
-    turn_about_vertical(reference.com_velocity, heading, scratch.vector)
-    reference.com_velocity[:] = scratch.vector
-    turn_about_vertical(reference.com_acceleration, heading, scratch.vector)
-    reference.com_acceleration[:] = scratch.vector
-    turn_about_vertical(reference.angular_momentum, heading, scratch.vector)
-    reference.angular_momentum[:] = scratch.vector
-    turn_about_vertical(reference.angular_momentum_rate, heading, scratch.vector)
-    reference.angular_momentum_rate[:] = scratch.vector
-    for foot in range(reference.foot_position.shape[0]):
-        turn_about_vertical(reference.foot_position[foot], heading, scratch.vector)
-        reference.foot_position[foot, :] = scratch.vector
-        turn_about_vertical(reference.foot_velocity[foot], heading, scratch.vector)
-        reference.foot_velocity[foot, :] = scratch.vector
-        reference.foot_yaw[foot] += heading
-    turn = scratch.turn
-    turn[0], turn[1] = 0.0, 0.0
-    turn[2], turn[3] = math.sin(0.5 * heading), math.cos(0.5 * heading)
-    multiply(turn, reference.orientation, reference.orientation)
-
-
-@kernel
-def shift_reference(origin: Array1D, reference: JumpReference) -> None:
-    """Move all places."""
-    reference.com[:] = reference.com + origin
-    for foot in range(reference.foot_position.shape[0]):
-        reference.foot_position[foot, :] = reference.foot_position[foot] + origin
 
 
 @kernel

@@ -42,7 +42,7 @@ from .robot import (
     RobotHealth,
     RobotTruth,
 )
-from .steering import CourseGoal, JumpCommand, PlanOutcome, PlanPart, PlanRequest
+from .steering import CourseGoal, JumpCommand, JumpFrame, PlanOutcome, PlanPart, PlanRequest
 
 __all__ = [
     "BaseState",
@@ -62,6 +62,7 @@ __all__ = [
     "JointTarget",
     "JointTorque",
     "JumpCommand",
+    "JumpFrame",
     "JumpReference",
     "MassEstimate",
     "Phase",

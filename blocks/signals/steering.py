@@ -70,6 +70,13 @@ class PlanPart(Signal):
     turn = Field(unit="rad", text="its change of heading")
 
 
+class JumpFrame(Signal):
+    """The frame of the jump that is made: the middle of the feet before it, and their heading."""
+
+    origin = Field(3, unit="m", frame="world", text="in the estimator's world")
+    heading = Field(unit="rad", frame="world", text="about its vertical")
+
+
 class CourseGoal(Signal):
     """Where the feet should be after the last command that was taken, by all commands so far."""
 

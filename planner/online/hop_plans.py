@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ...runtime.language.block import UnmetRequirement
 from ..library.jump_table import COLUMNS, JumpTable
 from ..library.library import SHIPPED
 from ..library.reference_table import COARSE_STEPS, reference_table
@@ -19,6 +21,20 @@ from .plan_samples import PlanSamples, read_samples
 def samples_path(robot: str) -> Path:
     """Where the plans of hops of a robot ship."""
     return SHIPPED / "hops" / f"{robot}.npz"
+
+
+def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
+    """What a block that needs the plans of hops of a robot does not have."""
+    path = samples_path(robot.name)
+    if path.is_file():
+        return
+    there = sorted(file.stem for file in path.parent.glob("*.npz"))
+    yield UnmetRequirement(
+        f"there are no stored plans of hops for {robot.name}",
+        expected=f"a robot with such plans: {', '.join(there)}",
+        found=robot.name,
+        fix=f"robot: {there[0]}, as a key of the graph" if there else "",
+    )
 
 
 @lru_cache(maxsize=4)

@@ -13,7 +13,7 @@ RISE = 0.09
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 TOE_KNOTS = 4
 """Intervals of the part of the thrust on the toes, which is 40 ms long."""
-REACH = {"ahead": 0.32, "back": 0.14, "aside": 0.30, "turn": 0.87}
+REACH = {"ahead": 0.32, "back": 0.10, "aside": 0.30, "turn": 0.87}
 """The largest distance ahead, back and aside [m] and turn [rad]. Jumps further back with a turn are planned, but
 in the robust trial they land askew."""
 

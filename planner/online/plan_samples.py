@@ -12,6 +12,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
-from .hop_request import HopRequest, task_of
+from .hop_request import HopRequest, task_of, within_reach
 
 FILE_FORMAT = "aloft hop plans 1"
 SCALES = np.array([0.1, 0.1, 0.4])
@@ -58,9 +59,13 @@ class PlanSamples:
         return np.asarray(trust * (basis * goal).sum(axis=1))
 
     def nearest(self, wanted: HopRequest) -> int:
-        """The plan whose request is the nearest."""
+        """The plan whose request is the nearest, of those within reach."""
         apart = (self.requests - np.array(wanted)) / SCALES
-        return int((apart * apart).sum(axis=1).argmin())
+        square = (apart * apart).sum(axis=1)
+        for row, request in enumerate(self.requests.tolist()):
+            if within_reach(HopRequest(*request)) != HopRequest(*request):
+                square[row] = np.inf
+        return int(square.argmin())
 
     def plan(self, row: int) -> PlannedJump:
         """One of the plans."""
@@ -71,7 +76,7 @@ class PlanSamples:
         return self._make(wanted, self.weights(wanted))
 
     def _make(self, wanted: HopRequest, weights: Array) -> PlannedJump:
-        values = {
+        values: dict[str, Any] = {
             name: array[0] if name in KEPT_EXACTLY else _mean(weights, array)
             for name, array in self.arrays.items()
         }
@@ -108,7 +113,7 @@ def write_samples(path: Path, samples: PlanSamples) -> Path:
     """Write the file, in single precision: plans made from it are solved and checked anew."""
     memory = io.BytesIO()
     header = json.dumps({"format": FILE_FORMAT, "robot": samples.robot, "units": ARRAYS})
-    stored = {
+    stored: dict[str, Any] = {
         name: array if name in KEPT_EXACTLY else array.astype(np.float32)
         for name, array in samples.arrays.items()
     }
