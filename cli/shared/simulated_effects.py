@@ -83,8 +83,9 @@ def _read(file: Path) -> dict[str, Setting]:
 def _group(info: FieldInfo) -> type[Parameters] | None:
     """The model of a parameter that is a group of effects; ``None`` for all others."""
     for kind in (info.annotation, *get_args(info.annotation)):
-        of_effects = isinstance(kind, type) and kind.__module__ == effects.__name__
-        if of_effects and issubclass(kind, Parameters):
+        if not isinstance(kind, type) or kind.__module__ != effects.__name__:
+            continue
+        if issubclass(kind, Parameters):
             return kind
     return None
 
