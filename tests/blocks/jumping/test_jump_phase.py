@@ -387,3 +387,52 @@ def test_a_robot_that_is_put_down_stands_once_all_its_points_have_carried_load()
     seen = step([True] * 4, 52)
     assert seen[48] == Phase.HANG and seen[51] == Phase.STAND
     assert bench.get("phase").stance.all()
+
+
+def land(bench, active, heights=(0.0, 0.0, 0.0, 0.0)):
+    """Fly, and touch down with the points ``active`` at these heights."""
+    bench.set("terms", contact_position=np.outer(heights, [0.0, 0.0, 1.0]))
+    run(bench, LIFT_OFF)
+    run(bench, TOUCHDOWN - 0.001, active=False)
+    run(bench, TOUCHDOWN + 0.01, active=active, fall=False)
+    assert phase(bench) == Phase.LANDING
+
+
+def stance_with(bench, active, heights, loaded):
+    points = np.zeros((4, 3))
+    points[:, 2] = heights
+    bench.set("terms", contact_position=points)
+    bench.set("load", loaded=loaded)
+    run(bench, bench.now + 0.002, active=active, fall=False)
+    return bench.get("phase").stance.tolist()
+
+
+def test_a_foot_on_an_edge_between_its_points_stands_by_the_torques_of_its_leg():
+    heel, other = [False, True, False, False], [False, False, True, False]
+    bench = make(flat_height=0.006)
+    land(bench, heel, (0.02, 0.01, 0.03, 0.03))
+    assert stance_with(bench, heel, [0.02, 0.01, 0.03, 0.03], [True, False]) == heel
+    # the toe has come down to 5 mm above where the heel has touched; then the heel lifts off by 4 mm
+    assert stance_with(bench, other, [0.015, 0.01, 0.03, 0.03], [True, False])[:2] == [True, True]
+    assert stance_with(bench, other, [0.0, 0.014, 0.03, 0.03], [True, False])[:2] == [True, True]
+    # 7 mm above where it has touched a point does not stand
+    assert stance_with(bench, other, [0.0, 0.017, 0.03, 0.03], [True, False])[:2] == [True, False]
+    run(bench, bench.now + 0.4, active=False, fall=False)
+    assert phase(bench) == Phase.RECOVER, "a load is a contact"
+
+
+def test_a_load_before_the_touchdown_counts_for_nothing():
+    bench = make()
+    run(bench, LIFT_OFF)
+    bench.set("load", loaded=True)
+    run(bench, TOUCHDOWN - 0.1, active=False)
+    assert phase(bench) == Phase.FLIGHT
+    assert not bench.get("phase").stance.any()
+
+
+def test_a_foot_whose_first_contact_is_an_edge_stands_by_its_load():
+    right = [True, True, False, False]
+    bench = make()
+    land(bench, right)
+    assert stance_with(bench, right, [0.0, 0.0, 0.02, 0.02], [True, False]) == right
+    assert stance_with(bench, right, [0.0, 0.0, 0.02, 0.02], [True, True]) == [True] * 4
