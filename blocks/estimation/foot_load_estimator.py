@@ -1,10 +1,11 @@
-"""Finds from the legs' torques which feet carry load, and where on their soles."""
+"""Finds from the legs' torques which feet carry load, and which of their points stand."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from ...mathematics.arrays import Array1D
+from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import solve_positive
@@ -13,7 +14,7 @@ from ...robots.limb import chain_to
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, FootLoad, JointState
+from ..signals import ContactState, DynamicsTerms, FootLoad, JointState, Phase, PhaseState
 
 _DAMPING = 1e-6
 """Added to the squared lever arms [m^2] of the joints, so that a straight leg has a finite inverse."""
@@ -24,6 +25,12 @@ class FootLoadMemory(Signal):
 
     force = Field(("n_contacts", 3), unit="N", frame="world", text="of each point, filtered")
     loaded = Field("n_feet", dtype="bool", text="whether each foot carries load")
+    touched = Field(
+        "n_contacts", dtype="bool", text="whether each point has touched while its foot stands"
+    )
+    ground = Field(
+        "n_contacts", unit="m", frame="world", text="the lowest height it has had since then"
+    )
 
 
 class FootLoadConstants(Signal):
@@ -60,9 +67,15 @@ class FootLoadEstimator(Block):
     the points, weighted by their upward forces and within the span of the points. A foot is ``loaded``
     from where its force exceeds ``begin`` weights of the robot until it falls below ``end``.
 
+    **Contacts.** After a touchdown a loaded foot may stand on an edge between its points. Load anywhere
+    between toe and heel is a sum of loads at both, so then the points count as in contact that are less than
+    ``flat_height`` above where they have touched since the foot came down, or, before they have, above where
+    its other points have. If none has touched, all count: the foot has come down on the edge. Points with a
+    closed switch stay in contact, and before the touchdown only they are.
+
     The joints' accelerations and friction are left out, so the force is wrong for some milliseconds after
-    an impact, and by what friction holds: confirm a touchdown by switches. The load of feet of one
-    contact point is found as well; a leg stretched straight shows no load along itself.
+    an impact, and by what friction holds. A leg that is stretched straight shows no load along itself. The block
+    does not find where under the sole the ground is.
     """
 
     class Params(Parameters):
@@ -75,6 +88,10 @@ class FootLoadEstimator(Block):
         end: float = live_parameter(
             0.1, gt=0.0, le=1.0, text="force below which it is not, likewise"
         )
+        flat_height: float = live_parameter(
+            0.006, unit="m", ge=0.0,
+            text="height above where it has touched up to which a point of a loaded foot is in contact",
+        )  # fmt: skip
 
     Constants = FootLoadConstants
     Scratch = FootLoadScratch
@@ -83,8 +100,13 @@ class FootLoadEstimator(Block):
     constants: FootLoadConstants
     terms = Input(DynamicsTerms, text="the model's terms")
     joints = Input(JointState, text="measured torques")
+    switches = Input(ContactState, text="which points have contact by their switches")
+    phase = Input(PhaseState, text="the phase, of the tick before")
     load = Output(FootLoad, text="force and centre of pressure of every foot")
-    memory = State(FootLoadMemory, text="the filter")
+    contacts = Output(
+        ContactState, text="which points have contact by switches or by their foot's load"
+    )
+    memory = State(FootLoadMemory, text="the filter, and where points have touched")
 
     @classmethod
     def state_dimensions(
@@ -112,8 +134,12 @@ class FootLoadEstimator(Block):
     def step(
         terms: DynamicsTerms,
         joints: JointState,
+        switches: ContactState,
+        phase: PhaseState,
         load: FootLoad,
+        contacts: ContactState,
         memory: FootLoadMemory,
+        params: Params,
         constants: FootLoadConstants,
         scratch: FootLoadScratch,
     ) -> None:
@@ -125,6 +151,12 @@ class FootLoadEstimator(Block):
             threshold = constants.least[0] if memory.loaded[foot] else constants.least[1]
             memory.loaded[foot] = load.force[foot] > threshold
             load.loaded[foot] = memory.loaded[foot]
+        contacts.active[:] = switches.active
+        if phase.phase < Phase.LANDING:
+            memory.touched[:] = False
+        else:
+            find_touched(terms, switches, memory, constants.foot_of_point)
+            add_loaded_points(terms, memory, constants.foot_of_point, params.flat_height, contacts)
 
 
 @kernel
@@ -203,3 +235,41 @@ def find_centre(
         if constants.foot_of_point[point] == foot:
             share = max(memory.force[point, 2], 0.0) / positive if positive > 0.0 else 1.0 / count
             load.centre[foot, :] += share * terms.contact_position[point]
+
+
+@kernel
+def find_touched(
+    terms: DynamicsTerms, switches: ContactState, memory: FootLoadMemory, foot: Indices1D
+) -> None:
+    """Note where the points of the feet that stand have touched, and forget it for the others."""
+    for i in range(foot.shape[0]):
+        stands = bool(memory.loaded[foot[i]])
+        for j in range(foot.shape[0]):
+            stands = stands or (foot[j] == foot[i] and switches.active[j])
+        known, height = memory.touched[i], terms.contact_position[i, 2]
+        memory.touched[i] = stands and (known or switches.active[i])
+        # A contact lasts longer than its switch is closed, so a point may have left the ground already.
+        if switches.active[i] and not (known and memory.ground[i] < height):
+            memory.ground[i] = height
+
+
+@kernel
+def add_loaded_points(
+    terms: DynamicsTerms,
+    memory: FootLoadMemory,
+    foot: Indices1D,
+    flat_height: float,
+    contacts: ContactState,
+) -> None:
+    """Add to the ``contacts`` the points of loaded feet that are near the ground under them."""
+    for i in range(foot.shape[0]):
+        if not memory.loaded[foot[i]]:
+            continue
+        ground = memory.ground[i]
+        if not memory.touched[i]:
+            ground = math.inf
+            for j in range(foot.shape[0]):
+                if foot[j] == foot[i] and memory.touched[j]:
+                    ground = min(ground, memory.ground[j])
+        if terms.contact_position[i, 2] < ground + flat_height:
+            contacts.active[i] = True

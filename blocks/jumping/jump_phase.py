@@ -20,15 +20,7 @@ from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import (
-    ContactState,
-    DelayEstimate,
-    DynamicsTerms,
-    FootLoad,
-    JumpReference,
-    Phase,
-    PhaseState,
-)
+from ..signals import ContactState, DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 
 
 class PhaseCondition(IntEnum):
@@ -157,12 +149,6 @@ class PhaseMemory(Signal):
     unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
     stood = Field(unit="s", text="how long all points have had contact")
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
-    touched = Field(
-        "n_contacts", dtype="bool", text="whether each point has touched while its foot stands"
-    )
-    ground = Field(
-        "n_contacts", unit="m", frame="world", text="the lowest height it has had since then"
-    )
 
 
 class JumpPhase(Block):
@@ -194,10 +180,7 @@ class JumpPhase(Block):
     that had contact within the last ``contact_hold``, and points of the same foot that are less
     than ``flat_height`` above the lowest of these; if there is none they stay those of the tick
     before. A landing without any contact so far begins with all points. (A controller that may push with a heel slightly above the ground brings it down by
-    that; otherwise the robot would rock on its toes.) A foot that is ``load.loaded`` by the torques of its leg may
-    stand on an edge between its points, where no switch is: then also those of its points are in stance that are
-    less than ``flat_height`` above where they have touched since it came down, or, before they have, above where
-    its other points have; all of them, if none has. After touchdown a load is a contact.
+    that; otherwise the robot would rock on its toes.)
 
     The time s to touchdown is that of the ballistic fall of the measured centre of mass to its
     planned height at touchdown: z + v s - g s^2 / 2 = z_td.
@@ -282,7 +265,6 @@ class JumpPhase(Block):
     contacts = Input(ContactState, text="which points carry load")
     terms = Input(DynamicsTerms, text="the present state")
     delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
-    load = Input(FootLoad, default={}, text="which feet carry load by the torques of their legs")
     phase = Output(PhaseState, text="the phase, its times and the stance points")
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
@@ -309,7 +291,6 @@ class JumpPhase(Block):
         contacts: ContactState,
         terms: DynamicsTerms,
         delay: DelayEstimate,
-        load: FootLoad,
         phase: PhaseState,
         memory: PhaseMemory,
         params: Params,
@@ -338,8 +319,6 @@ class JumpPhase(Block):
             )  # fmt: skip
         times[NOW], times[IN_PHASE] = now, now - memory.began
         times[LIFT_OFF], times[TOUCHDOWN] = lift_off, touchdown
-        if before >= Phase.LANDING and carries_load(load):
-            shortest = 0.0
         if before == Phase.LANDING:  # it may have begun without a contact, after a long flight
             shortest = min(shortest, times[IN_PHASE])
         times[REMAINING], times[UNLOADED], times[AHEAD] = remaining, shortest, delay.ahead
@@ -355,13 +334,6 @@ class JumpPhase(Block):
             after, reference.contact, memory.unloaded, params.contact_hold,
             terms.contact_position, constants.foot_of_point, params.flat_height, memory.stance,
         )  # fmt: skip
-        if after < Phase.LANDING:
-            memory.touched[:] = False
-        else:
-            add_loaded_points(
-                contacts.active, load, terms.contact_position, constants.foot_of_point,
-                params.flat_height, memory,
-            )  # fmt: skip
         phase.phase = after
         phase.time_in_phase = now - memory.began
         phase.time_to_touchdown = remaining if after == Phase.FLIGHT else 0.0
@@ -370,51 +342,6 @@ class JumpPhase(Block):
         phase.stance[:] = memory.stance
         phase.stepping[:] = False  # steps are for CaptureStep to take
         phase.step_acceleration[:] = 0.0
-
-
-@kernel
-def carries_load(load: FootLoad) -> bool:
-    """Whether any foot carries load by the torques of its leg."""
-    found = False
-    for foot in range(load.loaded.shape[0]):
-        found = found or bool(load.loaded[foot])
-    return found
-
-
-@kernel
-def add_loaded_points(
-    active: Flags1D,
-    load: FootLoad,
-    position: Rows3,
-    foot: Indices1D,
-    flat_height: float,
-    memory: PhaseMemory,
-) -> None:
-    """Put into the stance the points of loaded feet that are near the ground under them.
-
-    That ground is where a point has touched since its foot came down, or as high as that under the other points of its foot. All
-    points of a loaded foot that has not touched are in stance: it has come down on an edge between them.
-    """
-    for i in range(foot.shape[0]):
-        stands = bool(load.loaded[foot[i]])
-        for j in range(foot.shape[0]):
-            stands = stands or (foot[j] == foot[i] and active[j])
-        known = memory.touched[i]
-        memory.touched[i] = stands and (known or active[i])
-        # A contact lasts longer than its switch is closed, so a point may have left the ground already.
-        if active[i] and not (known and memory.ground[i] < position[i, 2]):
-            memory.ground[i] = position[i, 2]
-    for i in range(foot.shape[0]):
-        if not load.loaded[foot[i]]:
-            continue
-        ground, known = memory.ground[i], memory.touched[i]
-        if not known:
-            ground = math.inf
-            for j in range(foot.shape[0]):
-                if foot[j] == foot[i] and memory.touched[j]:
-                    ground = min(ground, memory.ground[j])
-        if position[i, 2] < ground + flat_height:
-            memory.stance[i] = True
 
 
 @kernel
