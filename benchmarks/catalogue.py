@@ -59,6 +59,8 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "loss": ("link_delays",),
     "tsid": ("tick",),
     "since": ("tick",),
+    "arms": ("real_robot",),
+    "asked": ("real_robot",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""
 
