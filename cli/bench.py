@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FROM_SOURCE = f"""the benchmarks are not in the wheel; install aloft from its source instead:
-    pip download --no-deps --no-binary aloft aloft=={__version__}
-    tar xzf aloft-{__version__}.tar.gz
-    pip install --editable aloft-{__version__}
+    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
+    tar xzf aloft_robotics-{__version__}.tar.gz
+    pip install --editable aloft_robotics-{__version__}
 or, in a clone of the repository: pip install --editable ."""
 
 

@@ -64,12 +64,12 @@ def export(
     mcap: Annotated[
         bool,
         typer.Option(
-            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft[mcap]'."
+            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'."
         ),
     ] = False,
     bag: Annotated[
         bool,
-        typer.Option("--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft[mcap]'."),
+        typer.Option("--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft-robotics[mcap]'."),
     ] = False,
     signal: Annotated[
         list[str] | None,

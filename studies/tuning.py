@@ -329,7 +329,7 @@ def _optuna_study(seed: int, arm: Arm) -> OptunaStudy:
     try:
         import optuna
     except ImportError:
-        raise AloftError("aloft tune needs Optuna: pip install 'aloft[tune]'") from None
+        raise AloftError("aloft tune needs Optuna: pip install 'aloft-robotics[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     name = int.from_bytes(hashlib.sha256(f"{seed} {arm.name}".encode()).digest()[:4], "big")
     sampler = optuna.samplers.TPESampler(seed=name, constant_liar=True)

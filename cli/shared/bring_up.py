@@ -32,6 +32,9 @@ def bring_up(
         str | None,
         typer.Option("--from", help="The step to begin with; else behind the last that passed."),
     ] = None,
+    last: Annotated[
+        str | None, typer.Option("--to", help="The step to end with; else the last of all.")
+    ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Ask nobody: only where both ports are `twin`.")
     ] = False,
@@ -45,7 +48,7 @@ def bring_up(
         record = BringUpRecord(file)
         entries: list[dict[str, Any]] = []
         try:
-            for entry in walk(session, record, first, _announce):
+            for entry in walk(session, record, first, last, _announce):
                 entries.append(entry)
                 _tell(entry)
         except UnknownStepError as error:
@@ -58,7 +61,8 @@ def bring_up(
         elif not passed:
             raise AloftError(f"step {entries[-1]['step']} did not pass; mend it, and go on from it")
         else:
-            _say("all steps passed: go on with the first jump of docs/bring_up.md")
+            what = "all steps passed" if last is None else f"all steps up to {last} passed"
+            _say(f"{what}: go on with docs/bring_up.md")
 
 
 def _say(text: str) -> None:

@@ -373,9 +373,9 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise ExportError("MCAP needs the library mcap; pip install 'aloft[mcap]'") from None
+        raise ExportError("MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'") from None
     if find_spec("rosbags") is None:
-        raise ExportError("MCAP needs the library rosbags; pip install 'aloft[mcap]'")
+        raise ExportError("MCAP needs the library rosbags; pip install 'aloft-robotics[mcap]'")
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)
@@ -413,7 +413,7 @@ def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
         OSError: the folder cannot be written.
     """
     if find_spec("rosbags") is None:
-        raise ExportError("a bag needs the library rosbags; pip install 'aloft[mcap]'")
+        raise ExportError("a bag needs the library rosbags; pip install 'aloft-robotics[mcap]'")
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 

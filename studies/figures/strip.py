@@ -2,7 +2,7 @@
 
 Pictures of the simulated robot without a screen: MuJoCo's renderer on EGL.
 
-Needs PyOpenGL (``pip install 'aloft[pictures]'``) and, on Linux, a driver for OpenGL without a
+Needs PyOpenGL (``pip install 'aloft-robotics[pictures]'``) and, on Linux, a driver for OpenGL without a
 screen; Mesa's does it on the processor: ``apt-get install libegl1 libgl1-mesa-dri``.
 """
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Pixels = NDArray[np.uint8]
 
 REMEDY = (
-    "pip install 'aloft[pictures]' and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
+    "pip install 'aloft-robotics[pictures]' and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
     "figures of frames are left out without"
 )
 PAINT = {

@@ -118,7 +118,7 @@ def answer(keyboard: Keyboard, monkeypatch: pytest.MonkeyPatch, answers: dict[st
 def walk(file: Path, first: str | None = None) -> int:
     """Run the verb; gives its exit code."""
     try:
-        verb.bring_up(file, first, False, False)
+        verb.bring_up(file, first, None, False, False)
     except typer.Exit as left:
         return left.exit_code
     return 0

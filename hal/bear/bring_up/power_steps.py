@@ -20,7 +20,7 @@ from ..bus import BusError
 from ..driver import DriveLaw, Driver
 from ..protocol import Torque
 from .air_identification import AirMotion, identify_in_air, joint_inertia
-from .session import Request, Session, StepReport
+from .session import LetGoError, Request, Session, StepReport, go_on
 
 SHARE = 0.01
 """The share of its current limit with which a motor is tried at first."""
@@ -70,6 +70,8 @@ def check_currents(session: Session) -> StepReport:
         for name in session.motors:
             try:
                 turned[name] = _push(session, name, next_cycle)
+            except LetGoError:
+                raise
             except BusError as error:
                 report.add(
                     f"motors.{name}", "a drive that follows a small current", str(error),
@@ -106,17 +108,12 @@ def _push(session: Session, name: str, next_cycle: Callable[[], bool]) -> float:
                 session.board.poll()
                 if abs(drive.position.item(0) - start) > 2.0 * TURNED:
                     break
-                _go_on(next_cycle)
+                go_on(next_cycle)
             total += way * (drive.position.item(0) - start)
             while abs(drive.velocity.item(0)) > 0.2:  # it coasts to rest
                 drive.exchange()
-                _go_on(next_cycle)
+                go_on(next_cycle)
     return total
-
-
-def _go_on(next_cycle: Callable[[], bool]) -> None:
-    if not next_cycle():
-        raise BusError("the dead man's switch was let go")
 
 
 def check_watchdogs(session: Session) -> StepReport:
@@ -140,8 +137,10 @@ def check_watchdogs(session: Session) -> StepReport:
                     for _ in range(math.ceil(silent / hardware.bus.period)):
                         reading.exchange()
                         session.board.poll()
-                        _go_on(next_cycle)
+                        go_on(next_cycle)
                     state = session.bus.read(device, "torque_enable")["torque_enable"]
+            except LetGoError:
+                raise
             except BusError as error:
                 report.add(f"motors.{name}", "a drive that answers", str(error), "check its cable")
                 continue
@@ -170,6 +169,8 @@ def check_motors(session: Session) -> StepReport:
         for j, joint in enumerate(robot.joints):
             try:
                 motions.append(_wave(session, j, next_cycle))
+            except LetGoError:
+                raise
             except BusError as error:
                 report.add(
                     joint.name, "a joint that follows two waves", str(error),
@@ -256,7 +257,7 @@ def _wave(session: Session, j: int, next_cycle: Callable[[], bool]) -> AirMotion
                 motion.torque[k] = hardware.torque_constants(robot) * drives.current
                 motion.rate[k] = to_base @ session.board.angular_velocity
                 motion.force[k] = to_base @ session.board.specific_force
-            _go_on(next_cycle)
+            go_on(next_cycle)
     return motion
 
 
@@ -281,8 +282,10 @@ def hold_in_the_air(session: Session) -> StepReport:
                 if loop.fault:
                     raise BusError(loop.fault)
                 speed[k] = loop.measured.velocity
-                _go_on(next_cycle)
+                go_on(next_cycle)
             error[:] = loop.measured.position - loop.target
+    except LetGoError:
+        raise
     except BusError as error_text:
         report.add(
             "drives", "drives that hold the standing pose in the air", str(error_text),
@@ -311,7 +314,13 @@ def hold_in_the_air(session: Session) -> StepReport:
 
 
 def _hang(session: Session, report: StepReport) -> bool:
-    """Have the robot hung up, with all drives in damping; says whether they are."""
+    """Have the robot hung up, with all drives in damping; says whether they are, and may be switched on."""
+    missing = session.hardware.missing_calibration()
+    if missing:
+        report.add(
+            "motors", "zero and limits before power", "; ".join(missing), "--from zero"
+        )  # fmt: skip
+        return False
     session.do(
         Request(
             "hang", "",

@@ -16,7 +16,7 @@ import yaml
 
 from ....mathematics.arrays import Array
 from ....robots.robot_description import RobotDescription
-from ..bus import BearBus
+from ..bus import BearBus, BusError
 from ..configuration import Hardware
 from ..sense_board import SenseBoard
 
@@ -86,6 +86,20 @@ class StepReport:
     def add(self, place: str, expected: str, found: str, fix: str, mended: bool = False) -> None:
         """Note a discrepancy."""
         self.discrepancies.append(Discrepancy(place, expected, found, fix, mended))
+
+
+class LetGoError(BusError):
+    """Somebody let go of the dead man's switch."""
+
+
+def go_on(next_cycle: Callable[[], bool]) -> None:
+    """Wait for the next cycle.
+
+    Raises:
+        LetGoError: the dead man's switch is not held.
+    """
+    if not next_cycle():
+        raise LetGoError("the dead man's switch was let go")
 
 
 class Devices(NamedTuple):

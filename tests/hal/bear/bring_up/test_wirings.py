@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from aloft.hal.bear.bring_up.session import BringUpRecord, Session
 from aloft.hal.bear.bring_up.steps import STEPS
 from aloft.hal.bear.bring_up.walk import UnknownStepError, steps_from, walk
 from aloft.hal.bear.configuration import Hardware
+from aloft.hal.bear.protocol import Torque
 from aloft.hal.twin.by_hand import STEADY, HandErrors, RobotByHand
 from aloft.hal.twin.wiring import Wiring
 from aloft.robots.description import find_robot
@@ -161,12 +163,7 @@ def session_with(
 
 def walked(session: Session, last: str, first: str | None = None) -> list[dict[str, Any]]:
     """The entries up to the step ``last``."""
-    entries = []
-    for entry in walk(session, BringUpRecord(session.file), first):
-        entries.append(entry)
-        if entry["step"] == last:
-            break
-    return entries
+    return list(walk(session, BringUpRecord(session.file), first, last))
 
 
 def assert_found(entries: list[dict[str, Any]], step: str, text: str) -> None:
@@ -201,6 +198,29 @@ def test_it_is_found_under_power(name: str, tmp_path: Path) -> None:
     change(wiring)
     entries = walked(session_with(wiring, tmp_path, 3, HandErrors()), step, "current")
     assert_found(entries, step, text)
+
+
+@pytest.mark.long
+def test_who_lets_go_of_the_switch_ends_the_step_in_damping(tmp_path: Path) -> None:
+    session = session_with(Wiring.of(ROBOT), tmp_path)
+    held = iter([True] * 40)
+    session._hold = lambda hardware: nullcontext(lambda: next(held, False))
+    (entry,) = walked(session, "watchdog", "current")
+    (found,) = entry["discrepancies"]
+    assert found["place"] == "dead man's switch" and "was let go" in found["found"]
+    assert entry["values"] == {}
+    twin = session.operator.twin  # type: ignore[attr-defined]
+    assert {drive.status["torque_enable"] for drive in twin.actuators} == {Torque.DAMPING}
+
+
+def test_no_power_before_zero_and_limits(tmp_path: Path) -> None:
+    session = session_with(Wiring.of(ROBOT), tmp_path)
+    session.write({"left_knee_motor": {"offset": None}})
+    for step in ("current", "watchdog", "motors", "gains"):
+        (entry,) = walked(session, step, step)
+        (found,) = entry["discrepancies"]
+        assert "left_knee_motor: not calibrated" in found["found"]
+    assert session.operator.twin is None  # type: ignore[attr-defined]
 
 
 @pytest.mark.long
