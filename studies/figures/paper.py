@@ -16,7 +16,8 @@ import numpy as np
 from ...robots.description import find_robot
 from ..expansion import load_cell
 from .curves import draw_jump, draw_push, jump_numbers, push_numbers
-from .strip import Moment, Motion, NoRendererError, View, draw_strip, moments_of
+from .offscreen import NoRendererError, View
+from .strip import Moment, Motion, draw_strip, moments_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
