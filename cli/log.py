@@ -64,12 +64,15 @@ def export(
     mcap: Annotated[
         bool,
         typer.Option(
-            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'."
+            "--mcap",
+            help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'.",
         ),
     ] = False,
     bag: Annotated[
         bool,
-        typer.Option("--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft-robotics[mcap]'."),
+        typer.Option(
+            "--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft-robotics[mcap]'."
+        ),
     ] = False,
     signal: Annotated[
         list[str] | None,

@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+import yaml
 
 import aloft
 
@@ -93,6 +94,9 @@ def test_the_source_distribution_has_what_the_benchmarks_need(
 
 def test_one_version() -> None:
     assert PROJECT["project"]["version"] == aloft.__version__ == metadata.version("aloft-robotics")
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == aloft.__version__
+    major = aloft.__version__.rpartition(".")[0]
+    assert f"| {major} | yes |" in (ROOT / "SECURITY.md").read_text()
 
 
 def loaded_by(code: str) -> set[str]:

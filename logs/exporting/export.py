@@ -373,7 +373,9 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise ExportError("MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'") from None
+        raise ExportError(
+            "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"
+        ) from None
     if find_spec("rosbags") is None:
         raise ExportError("MCAP needs the library rosbags; pip install 'aloft-robotics[mcap]'")
     ports: dict[str, list[RecordedField]] = {}
