@@ -63,6 +63,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "since": ("tick",),
     "arms": ("real_robot",),
     "asked": ("real_robot",),
+    "harder": ("jumps",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""
 
