@@ -77,7 +77,8 @@ class HopPlanner:
     ) -> HopPlan:
         row = self.samples.nearest(wanted)
         done = HopRequest(*self.samples.requests[row].tolist())
-        plan = self.samples.plan(row)
+        stored = self.samples.plan(row)
+        plan = replace(stored, task=coarse(stored.task.resolved(self.robot)))
         return HopPlan(plan, done, outcome, iterations, failed, solve_s, check_s)
 
     def _solve(self, wanted: HopRequest) -> tuple[PlannedJump | None, int, float]:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
@@ -68,8 +69,12 @@ class PlanSamples:
         return int(square.argmin())
 
     def plan(self, row: int) -> PlannedJump:
-        """One of the plans."""
-        return self._make(HopRequest(*self.requests[row].tolist()), np.eye(len(self.requests))[row])
+        """One of the plans. Its flight begins and ends at knots, whose times are in single precision."""
+        weights = np.eye(len(self.requests))[row]
+        plan = self._make(HopRequest(*self.requests[row].tolist()), weights)
+        flying = np.flatnonzero(plan.phase == Phase.FLIGHT)
+        lift_off, touchdown = plan.time[[flying[0], flying[-1] + 1]].tolist()
+        return replace(plan, lift_off_time=lift_off, touchdown_time=touchdown)
 
     def interpolated(self, wanted: HopRequest) -> PlannedJump:
         """A motion near the plan of a request. It obeys no law of motion exactly."""
