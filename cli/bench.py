@@ -67,7 +67,10 @@ def bench(
         int | None, typer.Option(help="The seed by which they are drawn.", min=0)
     ] = None,
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the trial for 'frontier', 'link_delays' and 'real_robot'.")
+        str,
+        typer.Option(
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot' and 'courses'."
+        ),
     ] = "",
     jitter: Annotated[
         str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")
@@ -88,6 +91,10 @@ def bench(
     asked: Annotated[
         str, typer.Option(help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'.")
     ] = "",
+    harder: Annotated[
+        bool,
+        typer.Option("--harder", help="Draw the tasks of 'jumps' as far as jumps land at all."),
+    ] = False,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
@@ -111,6 +118,7 @@ def bench(
             "since": since or None,
             "arms": _names(arms),
             "asked": _names(asked),
+            "harder": harder or None,
         }
         given = {option: value for option, value in options.items() if value is not None}
         for option in given:

@@ -202,6 +202,7 @@ def definition(study: Study) -> str:
     tuning = study.tuning
     searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
     searched += [path.name for path in study.include]
+    searched += [[arm.name, path.name] for arm in study.arms for path in arm.include]
     searched += [[c.task, c.graph.name, c.arm, c.overrides] for c in tuning_cells(study)]
     searched += [
         [arm.name, each.key, each.unit, each.log, *map(list, each.bounds), *each.choices]

@@ -145,6 +145,24 @@ def run_alone(name, robot, **parameters):
     bench.close()
 
 
+def steer_alone():
+    """A jump that is commanded, and its judgement, without a planner."""
+    bruce = find_robot("bruce")
+    plan = BlockBench(
+        find_block("blocks.SteeredPlan"), {"settle_time": 0.001}, robot=bruce, plain=True
+    )
+    score = BlockBench(find_block("blocks.CourseScore"), robot=bruce, plain=True)
+    plan.set("terms", foot_rotation=np.tile(np.eye(3), (2, 1, 1)))
+    plan.set("command", number=1, ahead=0.1)
+    plan.set("part", number=1, parts=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2)
+    score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
+    for tick in range(400):
+        plan.step()
+        score.set("goal", number=int(tick >= 10))
+        score.set("truth", contact_touched=np.full(4, not 20 <= tick < 80))
+        score.step()
+
+
 @pytest.fixture(scope="module")
 def calls():
     """For every kernel the arguments of some of its calls, during a jump or in a block by itself."""
@@ -193,7 +211,7 @@ def calls():
                     patch.setattr(module, key, called)
                 elif id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
-        run_jump()
+        run_jump({"step.seek_speed": 1.0})
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         run_jump({**other, "wbc.solver": "daqp"}, duration=0.1)
         other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
@@ -204,6 +222,7 @@ def calls():
         run_jump(weak, duration=0.1)
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
         run_jump({"robot.motor_model.load_friction": 0.05}, 0.02, "from_gantry.yaml")
+        steer_alone()
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
         run_alone("blocks.SensorAlignment", find_robot("bruce"), play=0.01, **mounted)

@@ -185,7 +185,7 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
 
 def scene_of(cell: Cell) -> Terrain:
     """The ground that a cell's simulated robot jumps on."""
-    checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin).checked
+    checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin, cell.behind).checked
     params: Any = next(spec.params for spec in checked.blocks if spec.path == "robot")
     scene: Terrain = params.build_scene(None)
     return scene
