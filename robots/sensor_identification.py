@@ -195,7 +195,7 @@ def _encoders(
     prior = np.array([0.01, *np.tile([0.01, 0.004, 0.004], n)])
     normal, right, squares = np.diag(prior**-2.0), np.zeros(count), 0.0
     for joint in range(n):
-        rows = np.zeros((len(at), count))
+        rows: Array = np.zeros((len(at), count))
         rows[:, 0] = smoothed[at, joint]
         own = 1 + 3 * joint
         rows[:, own] = 0.5 * ends[at, joint]
