@@ -195,7 +195,7 @@ def _encoders(
     prior = np.array([0.01, *np.tile([0.01, 0.004, 0.004], n)])
     normal, right, squares = np.diag(prior**-2.0), np.zeros(count), 0.0
     for joint in range(n):
-        rows: Array = np.zeros((len(at), count))
+        rows = np.zeros((len(at), count))
         rows[:, 0] = smoothed[at, joint]
         own = 1 + 3 * joint
         rows[:, own] = 0.5 * ends[at, joint]
@@ -205,7 +205,8 @@ def _encoders(
         errors: Array = noise[joint] ** 2 * walk + np.diag(seat[:, joint] ** 2 + RESOLVED**2)
         # angle and integral have no common zero: a constant may be anything
         white = np.linalg.cholesky(errors + (left.max() - left.min() + 1.0) ** 2)
-        rows, left = np.linalg.solve(white, rows), np.linalg.solve(white, left - left.mean())
+        unit = np.linalg.solve(white, np.column_stack([rows, left - left.mean()]))
+        rows, left = unit[:, :-1], unit[:, -1]
         own_normal = rows.T @ rows + np.diag(prior**-2.0)
         found = np.linalg.solve(own_normal, rows.T @ left)
         size = max(1.0, float(np.mean((left - rows @ found) ** 2)))
