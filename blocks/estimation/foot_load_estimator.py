@@ -10,7 +10,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import solve_positive
 from ...robots.description import RobotDescription
-from ...robots.limb import chain_to
+from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
@@ -114,15 +114,12 @@ class FootLoadEstimator(Block):
     ) -> Mapping[str, int]:
         """The number of joints of the longest leg."""
         assert robot is not None
-        return {"n_leg_joints": max(len(chain_to(robot, foot.link)) for foot in robot.feet)}
+        return {"n_leg_joints": leg_joints(robot).shape[1]}
 
     def setup(self) -> None:
         robot, constants = self.robot, self.constants
         constants.foot_of_point[:] = robot.foot_of_contact()
-        constants.leg_joints[:] = -1
-        for foot, joints in zip(robot.feet, constants.leg_joints, strict=True):
-            chain = chain_to(robot, foot.link)
-            joints[: len(chain)] = chain
+        constants.leg_joints[:] = leg_joints(robot)
 
     def prepare(self) -> None:
         p, weight = self.params, self.robot.total_mass * GRAVITY

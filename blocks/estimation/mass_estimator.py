@@ -25,7 +25,7 @@ from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector, solve_rows
 from ...mathematics.rotations import skew
 from ...robots.description import RobotDescription
-from ...robots.limb import chain_to
+from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.per_joint import PerJoint
@@ -201,7 +201,7 @@ class MassEstimator(Block):
     ) -> Mapping[str, int]:
         """The number of unknowns, and of the joints of the longest leg."""
         assert robot is not None
-        longest = max(len(chain_to(robot, foot.link)) for foot in robot.feet)
+        longest = leg_joints(robot).shape[1]
         return {"n_unknowns": FRICTION + len(robot.joints), "n_leg_joints": longest}
 
     def setup(self) -> None:
@@ -211,10 +211,7 @@ class MassEstimator(Block):
         constants.friction[:] = robot.motors.friction + self.params.friction.resolve(robot)
         constants.damping[:] = robot.motors.damping + self.params.damping.resolve(robot)
         constants.foot_of_point[:] = robot.foot_of_contact()
-        constants.leg_joints[:] = -1
-        for foot, joints in zip(robot.feet, constants.leg_joints, strict=True):
-            chain = chain_to(robot, foot.link)
-            joints[: len(chain)] = chain
+        constants.leg_joints[:] = leg_joints(robot)
 
     def prepare(self) -> None:
         p, constants, period = self.params, self.constants, self.period
