@@ -11,7 +11,7 @@
 set -e
 cd "$(dirname "$0")/.."
 which=$1
-limit=${LIMIT:-300}
+limit=${LIMIT:-600}
 version='import sys; print("%d.%d" % sys.version_info[:2])'
 ours=$(.venv/bin/python -c "$version")
 

@@ -55,6 +55,11 @@ class SwayReference(GuidedReference):
 
     params: Params
 
+    @classmethod
+    def example_parameters(cls) -> dict[str, object]:
+        """A short sway, as its table takes a while."""
+        return {"sway_time": 3.0}
+
     def make_table(self) -> JumpTable:
         """The stance and the motion after it."""
         p = self.params
