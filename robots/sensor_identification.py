@@ -28,7 +28,7 @@ from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
 from .transmission import PLAY_TIME, PLAY_TORQUE
 
-CUTOFF = 12.0
+CUTOFF = 6.0
 """Of the filter that all signals pass [Hz]."""
 EDGE = 0.3
 """The time at both ends that the filter spoils [s]."""
@@ -37,7 +37,21 @@ ROUNDS = 2
 CORRELATED = 3.0 / (2.0 * CUTOFF)
 """Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
 cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
-LEAST_AGE, LEAST_PLAY = 3e-4, 1.5e-3
+ITERATIONS = 8
+"""Of a fit, as the weights follow from what is left."""
+TYPICAL = 1.4826
+"""The standard deviation of normal numbers over the median of their sizes."""
+OUTLYING = 1.5
+"""Ticks with errors beyond so many standard deviations count less, as when a foot rocks on the ground."""
+NOISE_CUTOFF = 20.0
+"""Above this velocities are noise alone [Hz]."""
+SAMPLED = 0.02
+"""The time between samples of the angles that are fitted [s]."""
+HIDDEN_TORQUE = 0.1
+"""Torque that currents do not tell, such as ripple [N m]: with no more than this a rotor may be anywhere in its play."""
+USUAL_PLAY, RESOLVED = 0.01, 2e-4
+"""The play by which the error of an unseated rotor is weighted, and what an encoder tells at best [rad]."""
+LEAST_AGE, LEAST_PLAY = 1.5e-4, 1.5e-3
 """No age [s] and no play [rad] is claimed to be known better."""
 
 
@@ -154,31 +168,57 @@ def play_positions(torque: Array, period: float) -> Array:
 def _encoders(
     robot: RobotDescription, motion: MeasuredRun, span: slice
 ) -> tuple[dict[str, Estimate], Estimate, float]:
-    """The play of every joint and the age of the velocities beside the angles, and what is left [rad/s]."""
+    """The play of every joint and the age of the velocities beside the angles, and what is left [rad/s].
+
+    The angles less the integrated velocities are fitted. Noise of the velocities makes a random walk of them; where
+    a torque is so small that what is not measured of it may move the rotor across its play, they are
+    uncertain. So the errors have a known covariance, by which the equations are whitened.
+    """
     period, n = motion.period, len(robot.joints)
-    angle = smooth(motion.position[span], period)
-    speed = smooth(motion.velocity[span], period)
-    bend = slope(speed, period)
-    crossing = slope(smooth(play_positions(motion.torque[span], period), period), period)
-    right = slope(angle, period) - speed
+    every = round(SAMPLED / period)
+    speed, angle = motion.velocity[span], motion.position[span]
+    mean = 0.5 * period * (speed[1:] + speed[:-1])
+    walked = np.concatenate([np.zeros((1, n)), np.cumsum(mean, axis=0)])
+    ends = play_positions(motion.torque[span], period)
+    torque = smooth(motion.torque[span], period)
+    smoothed = smooth(speed, period)
     inner = _inner(len(angle), period)
+    at = np.arange(inner.start, inner.stop, every)
+    seat = 0.25 * USUAL_PLAY * (
+        np.tanh((torque[at] + HIDDEN_TORQUE) / PLAY_TORQUE)
+        - np.tanh((torque[at] - HIDDEN_TORQUE) / PLAY_TORQUE)
+    )  # fmt: skip
+    noise = (speed - smooth(speed, period, NOISE_CUTOFF))[inner].std(axis=0) * math.sqrt(period)
+    time = period * (at - at[0])
+    walk = np.minimum(time[:, None], time[None, :])
     count = 1 + 3 * n
-    rows = np.zeros((inner.stop - inner.start, n, count))
-    for joint in range(n):
-        rows[:, joint, 0] = bend[inner, joint]
-        own = 1 + 3 * joint
-        rows[:, joint, own] = 0.5 * crossing[inner, joint]
-        rows[:, joint, own + 1] = np.cos(angle[inner, joint]) * speed[inner, joint]
-        rows[:, joint, own + 2] = np.sin(angle[inner, joint]) * speed[inner, joint]
     prior = np.array([0.01, *np.tile([0.01, 0.004, 0.004], n)])
-    found, covariance, left = fit(rows, right[inner], prior, period)
-    std = np.sqrt(np.diag(covariance))
+    normal, right, squares = np.diag(prior**-2.0), np.zeros(count), 0.0
+    for joint in range(n):
+        rows = np.zeros((len(at), count))
+        rows[:, 0] = smoothed[at, joint]
+        own = 1 + 3 * joint
+        rows[:, own] = 0.5 * ends[at, joint]
+        rows[:, own + 1] = np.sin(angle[at, joint])
+        rows[:, own + 2] = np.cos(angle[at, joint])
+        left = (angle - walked)[at, joint]
+        covariance = noise[joint] ** 2 * walk + np.diag(seat[:, joint] ** 2 + RESOLVED**2)
+        white = np.linalg.cholesky(covariance + (left.max() - left.min() + 1.0) ** 2)
+        rows, left = np.linalg.solve(white, rows), np.linalg.solve(white, left - left.mean())
+        own_normal = rows.T @ rows + np.diag(prior**-2.0)
+        found = np.linalg.solve(own_normal, rows.T @ left)
+        size = max(1.0, float(np.mean((left - rows @ found) ** 2)))
+        normal, right = normal + rows.T @ rows / size, right + rows.T @ left / size
+        squares += size
+    covariance = np.linalg.inv(normal)
+    found, std = covariance @ right, np.sqrt(np.diag(covariance))
     play = {
         joint.name: Estimate(
             max(0.0, float(found[1 + 3 * k])), math.hypot(std[1 + 3 * k], LEAST_PLAY)
         )
         for k, joint in enumerate(robot.joints)
     }
+    left = float(np.sqrt(squares / n) * noise.mean() / math.sqrt(period))
     return play, Estimate(float(found[0]), math.hypot(std[0], LEAST_AGE)), left
 
 
@@ -290,16 +330,19 @@ def fit(
         What was found, its covariance, and the root mean square of what is left.
     """
     weight = np.ones(right.shape[1])
+    trust = np.ones(len(right))
     share = min(1.0, period / correlated)
     found = np.zeros(rows.shape[2])
     inverse = np.diag(prior**2)
-    for _ in range(3):
+    for _ in range(ITERATIONS):
         weighted = rows / weight[:, None]
-        normal = share * np.einsum("kra,krb->ab", weighted, weighted) + np.diag(prior**-2.0)
-        inverse = np.linalg.inv(normal)
-        found = inverse @ (share * np.einsum("kra,kr->a", weighted, right / weight))
+        normal = share * np.einsum("k,kra,krb->ab", trust, weighted, weighted, optimize=True)
+        inverse = np.linalg.inv(normal + np.diag(prior**-2.0))
+        projected = np.einsum("k,kra,kr->a", trust, weighted, right / weight, optimize=True)
+        found = inverse @ (share * projected)
         left = right - rows @ found
-        weight = np.maximum(np.sqrt((left**2).mean(axis=0)), 1e-9)
+        weight = np.maximum(TYPICAL * np.median(np.abs(left), axis=0), 1e-9)
+        trust = 1.0 / (1.0 + ((left / weight) ** 2).mean(axis=1) / OUTLYING**2)
     return found, inverse, float(np.sqrt((left**2).mean()))
 
 

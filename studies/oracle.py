@@ -73,22 +73,46 @@ def _imu(
     }
 
 
+class ReadingAges(NamedTuple):
+    """By how much readings of slow motions are older than joint angles that arrive at once [s]."""
+
+    rate: float
+    force: float
+    position: float
+    velocity: float
+
+
+def reading_ages(params: SimulatorParameters) -> ReadingAges:
+    """The ages of the simulated robot's readings, exactly as it computes them.
+
+    Delays are whole steps of the physics, and filters are late by what their discrete form is late. The physics
+    is integrated semi-implicitly, q[k+1] = q[k] + T v[k+1]: velocities, and specific forces that are their
+    differences, are half a step older than the angles beside them.
+    """
+    imu, encoders, step = params.imu, params.encoders, params.timestep
+    half = 0.5 * step
+    filtered = 0.0
+    if imu.bandwidth is not None:  # of second order, maximally flat, by the bilinear transform
+        filtered = math.sqrt(0.5) * step / math.tan(math.pi * imu.bandwidth * step)
+    gyro, accelerometer = (round(each / step) * step for each in draw_delays(imu, params.seed))
+    late = round(encoders.delay / step) * step
+    time = encoders.velocity_filter
+    smoothed = step / math.expm1(step / time) if time > 0.0 else 0.0
+    return ReadingAges(
+        gyro + filtered + half, accelerometer + filtered + half, late, late + smoothed + half
+    )
+
+
 def _ages(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
     """The ages of the readings [s], and the delay that the controller must bridge."""
-    imu, encoders, band = params.imu, params.encoders, params.motors.current_bandwidth
-    gyro, accelerometer = draw_delays(imu, params.seed)
-    if imu.bandwidth is not None:  # of second order, maximally flat
-        filtered = math.sqrt(0.5) / (math.pi * imu.bandwidth)
-        gyro, accelerometer = gyro + filtered, accelerometer + filtered
-    ages = np.array([
-        gyro, accelerometer, encoders.delay, encoders.delay + encoders.velocity_filter,
-    ])  # fmt: skip
+    band = params.motors.current_bandwidth
+    ages = np.array(reading_ages(params))
     ages = np.maximum(0.0, ages + errors.age * draw.normal(size=4))
-    names = ("rate", "force", "position", "velocity")
     loop = 0.0 if band is None else 1.0 / (2.0 * math.pi * band)
-    return {f"timing.{name}": float(age) for name, age in zip(names, ages, strict=True)} | {
+    told = zip(ReadingAges._fields, ages, strict=True)
+    return {f"timing.{name}": float(age) for name, age in told} | {
         "delay.told": float(params.latency + loop + ages.max())
     }
 

@@ -14,12 +14,12 @@ import pytest
 import yaml
 
 import aloft
-from aloft.hal.simulated.imu_effects import draw_delays
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.calibration import Calibration, calibrate_robot, fragment
 from aloft.robots.description import find_robot
 from aloft.robots.identification import IdentificationError, MeasuredRun
-from aloft.robots.sensor_identification import shifted, smooth, standing_span
+from aloft.robots.sensor_identification import fit, play_positions, shifted, smooth, standing_span
+from aloft.studies.oracle import reading_ages
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
 ROBOT = find_robot("bruce")
@@ -42,11 +42,10 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
     )  # fmt: skip
     params = next(block.params for block in graph.checked.blocks if block.path == "robot")
     drawn = draw_variation(params, ROBOT)
-    gyro, _ = draw_delays(params.imu, seed)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
     return found, {
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
-        "gyro": gyro + math.sqrt(0.5) / (math.pi * params.imu.bandwidth),
+        "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
         "resistance": params.battery.resistance, "voltage": params.battery.open_voltage,
     }  # fmt: skip
@@ -60,7 +59,9 @@ def test_a_drawn_robot_is_found(seed: int) -> None:
         assert value.value == pytest.approx(place, abs=max(0.003, 3.0 * value.std))
     for value, angle in zip(found.imu_rotation, true["angle"], strict=True):
         assert value.value == pytest.approx(angle, abs=max(0.006, 3.0 * value.std))
-    assert found.gyro_age.value == pytest.approx(true["gyro"], abs=1e-3)
+    ages = true["ages"]
+    assert found.gyro_age.value == pytest.approx(ages.rate, abs=4e-4)
+    assert found.velocity_age.value == pytest.approx(ages.velocity, abs=3e-4)
     assert found.open_voltage is not None and found.resistance is not None
     assert found.open_voltage.value == pytest.approx(true["voltage"], rel=0.01)
     assert found.resistance.value == pytest.approx(true["resistance"], rel=0.1)
