@@ -33,7 +33,9 @@ from .runtime.running.stepping import SteppedRun
 try:
     import gymnasium
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError("aloft.gym needs Gymnasium: pip install 'aloft[gym]'") from error
+    raise ModuleNotFoundError(
+        "aloft.gym needs Gymnasium: pip install 'aloft-robotics[gym]'"
+    ) from error
 
 Reward = str | Callable[[SteppedRun], float]
 _MOST_SEEDS = 2**31

@@ -15,6 +15,7 @@ import numpy as np
 
 from .agreement import agreement
 from .background import background
+from .courses import courses
 from .driver import driver
 from .frontier.frontier import frontier
 from .general_blocks import general_blocks
@@ -46,19 +47,23 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "jumps": jumps,
     "real_robot": real_robot,
     "frontier": frontier,
+    "courses": courses,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays")
+LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays", "courses")
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
-    "seeds": ("frontier", "link_delays", "real_robot"),
+    "seeds": ("frontier", "link_delays", "real_robot", "courses"),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick",),
     "since": ("tick",),
+    "arms": ("real_robot",),
+    "asked": ("real_robot",),
+    "harder": ("jumps",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""
 

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 FROM_SOURCE = f"""the benchmarks are not in the wheel; install aloft from its source instead:
-    pip download --no-deps --no-binary aloft aloft=={__version__}
-    tar xzf aloft-{__version__}.tar.gz
-    pip install --editable aloft-{__version__}
+    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
+    tar xzf aloft_robotics-{__version__}.tar.gz
+    pip install --editable aloft_robotics-{__version__}
 or, in a clone of the repository: pip install --editable ."""
 
 
@@ -67,7 +67,10 @@ def bench(
         int | None, typer.Option(help="The seed by which they are drawn.", min=0)
     ] = None,
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the trial for 'frontier', 'link_delays' and 'real_robot'.")
+        str,
+        typer.Option(
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot' and 'courses'."
+        ),
     ] = "",
     jitter: Annotated[
         str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")
@@ -81,6 +84,17 @@ def bench(
     since: Annotated[
         str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")
     ] = "",
+    arms: Annotated[
+        str,
+        typer.Option(help="What robots of 'real_robot' are told, with semicolons: 'calibrated'."),
+    ] = "",
+    asked: Annotated[
+        str, typer.Option(help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'.")
+    ] = "",
+    harder: Annotated[
+        bool,
+        typer.Option("--harder", help="Draw the tasks of 'jumps' as far as jumps land at all."),
+    ] = False,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
@@ -102,6 +116,9 @@ def bench(
             "loss": _number("--loss", loss, "1", 0.999, "'5 %', less than all"),
             "tsid": tsid or None,
             "since": since or None,
+            "arms": _names(arms),
+            "asked": _names(asked),
+            "harder": harder or None,
         }
         given = {option: value for option, value in options.items() if value is not None}
         for option in given:
@@ -114,6 +131,11 @@ def bench(
         print_json(results)
     missed = any(row["met"] is False for row in results["rows"])
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missed else ExitCode.SUCCESS)
+
+
+def _names(text: str) -> list[str] | None:
+    """The names between the semicolons of an option's text; they have commas of their own."""
+    return [name.strip() for name in text.split(";")] if text else None
 
 
 def _number(option: str, text: str, unit: str, most: float, expected: str) -> float | None:

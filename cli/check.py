@@ -31,10 +31,17 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = load(graph, overrides or [])
+    warnings: list[str] = []
+    if checked.machines:
+        from ..runtime.transports.registry import open_endpoints
+
+        warnings = open_endpoints(checked.machines)
     if as_json:
-        found = {"file": str(graph), "ok": True, "count": 0, "problems": []}
+        found = {"file": str(graph), "ok": True, "count": 0, "problems": [], "warnings": warnings}
         print_json({"success": True, **found, "unchecked": list(checked.unchecked)})
     else:
+        for text in warnings:
+            typer.echo(f"warning: {text}")
         for text in checked.unchecked:
             typer.echo(f"unit not checked: {text}")
         count, machines = len(checked.blocks), len(checked.machines)

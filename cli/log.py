@@ -64,7 +64,14 @@ def export(
     mcap: Annotated[
         bool,
         typer.Option(
-            "--mcap", help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft[mcap]'."
+            "--mcap",
+            help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'.",
+        ),
+    ] = False,
+    bag: Annotated[
+        bool,
+        typer.Option(
+            "--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft-robotics[mcap]'."
         ),
     ] = False,
     signal: Annotated[
@@ -81,10 +88,13 @@ def export(
     from ..logs.recording.place import remedy
 
     with errors_reported(as_json):
-        kinds = [k for k, on in (("csv", csv), ("parquet", parquet), ("mcap", mcap)) if on]
+        asked = {"csv": csv, "parquet": parquet, "mcap": mcap, "bag": bag}
+        kinds = [kind for kind, on in asked.items() if on]
         if len(kinds) != 1:
-            raise AloftError("say one of --csv, --parquet and --mcap")
-        target = output or file.with_suffix(f".{kinds[0]}")
+            raise AloftError("say one of --csv, --parquet, --mcap and --bag")
+        # a folder that ends with .bag is taken for a file of ROS 1
+        name = f"{file.stem}_bag" if bag else f"{file.stem}.{kinds[0]}"
+        target = output or file.with_name(name)
         run = read(file)
         try:
             write_export(kinds[0], run, target, signal or ())

@@ -192,7 +192,7 @@ def plan_task(
         return row | (search_nearest(task, library, error.family, spent, screen) if nearest else {})
     row = plan_json(found, robot, library.path_of(task), kept, reason)
     row["cpu_s"] = None if kept else cpu_time() - started
-    print_plan(screen, found, tests=tests or not found.valid)
+    print_plan(screen, found, robot, tests=tests or not found.valid)
     if not found.valid:
         print_error(reason)
     if out is not None:

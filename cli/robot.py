@@ -47,6 +47,9 @@ def show(
     picture: Annotated[
         Path | None, typer.Option(help="Draw it as it stands to this .png or .svg file.")
     ] = None,
+    effects: Annotated[
+        bool, typer.Option("--effects", help="What of a real robot can be simulated, instead.")
+    ] = False,
 ) -> None:
     """Print the tree, masses, limits, motors, feet and sensors of a robot, and what is missing."""
     from ..robots.report import report
@@ -56,12 +59,27 @@ def show(
         about = report(found)
         if picture is not None:
             _draw(found, picture)
-    if as_json:
+    if effects:
+        _show_effects(about["name"], as_json)
+    elif as_json:
         print_json({"success": True, **about, "picture": str(picture) if picture else None})
     else:
         _print_robot(console(), about)
         if picture is not None:
             say(console(), f"drawn to {picture}")
+
+
+def _show_effects(name: str, as_json: bool) -> None:
+    """Print the effects that a simulated robot can have."""
+    from .shared.simulated_effects import effect_rows, simulated_effects
+
+    found = simulated_effects()
+    if as_json:
+        print_json({"success": True, "name": name, "trial": "real", "effects": found})
+        return
+    columns = ("robot.", "unit", ">default", ">trial real", "source")
+    title = f"{name}: what can be simulated of a real robot"
+    console().print(table(title, columns, list(effect_rows(found))))
 
 
 @robot.command("import")

@@ -50,10 +50,12 @@ def top(
             missing = observer.wait_for(machines, wait)
             about = report(observer)
             if as_json:
-                found = "" if not missing else f"nothing was heard of {', '.join(missing)}"
+                found = "; ".join(f"{name}: {observer.why_silent(name)}" for name in missing)
                 print_json({"success": not missing, "reason": found, "machines": about})
             else:
                 console().print(_tables(observer))
+                for machine in missing:
+                    typer.echo(f"{machine}: {observer.why_silent(machine)}", err=True)
     raise typer.Exit(ExitCode.NOT_SUCCESSFUL if missing else ExitCode.SUCCESS)
 
 

@@ -40,8 +40,6 @@ def twin(
 
     Run a graph with hal.BearRobot against it: the file that is written names the ports.
     """
-    import yaml
-
     from ..hal.bear.configuration import Hardware
     from ..hal.simulated.simulated_robot import SimulatorParameters
     from ..hal.twin.faults import read_fault
@@ -64,13 +62,8 @@ def twin(
         )
         made = standing_twin(description, params, found, faults=faults)
         with TwinServer(made, virtual=virtual, period=found.bus.period) as server:
-            data = found.model_dump(mode="json")
-            data["bus"] |= {"port": server.bus_path}
-            data["board"] |= {"port": server.board_path}
-            data["dead_man"] = {"kind": "none"}
-            if virtual:
-                data["bus"] |= {"time": "virtual", "reply_time": 5.0}
-            write.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+            text = found.at_ports(server.bus_path, server.board_path, virtual=virtual)
+            write.write_text(text, encoding="utf-8")
             if as_json:
                 print_json({"bus": server.bus_path, "board": server.board_path, "file": str(write)})
             else:

@@ -31,10 +31,18 @@ from aloft.runtime.drawing.render import svg
 from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import EndpointError
+from aloft.studies.figures.film import Camera, Take, instants, pictures, write_film
 
 FOLDER = Path(__file__).parent
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
 HOPS = FOLDER.parent / "graphs" / "hops.yaml"
+FILMED = {
+    "BRUCE, 12 cm": ("graphs/jump.yaml", []),
+    "a push in flight": ("graphs/push_12cm.yaml", []),
+    "a somersault": ("graphs/somersault.yaml", []),
+    "Go2": ("graphs/robots/go2_forward.yaml", []),
+}
+"""The runs of the film: caption, graph and settings."""
 THRUST = 0.98
 """An instant [s] late in the thrust, when the forces are large."""
 PATIENCE = 300.0
@@ -78,8 +86,22 @@ def save_view(recording: Path, instant: float, path: Path) -> None:
         viewer.stop()
 
 
+def save_film(path: Path) -> None:
+    """Run the graphs of ``FILMED`` and draw them side by side, in slow motion."""
+    camera = Camera(width=260, height=300)
+    takes = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (caption, (graph, settings)) in enumerate(FILMED.items()):
+            recording = Path(folder) / f"{number}.rrd"
+            load(FOLDER.parent / graph, settings).run(sinks=[Recorder(recording)])
+            takes.append(Take(read(recording), caption, camera))
+        times = instants(takes, 0.5, 2.3, 0.5 / 20.0)
+        write_film(path, pictures(takes, times, camera), 20.0)
+
+
 def main() -> None:
     """Make all pictures."""
+    save_film(FOLDER / "jumps.gif")
     graph = load(JUMP)
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / "jump.rrd"

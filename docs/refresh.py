@@ -33,6 +33,7 @@ from result_tables import (
     ground_table,
     impulse_table,
     quarter_table,
+    real_table,
     results_sentence,
     results_table,
     short_tasks_table,
@@ -249,6 +250,11 @@ def write_effects(file: Path) -> None:
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
 
 
+def write_real(file: Path) -> None:
+    """Robots as a bench finds them, untold, calibrated, and learning."""
+    refresh(DOCS / "real_robots.md", "real", real_table(read_json(file)["robots"]))
+
+
 def write_ground(*files: Path) -> None:
     """Landings on single unevennesses that nobody is told of."""
     refresh(DOCS / "ground.md", "ground", ground_table(_runs_of(files), "ground"))
@@ -312,6 +318,7 @@ PAGES = {
         "results/push_polar/summary.json results/push_polar_12cm/summary.json",
     ),
     "late": Page(write_late, f"{STUDIES}late_sensors.yaml", "results/late_sensors/summary.json"),
+    "real": Page(write_real, "aloft bench real_robot", "results/real_robot/results.json"),
     "results": Page(write_results),
     "robots": Page(write_robots),
     "robots_results": Page(

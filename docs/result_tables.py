@@ -9,6 +9,7 @@ from typing import Any
 
 from aloft.benchmarks.tick.chart import BARS
 from aloft.studies.batch.seeds import SeedRow
+from aloft.studies.summary import wilson_interval
 
 Row = Mapping[str, Any]
 """A row of a summary or of a benchmark."""
@@ -432,6 +433,23 @@ def effects_table(rows: Sequence[Row]) -> str:
         ("effect", *tasks),
         [(effect, *(succeeded(of[task]) for task in tasks)) for effect, of in by_effect.items()],
     )
+
+
+def real_table(robots: Sequence[Mapping[str, Any]]) -> str:
+    """One row a kind of jump, one column an arm: how many robots land, at each time."""
+    arms = list(robots[0]["arms"])
+    rows = []
+    for kind in robots[0]["arms"][arms[0]]:
+        cells = [kind]
+        for arm in arms:
+            runs = [robot["arms"][arm][kind] for robot in robots]
+            times = [sum(run[k]["success"] for run in runs) for k in range(len(runs[0]))]
+            low, high = wilson_interval(times[-1], len(runs))
+            cells.append(
+                f"{', '.join(map(str, times))} of {len(runs)} ({100 * low:.0f} to {100 * high:.0f} %)"
+            )
+        rows.append(cells)
+    return table(("", *arms), rows)
 
 
 UPRIGHT = 12.0

@@ -69,7 +69,9 @@ def example_fmu() -> Path:
     try:
         from pythonfmu3.builder import FmuBuilder
     except ImportError:
-        raise BlockError("the example needs PythonFMU3: pip install 'aloft[fmi]'") from None
+        raise BlockError(
+            "the example needs PythonFMU3: pip install 'aloft-robotics[fmi]'"
+        ) from None
     folder = tempfile.TemporaryDirectory(prefix="aloft-example-")
     _FOLDERS.append(folder)
     script = Path(folder.name) / "aloft_example_spring.py"

@@ -53,6 +53,9 @@ class Purpose(IntEnum):
     ECCENTRICITY = 27
     FLOOR_TILT = 28
     CABLE = 29
+    LINK_LENGTH = 30
+    STATIC_FRICTION = 31
+    COGGING = 32
 
 
 RUNNING = (

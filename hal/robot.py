@@ -169,8 +169,9 @@ class Robot(Block, ABC):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """``delay``: the delay from sensing to torque [s], for the graph to compensate."""
-        return {"delay": cls.nominal_delay(params)}
+        """What the graph may compensate: ``delay``, from sensing to torque [s], and ``imu_position``, where the
+        IMU is told to be, from the base's origin [m, base]."""
+        return {"delay": cls.nominal_delay(params), "imu_position": [0.0, 0.0, 0.0]}
 
     @classmethod
     def nominal_delay(cls, params: Parameters) -> float:

@@ -229,6 +229,14 @@ def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
 
 
 @kernel
+def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
+    """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y = vector[0], vector[1]
+    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
+
+
+@kernel
 def unit(
     x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
 ) -> tuple[float, float, float]:

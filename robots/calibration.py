@@ -141,6 +141,7 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
 
     delay = USUAL_DELAY if found.delay is None else found.delay.value
     oldest = max(0.0, *(each.value for each in ages))
+    lossless = 1.0 - bounded(found.saturation, 0.0, 0.5) - bounded(found.load_friction, 0.0, 0.2)
     lines = [
         f"# {robot.name} as {source} shows it, found by `aloft robot calibrate`. Include this file behind the",
         "# controller, its gains and controllers/late_sensors.yaml. Standard deviations are in the comments.",
@@ -157,13 +158,19 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
         *_rows(found.torque_constant),
         f"  robot.motor_model.saturation: {share(found.saturation)}",
         f"  robot.motor_model.load_friction: {share(found.load_friction)}",
-        "  joint_pd.friction:  # 80 % of what is beyond the description's [N m]",
-        *_rows(
-            found.friction,
-            {
-                joint.name: COMPENSATED * max(0.0, found.friction[joint.name].value - float(known))
-                for joint, known in zip(robot.joints, robot.motors.friction, strict=True)
-            },
+        *_beyond(
+            "joint_pd.friction", "N m", COMPENSATED, robot, found.friction, robot.motors.friction
+        ),
+        *_beyond(
+            "joint_pd.damping", "N m s/rad", COMPENSATED, robot, found.damping, robot.motors.damping
+        ),
+        *_beyond("weight.friction", "N m", 1.0, robot, found.friction, robot.motors.friction),
+        *_beyond("weight.damping", "N m s/rad", 1.0, robot, found.damping, robot.motors.damping),
+        f"  dynamics.rotor_inertia: {{'*': {found.rotor_inertia.value:.4f}}}  # +- {found.rotor_inertia.std:.4f}",
+        "  wbc.peak_torque:  # shares of the description's that are left for the robot's motion",
+        *(
+            f"    {joint.name}: {lossless * found.torque_constant[motor].value:.4f}"
+            for joint, motor in zip(robot.joints, robot.transmission.motors, strict=True)
         ),
     ]
     if found.resistance is not None:
@@ -171,6 +178,20 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
             f"  safety.pack_resistance: {bounded(found.resistance, 0.0):.4f} ohm  # +- {found.resistance.std:.4f}"
         )
     return "\n".join(lines) + "\n"
+
+
+def _beyond(
+    parameter: str, unit: str, share: float, robot: RobotDescription, found: dict[str, Value], known: Array,
+) -> list[str]:  # fmt: skip
+    """A share of what is found beyond the description's; for compensation, which must not push, never less."""
+    least = 0.0 if share < 1.0 else -1e9
+    values = {
+        joint.name: share * max(least, found[joint.name].value - float(nominal))
+        for joint, nominal in zip(robot.joints, known, strict=True)
+    }
+    part = f"{share:.0%} of what" if share < 1.0 else "what"
+    head = f"  {parameter}:  # {part} is beyond the description's [{unit}]"
+    return [head, *_rows(found, values)]
 
 
 def _rows(found: dict[str, Value], values: dict[str, float] | None = None) -> list[str]:

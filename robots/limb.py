@@ -17,7 +17,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..mathematics.arrays import Array, Array1D, Array2D, Matrix3, Rows3, Vector3
+from ..mathematics.arrays import Array, Array1D, Array2D, Indices2D, Matrix3, Rows3, Vector3
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import unit
@@ -76,6 +76,20 @@ def chain_to(robot: RobotDescription, link: str) -> tuple[int, ...]:
         chain.insert(0, index)
         link = robot.joints[index].parent
     return tuple(chain)
+
+
+def leg_joints(robot: RobotDescription) -> Indices2D:
+    """The joints of each foot's leg from the base outwards, (n_feet, joints of the longest leg); -1
+    where a leg has fewer.
+
+    Raises:
+        ValueError: no joint carries one of the links on the way.
+    """
+    chains = [chain_to(robot, foot.link) for foot in robot.feet]
+    found = np.full((len(chains), max(map(len, chains), default=0)), -1, dtype=np.int64)
+    for row, chain in zip(found, chains, strict=True):
+        row[: len(chain)] = chain
+    return found
 
 
 def foot_shape(robot: RobotDescription, foot: int) -> tuple[FootKind, Array]:

@@ -202,9 +202,11 @@ def _encoders(
         rows[:, own + 1] = np.sin(angle[at, joint])
         rows[:, own + 2] = np.cos(angle[at, joint])
         left = (angle - walked)[at, joint]
-        covariance = noise[joint] ** 2 * walk + np.diag(seat[:, joint] ** 2 + RESOLVED**2)
-        white = np.linalg.cholesky(covariance + (left.max() - left.min() + 1.0) ** 2)
-        rows, left = np.linalg.solve(white, rows), np.linalg.solve(white, left - left.mean())
+        errors: Array = noise[joint] ** 2 * walk + np.diag(seat[:, joint] ** 2 + RESOLVED**2)
+        # angle and integral have no common zero: a constant may be anything
+        white = np.linalg.cholesky(errors + (left.max() - left.min() + 1.0) ** 2)
+        unit = np.linalg.solve(white, np.column_stack([rows, left - left.mean()]))
+        rows, left = unit[:, :-1], unit[:, -1]
         own_normal = rows.T @ rows + np.diag(prior**-2.0)
         found = np.linalg.solve(own_normal, rows.T @ left)
         size = max(1.0, float(np.mean((left - rows @ found) ** 2)))

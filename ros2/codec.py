@@ -101,7 +101,7 @@ def type_store(distribution: str) -> Any:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise BlockError(
-            "ROS 2's message types come with the library rosbags: pip install 'aloft[ros2]'"
+            "ROS 2's message types come with the library rosbags: pip install 'aloft-robotics[ros2]'"
         ) from error
     name = f"ROS2_{distribution.upper()}"
     if name not in Stores.__members__:

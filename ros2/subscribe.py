@@ -121,16 +121,16 @@ class Subscribe(Ros2Block):
 
     def hear(self, data: bytes, beside: bytes = b"") -> None:
         """Take a message; a thread of Zenoh calls this."""
+        sequence = sequence_in(beside)
+        if sequence is not None:  # before the message is read: one that is refused has come
+            if self._sequence is not None and sequence > self._sequence + 1:
+                self._lost += sequence - self._sequence - 1
+            self._sequence = sequence
         try:
             values = self._codec.read(data)
         except WrongMessageError:
             self._refused += 1
             return
-        sequence = sequence_in(beside)
-        if sequence is not None:
-            if self._sequence is not None and sequence > self._sequence + 1:
-                self._lost += sequence - self._sequence - 1
-            self._sequence = sequence
         self._received += 1
         self._newest = (values, time.monotonic_ns())
 

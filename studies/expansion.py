@@ -41,6 +41,8 @@ class Cell:
     sets: Mapping[str, Entry]
     origin: Path
     """The study's file, for which the graph is put together."""
+    behind: tuple[Path, ...] = ()
+    """The files that follow the graph."""
     key: str = ""
     """What the outcome depends on, but for the seed; set once the cell is checked."""
 
@@ -64,6 +66,7 @@ class Job:
     origin: str
     overrides: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
+    behind: tuple[str, ...] = ()
 
 
 def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
@@ -92,6 +95,7 @@ def _cell(
         study.include,
         {entry.key: entry for entry in (*entries, *arm.sets)},
         study.path,
+        arm.include,
     )
 
 
@@ -113,7 +117,7 @@ def checked_cells(
     for cell in found:
         on_cell()
         try:
-            graph = load_cell(cell.graph, cell.include, cell.sets, cell.origin).checked
+            graph = load_cell(cell.graph, cell.include, cell.sets, cell.origin, cell.behind).checked
         except LoadError as error:
             problems.update(dict.fromkeys(error.report.problems))
             continue
@@ -135,12 +139,16 @@ def checked_cells(
 
 
 def load_cell(
-    graph: Path, include: Sequence[Path], overrides: Mapping[str, Any], origin: Path
+    graph: Path,
+    include: Sequence[Path],
+    overrides: Mapping[str, Any],
+    origin: Path,
+    behind: Sequence[Path] = (),
 ) -> Graph:
-    """The graph with a cell's overrides. Raises ``LoadError``."""
-    if not include:
+    """The graph between files that it includes, with a cell's overrides. Raises ``LoadError``."""
+    if not include and not behind:
         return Graph(load(graph, overrides))
-    files = [os.path.relpath(file, origin.parent) for file in (*include, graph)]
+    files = [os.path.relpath(file, origin.parent) for file in (*include, graph, *behind)]
     return Graph(load_text(f"include: {text_of(files)}\n", origin, overrides))
 
 
@@ -151,9 +159,10 @@ def seeded_graph(work: Job) -> Graph:
         LoadError: the graph cannot be loaded.
     """
     graph, origin = Path(work.graph), Path(work.origin)
-    include = [Path(file) for file in work.include]
-    seeds = load_cell(graph, include, work.overrides, origin).seed_parameters
-    return load_cell(graph, include, {**work.overrides, **dict.fromkeys(seeds, work.seed)}, origin)
+    include, behind = ([Path(file) for file in files] for files in (work.include, work.behind))
+    seeds = load_cell(graph, include, work.overrides, origin, behind).seed_parameters
+    seeded = {**work.overrides, **dict.fromkeys(seeds, work.seed)}
+    return load_cell(graph, include, seeded, origin, behind)
 
 
 def job(cell: Cell, seed: int) -> Job:
@@ -164,6 +173,7 @@ def job(cell: Cell, seed: int) -> Job:
         str(cell.origin.absolute()),
         cell.overrides,
         seed,
+        tuple(str(file.absolute()) for file in cell.behind),
     )
 
 

@@ -17,7 +17,7 @@ takes it into use.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,15 +48,29 @@ SETTLED = 0.15
 """s after touchdown from which on the feet stand in their new place."""
 MOST_TILT = 0.35
 """A tilt [rad] beyond this says no more than that it was too much."""
+RUNGS = (0.02, 0.05, 0.08, 0.12)
+"""The rises of the jumps in place that come before the one that is asked for [m]."""
 Signals = Callable[[str], Array]
 """The values of a signal in every tick, by its name."""
+
+
+def ladder(asked: Mapping[str, float], rise: float) -> list[dict[str, float]]:
+    """Smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and turned."""
+    found = [{"rise": rung} for rung in RUNGS if rung < rise - 0.005]
+    half = {
+        name: 0.5 * asked[name] for name in ("distance_x", "distance_y", "twist") if name in asked
+    }
+    if half:
+        found += [{"rise": rise}, {"rise": rise, **half}]
+    return found
 
 
 def lesson_of(
     signals: Signals, plan: PlannedJump, mass: float, applied: tuple[Vector, Vector],
     measured_place: tuple[float, float] | None = None,
 ) -> Lesson | None:  # fmt: skip
-    """What one run teaches; ``None`` where its task cannot be learnt, or it never flew and landed.
+    """What one run teaches; ``None`` where its task cannot be learnt, such as a row of jumps, or it never
+    flew and landed.
 
     Args:
         signals: of the run.
@@ -66,7 +80,7 @@ def lesson_of(
         measured_place: by how much the feet moved, ahead and to the left [m], where somebody has
             measured it; by default the robot's estimate.
     """
-    launch = launch_of(plan.task)
+    launch = launch_of(plan.task) if len(plan.task.hops()) == 1 else None
     missed = None if launch is None else landing_error(signals, measured_place)
     if launch is None or missed is None:
         return None

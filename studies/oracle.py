@@ -132,7 +132,9 @@ def _motors(
         f"{block}.motor_model.torque_constant": _named(robot.transmission.motors, constant),
         f"{block}.motor_model.saturation": motors.saturation,
         f"{block}.motor_model.load_friction": motors.load_friction,
-        "wbc.peak_torque": _by_joint(robot, constant * (1.0 - motors.saturation)),
+        "wbc.peak_torque": _by_joint(
+            robot, constant * (1.0 - motors.saturation - motors.load_friction)
+        ),
     }
 
 
@@ -146,9 +148,13 @@ def _joints(
     factor = np.array([variation.factor(variation.friction_of_joint, k) for k in range(n)])
     factor = params.joint_friction * factor * (1.0 + errors.friction * draw.normal(size=n))
     rotors = [variation.factor(variation.rotor_inertia, k) for k in range(n)]
+    friction = _by_joint(robot, (factor - 1.0) * robot.motors.friction)
+    damping = _by_joint(robot, (factor - 1.0) * robot.motors.damping)
     return {
-        "joint_pd.friction": _by_joint(robot, (factor - 1.0) * robot.motors.friction),
-        "joint_pd.damping": _by_joint(robot, (factor - 1.0) * robot.motors.damping),
+        "joint_pd.friction": friction,
+        "joint_pd.damping": damping,
+        "weight.friction": friction,
+        "weight.damping": damping,
         "timing.play": params.encoders.backlash,
         "dynamics.rotor_inertia": _by_joint(robot, rotors),
     }

@@ -23,7 +23,7 @@ KEYS = (
     "tune", "plots",
 )  # fmt: skip
 GRAPH_KEYS = ("graph", "graphs", "graphs_of")
-ARM_KEYS = ("set", "tune")
+ARM_KEYS = ("set", "tune", "include")
 TASK_KEYS = ("graph", "set")
 
 
@@ -95,7 +95,7 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
             expected="seeds, from 1000 on where results are reported", fix="seeds: 2000:2040",
         )  # fmt: skip
     common = _read_ranges(section("tune").get("ranges"), problems)
-    arms = tuple(_read_arm(entry, common, problems) for entry in section("arms"))
+    arms = tuple(_read_arm(entry, common, path, problems) for entry in section("arms"))
     arms = arms or (Arm("default", (), common),)
     axes = read_axes(section("grid"), problems)
     labels = Labels(
@@ -238,8 +238,8 @@ def _read_ranges(entry: Entry | None, problems: Problems) -> tuple[Range, ...]:
     return tuple(each for each in found if each is not None)
 
 
-def _read_arm(entry: Entry, common: tuple[Range, ...], problems: Problems) -> Arm:
-    """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}}``."""
+def _read_arm(entry: Entry, common: tuple[Range, ...], path: Path, problems: Problems) -> Arm:
+    """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}, include: FILE}``."""
     node = entry.value
     if isinstance(node, MapNode) and any(node.get(key) for key in ARM_KEYS):
         for item in node:
@@ -248,5 +248,6 @@ def _read_arm(entry: Entry, common: tuple[Range, ...], problems: Problems) -> Ar
         given, own = node.get("set"), node.get("tune")
         sets = (read_sets(given, problems) or ()) if given else ()
         ranges = _read_ranges(own, problems) if own else common
-        return Arm(entry.key, sets, ranges)
+        files = tuple(file for _, file in _files(node.get("include"), path, problems))
+        return Arm(entry.key, sets, ranges, files)
     return Arm(entry.key, read_sets(entry, problems) or (), common)

@@ -58,11 +58,13 @@ class Range:
 
 @dataclass(frozen=True)
 class Arm:
-    """One of the variants that are compared, and its parameters that may be tuned."""
+    """One of the variants that are compared: settings, files that follow every graph, and its parameters that
+    may be tuned."""
 
     name: str
     sets: tuple[Entry, ...] = ()
     ranges: tuple[Range, ...] = ()
+    include: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)

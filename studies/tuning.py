@@ -202,6 +202,7 @@ def definition(study: Study) -> str:
     tuning = study.tuning
     searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
     searched += [path.name for path in study.include]
+    searched += [[arm.name, path.name] for arm in study.arms for path in arm.include]
     searched += [[c.task, c.graph.name, c.arm, c.overrides] for c in tuning_cells(study)]
     searched += [
         [arm.name, each.key, each.unit, each.log, *map(list, each.bounds), *each.choices]
@@ -329,7 +330,7 @@ def _optuna_study(seed: int, arm: Arm) -> OptunaStudy:
     try:
         import optuna
     except ImportError:
-        raise AloftError("aloft tune needs Optuna: pip install 'aloft[tune]'") from None
+        raise AloftError("aloft tune needs Optuna: pip install 'aloft-robotics[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     name = int.from_bytes(hashlib.sha256(f"{seed} {arm.name}".encode()).digest()[:4], "big")
     sampler = optuna.samplers.TPESampler(seed=name, constant_liar=True)

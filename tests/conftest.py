@@ -16,7 +16,7 @@ from hypothesis import settings
 from aloft.cli import COLLECTED_AFTER
 
 ROOT = Path(__file__).parent.parent
-UNTRACKED = ("recordings", "build", "dist", "aloft.egg-info", "__pycache__", ".*")
+UNTRACKED = ("recordings", "build", "dist", "aloft_robotics.egg-info", "__pycache__", ".*")
 
 # The same examples every time: what passes here passes there. No deadline: machines are shared.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)

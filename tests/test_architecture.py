@@ -69,6 +69,10 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking",
         "mathematics", "robots", "runtime/language", "blocks/signals",
     ),
+    "planner/online": (
+        "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking", "planner/library",
+        "mathematics", "robots", "runtime/language", "blocks/signals",
+    ),
     "planner/drawing": (
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
         "blocks/signals",

@@ -21,6 +21,7 @@ NOT_FOR_BRUCE = {
 NEEDS_DRIVES = {
     "hal.BearRobot": "needs drives on serial ports; hal.TwinRobot is the same driver without them",
 }
+NEEDS_TERMINAL = {"hal.Keyboard": "needs a terminal; checked with one in its own test"}
 BEYOND = {
     ("bolt", "hal.MujocoRobot"): "its centre of mass is .* outside its contact points",
     ("bolt", "hal.TwinRobot"): "its centre of mass is .* outside its contact points",
@@ -40,6 +41,10 @@ def test_conformance(name: str, case: str) -> None:
         with pytest.raises(AloftError, match=r"the serial port .* cannot be opened"):
             BlockBench(find_block(name), find_block(name).example_parameters(), robot="bruce")
         pytest.skip(NEEDS_DRIVES[name])
+    if name in NEEDS_TERMINAL:
+        with pytest.raises(AloftError, match="standard input is no terminal"):
+            BlockBench(find_block(name), robot="bruce")
+        pytest.skip(NEEDS_TERMINAL[name])
     check_block(find_block(name), robot="bruce", cases=[case])
 
 

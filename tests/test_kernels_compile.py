@@ -65,6 +65,10 @@ NOT_HOT = {
     "mathematics.whole_body_solution.active_set_program": "memory, when a block is set up",
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
+    "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
+    "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
+    "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
+    "blocks.signals.steering.plan_width": "sizes of signals, when a graph is loaded",
     "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
     "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
@@ -142,6 +146,24 @@ def run_alone(name, robot, **parameters):
     bench.close()
 
 
+def steer_alone():
+    """A jump that is commanded, and its judgement, without a planner."""
+    bruce = find_robot("bruce")
+    plan = BlockBench(
+        find_block("blocks.SteeredPlan"), {"settle_time": 0.001}, robot=bruce, plain=True
+    )
+    score = BlockBench(find_block("blocks.CourseScore"), robot=bruce, plain=True)
+    plan.set("terms", foot_rotation=np.tile(np.eye(3), (2, 1, 1)))
+    plan.set("command", number=1, ahead=0.1)
+    plan.set("part", number=1, parts=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2)
+    score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
+    for tick in range(400):
+        plan.step()
+        score.set("goal", number=int(tick >= 10))
+        score.set("truth", contact_touched=np.full(4, not 20 <= tick < 80))
+        score.step()
+
+
 @pytest.fixture(scope="module")
 def calls():
     """For every kernel the arguments of some of its calls, during a jump or in a block by itself."""
@@ -190,7 +212,7 @@ def calls():
                     patch.setattr(module, key, called)
                 elif id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
-        run_jump()
+        run_jump({"step.seek_speed": 1.0})
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         run_jump({**other, "wbc.solver": "daqp"}, duration=0.1)
         other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
@@ -201,6 +223,7 @@ def calls():
         run_jump(weak, duration=0.1)
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
         run_jump({"robot.motor_model.load_friction": 0.05}, 0.02, "from_gantry.yaml")
+        steer_alone()
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
         run_alone("blocks.SensorAlignment", find_robot("bruce"), play=0.01, **mounted)

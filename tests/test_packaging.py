@@ -10,12 +10,13 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+import yaml
 
 import aloft
 
 ROOT = Path(__file__).parent.parent
 NOT_SHIPPED = {
-    "benchmarks", "tests", "docs", "scripts", "recordings", "build", "dist", "aloft.egg-info",
+    "benchmarks", "tests", "docs", "scripts", "recordings", "build", "dist", "aloft_robotics.egg-info",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
@@ -47,7 +48,7 @@ def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:
 
 def test_the_wheel_holds_nothing_else(wheel: Path) -> None:
     tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
-    assert tops == {"aloft", f"aloft-{aloft.__version__}.dist-info"}
+    assert tops == {"aloft", f"aloft_robotics-{aloft.__version__}.dist-info"}
     shipped = {name.split("/")[1] for name in zipfile.ZipFile(wheel).namelist()}
     assert shipped.isdisjoint(NOT_SHIPPED)
 
@@ -70,9 +71,9 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("error: the benchmarks are not in the wheel; install aloft from")
     for command in (
-        f"pip download --no-deps --no-binary aloft aloft=={aloft.__version__}",
-        f"tar xzf aloft-{aloft.__version__}.tar.gz",
-        f"pip install --editable aloft-{aloft.__version__}",
+        f"pip download --no-deps --no-binary :all: aloft-robotics=={aloft.__version__}",
+        f"tar xzf aloft_robotics-{aloft.__version__}.tar.gz",
+        f"pip install --editable aloft_robotics-{aloft.__version__}",
     ):
         assert f"    {command}\n" in done.stderr
 
@@ -81,7 +82,7 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
 def test_the_source_distribution_has_what_the_benchmarks_need(
     source_distribution: Path, wheel: Path
 ) -> None:
-    assert source_distribution.name == f"aloft-{aloft.__version__}.tar.gz"
+    assert source_distribution.name == f"aloft_robotics-{aloft.__version__}.tar.gz"
     with tarfile.open(source_distribution) as tar:
         inside = {name.partition("/")[2] for name in tar.getnames()}
     expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "benchmarks").rglob("*.py")}
@@ -92,7 +93,10 @@ def test_the_source_distribution_has_what_the_benchmarks_need(
 
 
 def test_one_version() -> None:
-    assert PROJECT["project"]["version"] == aloft.__version__ == metadata.version("aloft")
+    assert PROJECT["project"]["version"] == aloft.__version__ == metadata.version("aloft-robotics")
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == aloft.__version__
+    major = aloft.__version__.rpartition(".")[0]
+    assert f"| {major} | yes |" in (ROOT / "SECURITY.md").read_text()
 
 
 def loaded_by(code: str) -> set[str]:

@@ -52,11 +52,15 @@ class JumpJob:
 
 
 def jumps(
-    count: int = COUNT, seed: int = SEED, runs: Sequence[int] = RUNS, folder: Path = FOLDER
+    count: int = COUNT,
+    seed: int = SEED,
+    runs: Sequence[int] = RUNS,
+    folder: Path = FOLDER,
+    harder: bool = False,
 ) -> list[Row]:
     """Rows: the share of tasks without a plan, and what binds; of runs that do not land, with its
     95 % interval; and the CPU time of planning, from nothing to checked."""
-    tasks = random_tasks(count, seed)
+    tasks = random_tasks(count, seed, harder)
     code = code_fingerprint()
     robot = find_robot("bruce")
     names = [f"{code}:{task.hash(robot)}" for task in tasks]

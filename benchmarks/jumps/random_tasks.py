@@ -15,6 +15,10 @@ step up           4-8 cm       16-25 cm ahead      2-12 cm higher; the rise is a
 step down         5-12 cm      18-30 cm ahead      2-35 cm lower
 ================  ===========  ==================  =======================================
 
+With ``harder`` they reach as far as jumps land at all: in place to 26 cm, forward to 62 cm, back to 28 cm, aside to 35 cm
+with a turn of up to 30 deg, turns of up to 120 deg with up to 20 cm ahead, and steps from 30 cm down to 12 cm up with 20 to 35 cm
+ahead. Each of these kinds begins where the usual range becomes hard.
+
 Every kind is as likely as any other. A task counts as done if ``solve_and_check`` gives a plan,
 which is then valid.
 """
@@ -41,12 +45,13 @@ MISSED_GOAL = 0.05
 """The largest good share of tasks without a valid plan."""
 
 
-def random_tasks(count: int = COUNT, seed: int = SEED) -> list[JumpTask]:
+def random_tasks(count: int = COUNT, seed: int = SEED, harder: bool = False) -> list[JumpTask]:
     """The first ``count`` tasks of a seed; the same on every machine."""
     rng = np.random.default_rng(seed)
-    kinds = list(_KINDS)
+    ranges = _HARDER if harder else _KINDS
+    kinds = list(ranges)
     return [
-        make_task({"name": f"{kind} {number}", **_KINDS[kind](rng)})
+        make_task({"name": f"{kind} {number}", **ranges[kind](rng)})
         for number, kind in enumerate(kinds[rng.integers(len(kinds))] for _ in range(count))
     ]
 
@@ -88,6 +93,25 @@ _KINDS: dict[str, Any] = {
     },
     "step up": lambda rng: _step(rng, (0.04, 0.08), (0.02, 0.12), (0.16, 0.25)),
     "step down": lambda rng: _step(rng, (0.05, 0.12), (-0.35, -0.02), (0.18, 0.30)),
+}  # fmt: skip
+
+_HARDER: dict[str, Any] = {
+    "high in place": lambda rng: {"rise": _between(rng, 0.14, 0.26)},
+    "far forward": lambda rng: {
+        "rise": _between(rng, 0.08, 0.16), "distance_x": _between(rng, 0.30, 0.62),
+    },
+    "far back": lambda rng: {
+        "rise": _between(rng, 0.06, 0.16), "distance_x": _between(rng, -0.28, -0.12),
+    },
+    "far aside": lambda rng: {
+        "rise": _between(rng, 0.06, 0.14), "distance_y": _signed(rng, 0.35),
+        "twist": _signed(rng, math.radians(30.0)),
+    },
+    "far round": lambda rng: {
+        "rise": _between(rng, 0.06, 0.16), "distance_x": _between(rng, 0.0, 0.20),
+        "twist": _signed(rng, math.radians(120.0)),
+    },
+    "far step": lambda rng: _step(rng, (0.04, 0.12), (-0.30, 0.12), (0.20, 0.35)),
 }  # fmt: skip
 
 

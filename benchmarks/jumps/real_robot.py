@@ -1,13 +1,17 @@
 """Jumps of simulated robots as a bench finds them: untold, calibrated, and learning from jump to jump.
 
-Each seed draws one robot by ``graphs/trials/real.yaml``. It is calibrated by ``aloft robot calibrate``, from its own
+Each seed draws one robot by ``graphs/trials/real.yaml``. It is calibrated once by ``aloft robot calibrate``, from its own
 motion alone; or the controller is told what the simulator drew, with errors of the size that a calibration is
 meant to reach (``studies/oracle``). A robot that learns (``studies/jump_learning``) makes smaller jumps first, and then each jump several times with
-fresh noise; it sees its own estimates alone. A run lands if ``blocks.JumpScore`` says so.
+fresh noise; it sees its own estimates alone. What it learns stays from one kind of jump to the next, in a file that the graph reads by
+``plan.learnt``. A run lands if ``blocks.JumpScore`` says so.
+
+Robots follow one another, and ``results/real_robot/results.json`` has all that are done, so a run that is stopped loses one robot.
 """
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -17,111 +21,152 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from ...planner.library.learnt import LearntJumps, launch_of
+from ...planner.library.learnt import LearntJumps, launch_of, write_learnt
 from ...planner.library.library import PlanLibrary, shipped_folder
-from ...planner.library.rehearsed import ZERO
 from ...planner.task.plan import PlannedJump
 from ...planner.task.task import make_task
 from ...robots.description import find_robot
 from ...runtime.graph import Graph
+from ...runtime.language.errors import AloftError
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell
 from ...studies.jump_learning import lesson_of
 from ...studies.oracle import CALIBRATED, told_values
 from ...studies.summary import wilson_interval
 from ..rows import Row
+from .real_tasks import ALONE, EFFORT, EVERY, AskedJump, asked_of
 
 SEEDS = range(97500, 97520)
 """The robots; nothing is tuned on them."""
-LADDER = ({"rise": 0.02}, {"rise": 0.05}, {"rise": 0.08})
-"""The smaller jumps before each series."""
-SERIES: Mapping[str, Mapping[str, float]] = {
-    "in place 12 cm": {"rise": 0.12},
-    "ahead 20 cm": {"rise": 0.12, "distance_x": 0.2},
-}
-"""The jumps that are counted, as changes of ``graphs/jump.yaml``'s task."""
-ARMS: Mapping[str, tuple[Literal["nothing", "calibration", "draws"], bool]] = {
+Told = Literal["nothing", "calibration", "draws"]
+ARMS: Mapping[str, tuple[Told, bool]] = {
     "nothing told": ("nothing", False),
     "calibrated": ("calibration", False),
     "learning, nothing told": ("nothing", True),
     "calibrated and learning": ("calibration", True),
     "told within the calibration's goals, learning": ("draws", True),
 }
-TIMES = 5
-"""How often a robot that learns makes each of them."""
+"""What the controller is told, and whether the robot learns."""
 MISSED_GOAL = 0.05
 """The largest good share of robots that do not land."""
 FOLDER = Path("results") / "real_robot"
-"""Where the fragments of calibrations go."""
+"""Where results, the fragments of calibrations and what robots have learnt go."""
 _NOISES = 1000
 
 
 @dataclass(frozen=True)
 class RobotJob:
-    """A robot by its seed; where what its controller is told of it comes from, and whether it learns."""
+    """A robot by its seed, and what it does in which arms."""
 
     seed: int
-    told: Literal["nothing", "calibration", "draws"]
-    learns: bool
+    arms: tuple[str, ...] = tuple(ARMS)
+    asked: tuple[str, ...] = EVERY
 
 
-def real_robot(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows: for each jump the share that lands, untold, calibrated, and learning, the first and last time."""
-    jobs = [RobotJob(seed, *arm) for seed in seeds for arm in ARMS.values()]
-    landed: dict[tuple[str, bool], list[list[list[bool]]]] = {arm: [] for arm in ARMS.values()}
-    with closing(job_results(jumps_of, jobs)) as results:
+Jumps = dict[str, list[dict[str, Any]]]
+"""What became of each jump, by its kind: ``success``, ``reason``, and the largest tilt [deg]."""
+
+
+def real_robot(
+    seeds: Sequence[int] = SEEDS, arms: Sequence[str] = (), asked: Sequence[str] = (), workers: int = 0
+) -> list[Row]:  # fmt: skip
+    """Rows: for each jump and arm the share of robots that do not land the last time.
+
+    Args:
+        seeds: of the robots.
+        arms, asked: some of ``ARMS`` and of ``EVERY``; none: all.
+        workers: processes; 0: as many as there are processors.
+
+    Raises:
+        AloftError: there is no such arm or jump.
+    """
+    job = RobotJob(0, chosen("arm", arms, tuple(ARMS)), chosen("jump", asked, EVERY))
+    jobs = [RobotJob(seed, job.arms, job.asked) for seed in seeds]
+    robots: list[dict[str, Any]] = []
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with closing(job_results(jumps_of, jobs, workers=workers)) as results:
         for result in results:
             if result.error:
                 raise RuntimeError(result.error)
-            job = jobs[result.index]
-            landed[job.told, job.learns].append(result.value)
-    rows = []
-    for number, name in enumerate(SERIES):
-        for title, arm in ARMS.items():
-            robots = [runs[number] for runs in landed[arm]]
-            rows.append(_row(f"{name}, {title}", robots, arm[1]))
-    return rows
+            robots.append({"seed": jobs[result.index].seed, "arms": result.value})
+            robots.sort(key=lambda robot: robot["seed"])
+            text = json.dumps({"effort": EFFORT, "robots": robots}, indent=1)
+            (FOLDER / "results.json").write_text(text + "\n", encoding="utf-8")
+    return [
+        _row(f"{name}, {arm}", [robot["arms"][arm][name] for robot in robots])
+        for name in job.asked
+        for arm in job.arms
+    ]
 
 
-def jumps_of(job: RobotJob) -> list[list[bool]]:
-    """Which jumps of a robot land, one list for each of the ``SERIES``."""
-    learnt = LearntJumps("bruce")
-    found, count = [], 0
-    for asked in SERIES.values():
-        landed: list[bool] = []
-        tasks = [*(LADDER if job.learns else ()), *[asked] * (TIMES if job.learns else 1)]
+def chosen(what: str, names: Sequence[str], there: tuple[str, ...]) -> tuple[str, ...]:
+    """The names, all that there are by default. Raises ``AloftError`` for others."""
+    for name in names:
+        if name not in there:
+            raise AloftError(f"there is no {what} {name!r}; there is {', '.join(map(repr, there))}")
+    return tuple(names) or there
+
+
+def jumps_of(job: RobotJob) -> dict[str, Jumps]:
+    """What becomes of a robot's jumps, by arm."""
+    return {arm: jumps_in(arm, job) for arm in job.arms}
+
+
+def jumps_in(arm: str, job: RobotJob) -> Jumps:
+    """What becomes of the jumps of a robot in one arm."""
+    told, learns = ARMS[arm]
+    file = (FOLDER / f"robot_{job.seed}_{tuple(ARMS).index(arm)}.json").absolute()
+    learnt, found, count = LearntJumps("bruce"), Jumps(), 0
+    for name, asked in asked_of(job.seed).items():
+        if name not in job.asked:
+            continue
+        tasks: list[Mapping[str, Any]] = [asked.task] * (asked.times if learns else 1)
+        if learns:
+            tasks = [*asked.before(first=not found), *tasks]
+        found[name] = []
         for task in tasks:
             count += 1
-            plan = planned(frozenset(task.items()))
-            correction = learnt.correction(launch_of(plan.task)) if job.learns else (ZERO, ZERO)
-            graph = graph_of(job, task, count)
-            velocity, momentum = map(list, correction)
-            result = graph.changed(
-                {"targets.velocity_correction": velocity, "targets.momentum_correction": momentum}
-            ).run(log=job.learns)
-            if task is asked:
-                landed.append(result.success)
-            if job.learns:
-                mass = find_robot("bruce").total_mass
-                lesson = lesson_of(result.signal, plan, mass, correction)
+            if learns:
+                write_learnt(file, learnt)
+            graph = graph_of(job.seed, told, asked, task, count, file if learns else None)
+            result = graph.run(log=learns)
+            if task is asked.task:
+                tilt = result.metrics.get("peak_tilt_deg")
+                found[name].append(
+                    {"success": result.success, "reason": result.reason, "tilt": tilt}
+                )
+            if learns and asked.graph == ALONE:
+                plan, mass = planned(task), find_robot("bruce").total_mass
+                applied = learnt.correction(launch_of(plan.task))
+                lesson = lesson_of(result.signal, plan, mass, applied)
                 learnt = learnt if lesson is None else learnt.with_lesson(lesson)
-        found.append(landed)
     return found
 
 
-def graph_of(job: RobotJob, task: Mapping[str, float], number: int) -> Graph:
+def graph_of(
+    seed: int, told: Told, asked: AskedJump, task: Mapping[str, Any], number: int,
+    learnt: Path | None = None,
+) -> Graph:  # fmt: skip
     """The graph of a robot's jump, with noise of its own."""
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
-    if job.told == "calibration":
-        include.append(calibrated(job.seed))
+    if told == "calibration":
+        include.append(calibrated(seed))
     sets: dict[str, Any] = {
-        "plan.task": dict(task), "robot.seed": job.seed, "robot.noise_seed": _NOISES * job.seed + number,
+        "plan.task": with_margin(task), "robot.seed": seed, "robot.noise_seed": _NOISES * seed + number,
+        **asked.sets,
     }  # fmt: skip
-    graph = load_cell(graphs / "jump.yaml", include, sets, graphs / "bench.yaml")
-    if job.told == "draws":
-        return graph.changed(told_values(graph, CALIBRATED, seed=job.seed))
+    if learnt is not None:
+        sets["plan.learnt"] = str(learnt)
+    graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml")
+    if told == "draws":
+        return graph.changed(told_values(graph, CALIBRATED, seed=seed))
     return graph
+
+
+def with_margin(task: Mapping[str, Any]) -> dict[str, Any]:
+    """The task, planned with ``EFFORT``."""
+    return {"effort": EFFORT, **task}
 
 
 @cache
@@ -136,17 +181,21 @@ def calibrated(seed: int) -> Path:
     return file
 
 
+def planned(task: Mapping[str, Any]) -> PlannedJump:
+    """The plan of a task of BRUCE."""
+    return _planned(frozenset(with_margin(task).items()))
+
+
 @cache
-def planned(task: frozenset[tuple[str, float]]) -> PlannedJump:
-    """The plan of a task of BRUCE, given by its items."""
+def _planned(task: frozenset[tuple[str, Any]]) -> PlannedJump:
     return PlanLibrary(find_robot("bruce"), None).plan(make_task({"name": "jump", **dict(task)}))[0]
 
 
-def _row(what: str, robots: Sequence[Sequence[bool]], learns: bool) -> Row:
-    last = [runs[-1] for runs in robots]
+def _row(what: str, robots: Sequence[Sequence[Mapping[str, Any]]]) -> Row:
+    last = [runs[-1]["success"] for runs in robots]
     low, high = wilson_interval(sum(last), len(last))
-    times = [sum(run[k] for run in robots) for k in range(len(robots[0]))]
+    times = [sum(run[k]["success"] for run in robots) for k in range(len(robots[0]))]
     told = f"{sum(last)} of {len(last)} robots, 95 % interval {low:.2f} to {high:.2f}, trial real"
-    if learns:
+    if len(times) > 1:
         told += f"; jumps 1 to {len(times)}: {', '.join(map(str, times))}"
     return Row(f"do not land {what}", 1.0 - sum(last) / len(last), "", goal=MISSED_GOAL, note=told)

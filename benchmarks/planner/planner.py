@@ -146,7 +146,7 @@ SNOPT = "SNOPT through Drake"
 SNOPT_GOAL = 1.0 / 30.0
 TIME_LIMIT = 120.0
 """s of CPU that SNOPT is given for a task."""
-INSTALL = "Drake is not installed: pip install aloft[peers]"
+INSTALL = "Drake is not installed: pip install aloft-robotics[peers]"
 
 
 def solver_rows(tasks: dict[str, dict[str, Any]], rounds: int = 3) -> list[Row]:

@@ -374,7 +374,11 @@ def _missing(package: str) -> str:
     """Why a peer cannot be measured; empty where it is installed."""
     from importlib.util import find_spec
 
-    return "" if find_spec(package) else f"not installed: pip install aloft[peers] has {package}"
+    return (
+        ""
+        if find_spec(package)
+        else f"not installed: pip install aloft-robotics[peers] has {package}"
+    )
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from ...mathematics.rotations import (
     logarithm,
     mean_heading,
     multiply,
+    turn_about_vertical,
 )
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
@@ -392,14 +393,6 @@ def pattern_turn(
         sine += ax * by - ay * bx
         cosine += ax * bx + ay * by
     return math.atan2(sine, cosine)
-
-
-@kernel
-def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
-    """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    x, y = vector[0], vector[1]
-    out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
 
 
 @kernel

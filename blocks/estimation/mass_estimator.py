@@ -25,9 +25,10 @@ from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector, solve_rows
 from ...mathematics.rotations import skew
 from ...robots.description import RobotDescription
-from ...robots.limb import chain_to
+from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.per_joint import PerJoint
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JointState, MassEstimate, Phase, PhaseState
 
@@ -77,6 +78,12 @@ class MassParameters(Parameters):
     )
     friction_speed: float = parameter(
         0.05, unit="rad/s", gt=0.0, text="speed above which a joint moves"
+    )
+    friction: PerJoint = parameter(
+        PerJoint(0.0), unit="N m", text="known joint friction beyond the description's"
+    )
+    damping: PerJoint = parameter(
+        PerJoint(0.0), unit="N m s/rad", text="known joint damping, likewise"
     )
     friction_time: float = parameter(
         0.3, unit="s", gt=0.0, text="correlation time of the unknown friction"
@@ -158,7 +165,8 @@ class MassEstimator(Block):
     d of the torso's centre of mass, and the friction c. The acceleration a is the derivative of the
     generalised velocity, filtered as the torques are.
 
-    Friction limits the accuracy (``docs/estimation.md``). The unknown part of each joint is a process of
+    Friction limits the accuracy (``docs/estimation.md``): what a robot has more of than its description
+    belongs to ``friction`` and ``damping``, or it is taken for a torso whose mass is elsewhere. The unknown part of each joint is a process of
     the standard deviation ``friction_share`` times the joint's friction that is forgotten within
     ``friction_time``; in a joint that moves only the share ``friction_left`` of it is left. An error
     ``tilt_std`` of the estimated tilt cannot be told from an offset, so it is an unknown too: the
@@ -193,20 +201,17 @@ class MassEstimator(Block):
     ) -> Mapping[str, int]:
         """The number of unknowns, and of the joints of the longest leg."""
         assert robot is not None
-        longest = max(len(chain_to(robot, foot.link)) for foot in robot.feet)
+        longest = leg_joints(robot).shape[1]
         return {"n_unknowns": FRICTION + len(robot.joints), "n_leg_joints": longest}
 
     def setup(self) -> None:
         robot, constants = self.robot, self.constants
         constants.mass = robot.total_mass
         constants.torso_mass = next(x.mass for x in robot.links if x.name == robot.base)
-        constants.friction[:] = robot.motors.friction
-        constants.damping[:] = robot.motors.damping
+        constants.friction[:] = robot.motors.friction + self.params.friction.resolve(robot)
+        constants.damping[:] = robot.motors.damping + self.params.damping.resolve(robot)
         constants.foot_of_point[:] = robot.foot_of_contact()
-        constants.leg_joints[:] = -1
-        for foot, joints in zip(robot.feet, constants.leg_joints, strict=True):
-            chain = chain_to(robot, foot.link)
-            joints[: len(chain)] = chain
+        constants.leg_joints[:] = leg_joints(robot)
 
     def prepare(self) -> None:
         p, constants, period = self.params, self.constants, self.period

@@ -69,6 +69,7 @@ class AlignmentScratch(Signal):
     force = Field(3, unit="m/s^2", frame="body", text="a specific force")
     swing = Field(3, unit="rad/s^2", frame="body", text="angular acceleration")
     inwards = Field(3, unit="m/s", frame="body", text="velocity of the IMU's place by the rotation")
+    position = Field("n_joints", unit="rad", text="joint angles without the play")
 
 
 class SensorAlignment(Block):
@@ -86,7 +87,8 @@ class SensorAlignment(Block):
         f_base = f - w' x r - w x (w x r)
 
     with the angular acceleration w' of the last tick. An encoder on the motor, behind a gear with play, reads
-    half the play more or less, by the sign of the torque, which is measured; that is taken off.
+    half the play more or less, by the sign of the torque, which is measured with it; that is taken off before
+    angles are brought to another time.
 
     With equal ages the outputs are the inputs. An age beyond 15 ticks of the oldest is taken for 15.
     """
@@ -129,7 +131,12 @@ class SensorAlignment(Block):
         count = memory.count
         keep(measured_imu.angular_velocity, memory.rate, count)
         keep(measured_imu.specific_force, memory.force, count)
-        keep(measured_joints.position, memory.position, count)
+        scratch.position[:] = measured_joints.position
+        if constants.has_play:
+            take_off_play(
+                measured_joints.torque, constants, memory, scratch.position, period
+            )  # fmt: skip
+        keep(scratch.position, memory.position, count)
         keep(measured_joints.velocity, memory.velocity, count)
         interpolate(memory.rate, count, (oldest - params.rate) / period, imu.angular_velocity)
         interpolate(memory.force, count, (oldest - params.force) / period, imu.specific_force)
@@ -138,8 +145,6 @@ class SensorAlignment(Block):
         joints.torque[:] = measured_joints.torque
         if constants.moved:
             bring_to_base(imu, constants, scratch, memory, period)
-        if constants.has_play:
-            take_off_play(joints, constants, memory, period)
         memory.count = count + 1
 
 
@@ -168,14 +173,18 @@ def bring_to_base(
 
 @kernel
 def take_off_play(
-    joints: JointState, constants: AlignmentConstants, memory: AlignmentMemory, period: float
+    torque: Array1D,
+    constants: AlignmentConstants,
+    memory: AlignmentMemory,
+    position: Array1D,
+    period: float,
 ) -> None:
-    """Take off joint angles [rad] what the gears' play adds to them, by the measured torques."""
+    """Take off joint angles [rad] what the gears' play adds to them, by the torques that were measured with them."""
     share = -math.expm1(-period / PLAY_TIME)
-    for k in range(joints.position.shape[0]):
-        end = constants.play[k] * math.tanh(joints.torque[k] / PLAY_TORQUE)
+    for k in range(position.shape[0]):
+        end = constants.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
         memory.play[k] += share * (end - memory.play[k])
-        joints.position[k] -= memory.play[k]
+        position[k] -= memory.play[k]
 
 
 @kernel

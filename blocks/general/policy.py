@@ -180,7 +180,9 @@ def _session(path: Path, shown: str) -> Any:
     try:
         import onnxruntime
     except ImportError:
-        raise ValueError("blocks.Policy needs ONNX Runtime: pip install 'aloft[onnx]'") from None
+        raise ValueError(
+            "blocks.Policy needs ONNX Runtime: pip install 'aloft-robotics[onnx]'"
+        ) from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL

@@ -70,6 +70,14 @@ class StepParams(Parameters):
         ge=0.0,
         text="height up to which the other points of a foot carry load while another foot steps",
     )
+    seek_speed: float = live_parameter(
+        0.0, unit="m/s", ge=0.0, le=2.0,
+        text="downward speed of a foot that has not touched after the touchdown of another; 0: it is "
+        "left to its inverse kinematics",
+    )  # fmt: skip
+    seek_damping: float = live_parameter(
+        60.0, unit="1/s", ge=0.0, le=500.0, text="gain on the error of that speed"
+    )
 
 
 class StepMemory(Signal):
@@ -143,6 +151,11 @@ class CaptureStep(Block):
     after 1.5 of it. The robot stays in LANDING, low, until ``settle`` after the last step, and then
     recovers.
 
+    **Seeking the ground.** With ``seek_speed`` v a foot without a point in stance in LANDING, while others
+    stand, goes on down: its points get the acceleration d (-v e_z - p'), with d the ``seek_damping`` and p'
+    their velocity. It is a task of the whole-body controller, like a step: driven by its joints alone the
+    leg turns the torso by 20 degrees where one foot lands 2 cm higher than the other. It counts as no step.
+
     The block plans one step at a time, on level ground, and does not return the feet to where they
     stood. A robot with a single foot takes none.
     """
@@ -196,6 +209,8 @@ class CaptureStep(Block):
         phase.step_acceleration[:] = 0.0
         lands = before.phase == Phase.LANDING or before.phase == Phase.RECOVER
         goes_on = reference.lift_off_time > reference.time
+        if params.seek_speed > 0.0 and before.phase == Phase.LANDING:
+            seek_ground(before, terms, params, constants, phase)
         if not lands or goes_on or constants.side.shape[0] < 2:
             memory.foot = 0
             memory.taken = 0
@@ -207,6 +222,36 @@ class CaptureStep(Block):
         if memory.foot > 0:
             swing_foot(before, terms, params, constants, memory, phase, scratch, rate)
         hold_low(before, params, memory, phase, before.phase)
+
+
+@kernel
+def seek_ground(
+    before: PhaseState,
+    terms: DynamicsTerms,
+    params: StepParams,
+    constants: StepConstants,
+    out: PhaseState,
+) -> None:
+    """Move the feet down that have not touched yet, while another one stands.
+
+    As tasks of the whole-body controller, so that it knows how the moving leg pushes the torso.
+    """
+    count, any_stance = constants.foot_of_point.shape[0], False
+    for i in range(count):
+        any_stance = any_stance or before.stance[i]
+    for i in range(count):
+        stands = not any_stance
+        for j in range(count):
+            if constants.foot_of_point[j] == constants.foot_of_point[i] and before.stance[j]:
+                stands = True
+        if stands:
+            continue
+        out.stepping[i] = True
+        for k in range(3):
+            speed = terms.contact_velocity[i, k]
+            if k == 2:
+                speed += params.seek_speed
+            out.step_acceleration[i, k] = -params.seek_damping * speed
 
 
 @kernel

@@ -46,6 +46,8 @@ class PhaseCondition(IntEnum):
     """No point has had contact for too long."""
     STANDS = 9
     """All points have had contact for long enough."""
+    SQUATS_AGAIN = 10
+    """Another flight is planned, and the plan is in its squat."""
 
 
 class PhaseTransition(NamedTuple):
@@ -74,6 +76,7 @@ TRANSITIONS = (
     PhaseTransition(Phase.LANDING, PhaseCondition.THRUSTS_AGAIN, Phase.THRUST),
     PhaseTransition(Phase.LANDING, PhaseCondition.RESTED, Phase.RECOVER),
     PhaseTransition(Phase.RECOVER, PhaseCondition.LOST_CONTACT, Phase.FAULT),
+    PhaseTransition(Phase.RECOVER, PhaseCondition.SQUATS_AGAIN, Phase.SQUAT),
 )
 """All transitions. In each phase the first transition whose condition holds is taken; a phase
 without transitions, such as FAULT, lasts to the end of the run."""
@@ -126,6 +129,7 @@ def find_conditions(
     holds[PhaseCondition.RESTED] = not another and in_phase >= limits[LANDING_TIME]
     holds[PhaseCondition.THRUSTS_AGAIN] = another and planned == Phase.THRUST
     holds[PhaseCondition.LOST_CONTACT] = unloaded > limits[LOST_CONTACT]
+    holds[PhaseCondition.SQUATS_AGAIN] = another and planned == Phase.SQUAT
     holds[PhaseCondition.STANDS] = times[STOOD] >= limits[STAND_TIME]
 
 
@@ -166,7 +170,7 @@ class JumpPhase(Block):
                   delay at the predicted touchdown, see below
     LANDING       ``landing_time`` after touchdown; where the plan has another flight, with the
                   planned thrust, and THRUST follows again
-    RECOVER       never; it follows the last LANDING
+    RECOVER       with the squat of another plan (``SteeredPlan``); else never. It follows a LANDING
     FAULT         never; entered from any other phase on the conditions below
     ============  =====================================================================
 
@@ -196,7 +200,7 @@ class JumpPhase(Block):
     all its points. A ``TriggeredJumpPlan`` begins then.
 
     The block does not judge tilt, torques or sensors (``SafetyMonitor`` does), and it never goes
-    back to an earlier phase except for another planned flight.
+    back to an earlier phase except for another planned flight or plan.
     """
 
     class Params(Parameters):

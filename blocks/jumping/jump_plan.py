@@ -27,9 +27,7 @@ from .plan_progress import (
     PlanProgress,
     ProgressConstants,
     ProgressParameters,
-    follow_fall,
-    follow_thrust,
-    follow_turn,
+    follow_plan,
 )
 
 if TYPE_CHECKING:
@@ -356,30 +354,6 @@ class JumpPlan(Block):
         kept = library.path_of(task)
         self.files_read = (kept,) if kept is not None else ()
         return plan
-
-
-@kernel
-def follow_plan(
-    now: float,
-    terms: DynamicsTerms,
-    delay: DelayEstimate,
-    reference: JumpReference,
-    progress: PlanProgress,
-    table: TableRows,
-    rotation: FlightRotation,
-    params: ProgressParameters,
-    constants: ProgressConstants,
-) -> None:
-    """Read the plan at the time ``now`` [s] of the run, and keep it in time with the robot."""
-    lead = delay.delay if constants.lead < 0.0 else constants.lead
-    early = min(delay.ahead, lead)
-    time = now - progress.late + early
-    read_table(table, time, lead - early, constants.period, reference)
-    if constants.follows_motion:
-        follow_thrust(time, terms, reference, progress, params, constants)
-        follow_fall(time, terms, reference, progress, params, constants)
-    if constants.follows_turn:
-        follow_turn(time, terms, reference, rotation, progress, constants)
 
 
 class TriggeredJumpPlan(JumpPlan):

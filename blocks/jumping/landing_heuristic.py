@@ -54,10 +54,6 @@ SLOWEST_DESCENT = 0.3
 """The least speed of descent [m/s] by which a change of the legs' length changes the time."""
 
 
-SEEK_TIME = 0.05
-"""A foot that seeks the ground aims as far below where it is as it moves in this time [s]."""
-
-
 def _three(value: object) -> object:
     """One number stands for all three axes."""
     return (value,) * 3 if isinstance(value, int | float) else value
@@ -109,11 +105,6 @@ class LandingParams(PredictionGains):
     retraction_time: float = live_parameter(
         0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
     )
-    seek_speed: float = live_parameter(
-        0.0, unit="m/s", ge=0.0, le=2.0,
-        text="downward speed of a foot that has not touched after the touchdown of another; 0: it stays "
-        "at the height of the lowest foot",
-    )  # fmt: skip
 
 
 class LandingMemory(PredictionMemory):
@@ -300,10 +291,6 @@ class LandingHeuristic(Block):
                 place[:2] = memory.goal[foot, :2] - terms.com[:2]
                 place[2] = lowest - terms.com[2]
                 speed[:] = -terms.com_velocity
-                if params.seek_speed > 0.0:
-                    below = params.seek_speed * SEEK_TIME
-                    place[2] = terms.foot_position[foot, 2] - below - terms.com[2]
-                    speed[2] -= params.seek_speed
             else:
                 place[:] = memory.planned[foot]
             convert_to_body(foot, reference.foot_yaw[foot], terms, feet, scratch)

@@ -9,10 +9,10 @@ from ...mathematics.arrays import Array1D, Array2D, Matrix3
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle
-from ...planner.library.jump_table import FlightRotation, locate
+from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import DynamicsTerms, JumpReference, Phase
+from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
 from .jump_phase import planned_touchdown_height, time_to_height
 
 FASTEST = 0.5
@@ -97,6 +97,30 @@ class ProgressConstants(Signal):
     late = Field(unit="s", text="``Turning.late``")
     aim = Field(unit="rad", text="``Turning.aim``")
     period = Field(unit="s", text="of the block")
+
+
+@kernel
+def follow_plan(
+    now: float,
+    terms: DynamicsTerms,
+    delay: DelayEstimate,
+    reference: JumpReference,
+    progress: PlanProgress,
+    table: TableRows,
+    rotation: FlightRotation,
+    params: ProgressParameters,
+    constants: ProgressConstants,
+) -> None:
+    """Read the plan at the time ``now`` [s] of the run, and keep it in time with the robot."""
+    lead = delay.delay if constants.lead < 0.0 else constants.lead
+    early = min(delay.ahead, lead)
+    time = now - progress.late + early
+    read_table(table, time, lead - early, constants.period, reference)
+    if constants.follows_motion:
+        follow_thrust(time, terms, reference, progress, params, constants)
+        follow_fall(time, terms, reference, progress, params, constants)
+    if constants.follows_turn:
+        follow_turn(time, terms, reference, rotation, progress, constants)
 
 
 @kernel

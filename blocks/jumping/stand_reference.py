@@ -8,10 +8,15 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.interpolation import minimum_jerk
-from ...planner.library.jump_table import JumpTable
+from ...mathematics.kernel import kernel
+from ...planner.library.jump_table import JumpTable, TableRows, read_table
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
+from ...runtime.language.block import Input, State
+from ...runtime.language.context import Clock
 from ...runtime.language.parameters import parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import DelayEstimate, JumpReference, Phase, PhaseState
 from .guided_motion import (
     NEVER,
     GuidedBody,
@@ -57,6 +62,42 @@ class StandReference(GuidedReference):
         p = self.params
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
         return _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
+
+
+class TriggerMemory(Signal):
+    """When the motion begins."""
+
+    began = Field(unit="s", text="the time of the run at which the robot stood")
+
+
+class TriggeredStandReference(StandReference):
+    """A ``StandReference`` that begins when the robot stands, and not with the run.
+
+    While the ``phase`` of the tick before is HANG the reference is its beginning, and ``reference.time`` is
+    negative. Wire it with ``{from: phase.phase, delay: 1, initial: {phase: -1}}``.
+    """
+
+    phase = Input(PhaseState, text="the phase; the motion begins after HANG")
+    memory = State(TriggerMemory, text="when the motion begins")
+
+    @kernel
+    @staticmethod
+    def step(  # type: ignore[override]  # it has another port
+        delay: DelayEstimate,
+        phase: PhaseState,
+        reference: JumpReference,
+        memory: TriggerMemory,
+        table: TableRows,
+        hold: float,
+        params: StandReference.Params,
+        clock: Clock,
+    ) -> None:
+        now = clock.base_period * clock.tick
+        if phase.phase == Phase.HANG:
+            memory.began = now + clock.base_period
+            read_table(table, -clock.base_period, 0.0, hold, reference)
+            return
+        read_table(table, now - memory.began + delay.ahead, params.lead, hold, reference)
 
 
 @lru_cache(maxsize=8)

@@ -91,8 +91,9 @@ class JumpScore(Block):
     On ground that is not as level as the task says (``ground_tolerance``) three of them differ. The simulator lets soles
     of several points touch the ground between these points, and counts that in its metric
     ``robot_sole_contacts``. Load there is not measured, so rest (6) is judged by what the robot does: tilt
-    and speeds; soles need not be flat, and neither load share nor support count. The ground under a
-    contact point may be so far above or below the ``landing_height``.
+    and speeds; soles need not be flat, and neither load share nor support count. A foot without a loaded point
+    counts as off the ground (7) only if all its points are higher above it than the tolerance. The ground under
+    a contact point may be so far above or below the ``landing_height``.
 
     A jump begins with its plan: a robot that is put down from a gantry before is not judged.
 
@@ -128,6 +129,8 @@ class JumpScore(Block):
         assert isinstance(criteria, JumpCriteria)
         self._criteria = criteria
         self.constants.fill(footing, criteria, criteria.slip_delay, self.period)
+        if criteria.ground_tolerance:
+            self.constants.clearance = criteria.ground_tolerance
         self.constants.planned = "reference" in self.context.wired
 
     @kernel
@@ -326,7 +329,7 @@ def record_landing(
     landed = record.now - record.touchdown_time
     stay = landed >= params.slip_delay - 1e-9
     record.peak_tilt = max(record.peak_tilt, tilt(truth.base_orientation))
-    record_feet(truth.contact_touched, record, params, constants, stay)
+    record_feet(truth, record, params, constants, stay)
     if record.steps != 0:
         landed = min(landed, record.now - largest_of(record.step_end))
     if record.judged_time == NEVER and landed >= params.rest_time - 1e-9:

@@ -121,7 +121,7 @@ class StandScore(Block):
         settled = now >= params.settle_time - 1e-9
         if settled:
             record.peak_tilt = max(record.peak_tilt, tilt(truth.base_orientation))
-        record_feet(truth.contact_touched, record, params, constants, settled)
+        record_feet(truth, record, params, constants, settled)
         judged = record.judged_time == NEVER and now >= params.judge_time - 1e-9
         if judged:
             record_rest(truth, record, constants)

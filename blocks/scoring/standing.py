@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import degrees, radians, sqrt
 from typing import Any
 
-from ...mathematics.arrays import Array1D, Flags1D
+from ...mathematics.arrays import Array1D
 from ...mathematics.capture_step import support_margin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import tilt
@@ -118,6 +118,9 @@ class StandConstants(Signal):
     fall_height = Field(unit="m", text="a base lower above the ground has fallen")
     settling = Field(unit="s", text="a foot that has taken a step may settle for so long")
     period = Field(unit="s", text="of a tick of the score")
+    clearance = Field(
+        unit="m", text="a foot with a point below this height above the ground is not off it"
+    )
 
     def fill(
         self, footing: Footing, criteria: StandCriteria, settling: float, period: float
@@ -126,6 +129,7 @@ class StandConstants(Signal):
         self.foot_of_point[:] = footing.foot_of_point
         self.weight, self.fall_height = footing.weight, criteria.fall_height
         self.settling, self.period = settling, period
+        self.clearance = -1.0  # on level ground only load counts
 
 
 @kernel
@@ -179,7 +183,7 @@ def record_fall(
 
 @kernel
 def record_feet(
-    touched: Flags1D,
+    truth: RobotTruth,
     record: StandRecord,
     params: StandCriteria,
     constants: StandConstants,
@@ -194,21 +198,28 @@ def record_feet(
         record.landed_foot[:] = record.foot
         return
     for foot in range(record.foot.shape[0]):
-        record_foot(touched, record, params, constants, foot)
+        record_foot(truth, record, params, constants, foot)
 
 
 @kernel
 def record_foot(
-    touched: Flags1D,
+    truth: RobotTruth,
     record: StandRecord,
     params: StandCriteria,
     constants: StandConstants,
     foot: int,
 ) -> None:
-    """How far a foot that should stay slides, and how long it is off the ground."""
+    """How far a foot that should stay slides, and how long it is off the ground.
+
+    On uneven ground a foot none of whose points is loaded may stand on an edge between them: it is off the
+    ground if all its points are higher above it than ``constants.clearance``.
+    """
     now, loaded = record.now, False
-    for point in range(touched.shape[0]):
-        if constants.foot_of_point[point] == foot and touched[point]:
+    for point in range(truth.contact_touched.shape[0]):
+        if constants.foot_of_point[point] != foot:
+            continue
+        above = truth.contact_position[point, 2] - truth.ground_height[point]
+        if truth.contact_touched[point] or above < constants.clearance:
             loaded = True
     lifted = 0.0 if loaded else record.lifted_time[foot] + constants.period
     record.lifted_time[foot] = lifted

@@ -16,6 +16,14 @@ class ContactState(Signal):
     active = Field("n_contacts", dtype="bool", text="whether each point is in contact")
 
 
+class FootLoad(Signal):
+    """What the torques of the legs say of the load on each foot."""
+
+    force = Field("n_feet", unit="N", text="upward force on each foot")
+    centre = Field(("n_feet", 3), unit="m", frame="world", text="where it acts on the sole")
+    loaded = Field("n_feet", dtype="bool", text="whether the foot carries load")
+
+
 class SwitchFault(IntEnum):
     """What is wrong with a foot switch."""
 

@@ -1,9 +1,10 @@
-"""``aloft robot bring-up``: the guided steps before power, with the person at the terminal."""
+"""``aloft robot bring-up``: the guided steps, with the person at the terminal."""
 
 from __future__ import annotations
 
 import select
 import sys
+import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,14 +19,11 @@ from .output import errors_reported, print_json
 
 if TYPE_CHECKING:
     from ...hal.bear.bring_up.session import Request, Session
-    from ...hal.bear.bring_up.steps import Step
-    from ...hal.bear.configuration import Hardware
-    from ...robots.robot_description import RobotDescription
+    from ...hal.bear.bring_up.steps import BringUpStep
 
 PATIENCE = 300.0
 """How long a step waits for the person [s]."""
 _PAUSE = 0.005
-_TWIN = "twin"
 
 
 def bring_up(
@@ -34,33 +32,37 @@ def bring_up(
         str | None,
         typer.Option("--from", help="The step to begin with; else behind the last that passed."),
     ] = None,
+    last: Annotated[
+        str | None, typer.Option("--to", help="The step to end with; else the last of all.")
+    ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Ask nobody: only where both ports are `twin`.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Walk through the steps before power: robot, drives, directions, zero, limits, IMU, switches."""
-    from ...hal.bear.bring_up.session import Journal
+    """Walk through all steps from the first look to a hop of 12 cm; power comes with the step `current`."""
+    from ...hal.bear.bring_up.session import BringUpRecord
     from ...hal.bear.bring_up.walk import UnknownStepError, walk
 
     with errors_reported(as_json), _session(file, yes) as session:
-        journal = Journal(file)
+        record = BringUpRecord(file)
         entries: list[dict[str, Any]] = []
         try:
-            for entry in walk(session, journal, first, _announce):
+            for entry in walk(session, record, first, last, _announce):
                 entries.append(entry)
                 _tell(entry)
         except UnknownStepError as error:
             raise AloftError(str(error.args[0])) from error
         passed = all(entry["passed"] for entry in entries)
         if as_json:
-            print_json({"success": passed, "journal": str(journal.path), "steps": entries})
+            print_json({"success": passed, "record": str(record.path), "steps": entries})
             if not passed:
                 raise typer.Exit(1)
         elif not passed:
             raise AloftError(f"step {entries[-1]['step']} did not pass; mend it, and go on from it")
         else:
-            _say("all steps before power passed: go on with docs/bring_up.md, one motor")
+            what = "all steps passed" if last is None else f"all steps up to {last} passed"
+            _say(f"{what}: go on with docs/bring_up.md")
 
 
 def _say(text: str) -> None:
@@ -68,34 +70,41 @@ def _say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _announce(step: Step) -> None:
+def _announce(step: BringUpStep) -> None:
     _say(f"\n{step.name}: what could be wrong: {step.risk}")
 
 
 def _tell(entry: dict[str, Any]) -> None:
     _say(f"{entry['step']}: {'passed' if entry['passed'] else 'NOT PASSED'}")
-    for each in entry["findings"]:
+    for each in entry["discrepancies"]:
         _say(
             f"  {each['place']}: expected {each['expected']}, found {each['found']}; {each['fix']}"
         )
 
 
-class Terminal:
+class TerminalOperator:
     """The person at the terminal, who confirms with the return key."""
 
     def do(self, request: Request, observe: Callable[[], None]) -> None:
         """Show what to do, and observe until it is confirmed.
 
         Raises:
-            AloftError: nobody confirms in time, or standard input ended.
+            AloftError: nobody confirms in time, something else is typed, or standard input ended.
         """
-        _say(f"  {request.text}; then press return")
+        if sys.stdin.isatty():  # what was typed before the text was read confirms nothing
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+        _say(f"  {request.text}; then press return, or type stop")
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             observe()
             if select.select([sys.stdin], [], [], _PAUSE)[0]:
-                if not sys.stdin.readline():
+                line = sys.stdin.readline()
+                if not line:
                     raise AloftError("standard input ended before the step was done")
+                if line.strip():
+                    raise AloftError(
+                        f"{line.strip()!r} instead of return: stopped; call it again to go on"
+                    )
                 observe()
                 return
         raise AloftError(f"nobody confirmed within {PATIENCE:g} s")
@@ -121,53 +130,30 @@ class Terminal:
 def _session(file: Path, yes: bool) -> Iterator[Session]:
     from ...hal.bear.configuration import Hardware
     from ...robots.description import find_robot
+    from .bring_up_session import TWIN, port_session, twin_session
 
     try:
         robot = find_robot(Hardware.read(file).robot)
     except LookupError as error:
         raise AloftError(str(error.args[0])) from error
     hardware = Hardware.read(file, robot)
-    on_twin = hardware.bus.port == hardware.board.port == _TWIN
+    on_twin = hardware.bus.port == hardware.board.port == TWIN
     if yes != on_twin:
         raise AloftError(
             "--yes asks nobody, and is for a file whose two ports are `twin`"
             if yes
             else "both ports are `twin`, on which nobody can be asked: give --yes"
         )
-    with _on_twin(file, robot, hardware) if on_twin else _on_ports(file, robot, hardware) as opened:
-        yield opened
+    if on_twin:
+        from ...hal.twin.by_hand import HandErrors, RobotByHand
+        from ...hal.twin.wiring import Wiring
 
-
-@contextmanager
-def _on_twin(file: Path, robot: RobotDescription, hardware: Hardware) -> Iterator[Session]:
-    from ...hal.bear.bring_up.session import Session
-    from ...hal.bear.bus import BearBus
-    from ...hal.bear.sense_board import SenseBoard
-    from ...hal.twin.by_hand import RobotByHand, Wiring
-
-    wiring = Wiring.of(robot)
-    wiring.addresses = {name: motor.id for name, motor in hardware.motors.items()}
-    hand = RobotByHand(robot, wiring)
-    yield Session(
-        file, robot, BearBus(hand.bus_port, reply_time=0.001), SenseBoard(hand.board_port), hand
-    )
-
-
-@contextmanager
-def _on_ports(file: Path, robot: RobotDescription, hardware: Hardware) -> Iterator[Session]:
-    from ...hal.bear.bring_up.session import Session
-    from ...hal.bear.bus import BearBus, open_port
-    from ...hal.bear.sense_board import BoardMode, SenseBoard
-
-    drives = open_port(hardware.bus.port, hardware.bus.baudrate)
-    bus = BearBus(drives, reply_time=hardware.bus.reply_time)
+        wiring = Wiring.of(robot)
+        wiring.addresses = {name: motor.id for name, motor in hardware.motors.items()}
+        session = twin_session(file, robot, RobotByHand(robot, wiring, errors=HandErrors()))
+    else:
+        session = port_session(file, robot, TerminalOperator())
     try:
-        port = open_port(hardware.board.port, 115_200)
-        try:
-            board = SenseBoard(port, hardware.board.mounted(robot))
-            board.send(BoardMode.NOMINAL)
-            yield Session(file, robot, bus, board, Terminal())
-        finally:
-            port.close()
+        yield session
     finally:
-        bus.close()
+        session.close()

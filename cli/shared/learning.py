@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ...runtime.graph import Graph
     from ...runtime.running.run_result import RunResult
 
-RUNGS = (0.02, 0.05, 0.08, 0.12)
-"""The rises of the jumps in place that come before the one that is asked for [m]."""
 NOISE_SEEDS = 1000
 """Jumps of one robot that differ in their noise."""
 
@@ -91,6 +89,8 @@ def learn_jumps(
     """
     assert options.learn is not None
     file = options.learn.absolute()
+    from ...studies.jump_learning import ladder
+
     tasks = [*(ladder(asked, rise) if options.ladder else ()), *[dict(asked)] * options.times]
     attempts: list[Attempt] = []
     code = ExitCode.SUCCESS
@@ -129,17 +129,6 @@ def learn_jumps(
     return code
 
 
-def ladder(asked: Mapping[str, float], rise: float) -> list[dict[str, float]]:
-    """Smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and turned."""
-    found = [{"rise": rung} for rung in RUNGS if rung < rise - 0.005]
-    half = {
-        name: 0.5 * asked[name] for name in ("distance_x", "distance_y", "twist") if name in asked
-    }
-    if half:
-        found += [{"rise": rise}, {"rise": rise, **half}]
-    return found
-
-
 def known(file: Path, ready: PlannedGraph) -> LearntJumps:
     """What the robot has learnt so far."""
     from ...planner.library.learnt import LearntJumps, read_learnt
@@ -176,7 +165,7 @@ def show(attempts: Sequence[Attempt], out: Console) -> None:
     rows = []
     for attempt in attempts:
         row = [attempt.task, "yes" if attempt.success else "no"]
-        row += [f"{1e3 * value:.0f}" for value in attempt.velocity[:2]]
+        row += [f"{1e3 * value:.0f}" for value in attempt.velocity]
         row += [f"{1e3 * value:.0f}" for value in attempt.momentum]
         if attempt.lesson is None:
             row += ["", ""]
@@ -185,7 +174,7 @@ def show(attempts: Sequence[Attempt], out: Console) -> None:
             row.append(" ".join(f"{degrees(value):.1f}" for value in attempt.lesson.tilt))
         rows.append(tuple(row))
     columns = (
-        "jump", "success", ">velocity x [mm/s]", ">y", ">momentum x [mN m s]", ">y", ">z",
+        "jump", "success", ">velocity x [mm/s]", ">y", ">z", ">momentum x [mN m s]", ">y", ">z",
         ">off its place [mm]", ">tilt, heading [deg]",
     )  # fmt: skip
     out.print(table("corrections of each jump, and what it found of itself", columns, rows))

@@ -172,15 +172,22 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
         yield progress, progress.add_task(text, total=total)
 
 
+MANY_KERNELS = 10
+"""Fewer are compiled in some seconds, of which nobody need be told."""
+
+
 @contextmanager
 def compiling_shown(progress: Progress) -> Iterator[None]:
-    """Show a second bar while kernels are compiled, which only the first run on a machine does."""
+    """Show a second bar while kernels are compiled, which only the first run on a machine does; a line
+    where there is no terminal."""
     from ...mathematics.compiling.compile_calls import watchers
 
     bars: list[TaskID] = []
 
     def watch(done: int, total: int) -> None:
         if not bars:
+            if not progress.console.is_terminal and total >= MANY_KERNELS:
+                say(progress.console, f"compiling {total} kernels, on the first run only")
             bars.append(progress.add_task("compiling, on the first run only", total=total))
         progress.update(bars[0], completed=done, visible=done < total)
 

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
 
 
-def print_plan(screen: Console, plan: PlannedJump, *, tests: bool = True) -> None:
-    """Print what the recipe chose, what the plan does, how it was solved, and every test."""
+def print_plan(
+    screen: Console, plan: PlannedJump, robot: RobotDescription, *, tests: bool = True
+) -> None:
+    """Print what the recipe chose, what the plan does to ``robot``, how it was solved, and every test."""
     chosen = [
         (each["parameter"], _shown(each["value"]), each["why"])
         for each in plan.statistics.get("chosen", ())
@@ -40,6 +42,9 @@ def print_plan(screen: Console, plan: PlannedJump, *, tests: bool = True) -> Non
         title = f"{plan.task.name}: chosen by the recipe"
         screen.print(table(title, ("parameter", "value", "why"), chosen))
     figures = [(name, number(value)) for name, value in plan.report["figures"].items()]
+    heat = winding_heat(plan, robot)
+    hottest = max(heat, key=lambda motor: heat[motor])
+    figures.append((f"winding_heat_j, {hottest}", number(heat[hottest])))
     figures += [
         (name, number(plan.statistics[name]))
         for name in SHOWN_STATISTICS
@@ -61,6 +66,21 @@ def print_plan(screen: Console, plan: PlannedJump, *, tests: bool = True) -> Non
     ]
     columns = ("test", "passed", ">found", ">allowed", "unit", "where")
     screen.print(table(f"{plan.task.name}: validity", columns, rows))
+
+
+def winding_heat(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]:
+    """The copper heat of each motor's winding from the first knot to the last [J], by the resistance and the torque
+    constant that ``blocks.SafetyMonitor`` takes by default.
+
+    A run also stands before and after: in simulation ``winding_heat_j`` of jumps of 12 cm is 10 J more.
+    """
+    from ...blocks.control.safety_monitor import SafetyMonitor
+
+    copper = SafetyMonitor.Params()
+    torque = np.asarray(plan.joint_torque[:-1] @ robot.torque_to_motor.T)
+    squared = (torque**2 * np.diff(plan.time)[:, None]).sum(axis=0)
+    heat = copper.winding_resistance / copper.torque_constant**2 * squared
+    return dict(zip(robot.transmission.motors, heat.tolist(), strict=True))
 
 
 def _shown(value: Any) -> str:
@@ -92,6 +112,7 @@ def plan_json(
         "cpu_s": plan.statistics.get("cpu_s"),
         "chosen": list(plan.statistics.get("chosen", ())),
         "statistics": dict(plan.statistics),
+        "winding_heat_j": winding_heat(plan, robot),
         **plan.report,
     }
 

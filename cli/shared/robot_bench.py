@@ -145,7 +145,7 @@ def jog(
 ) -> None:
     """Move one motor there and back with little current. Without --arm nothing moves."""
     from ...hal.bear import bench
-    from ...hal.bear.watchdog import open_switch, wait_until_held
+    from .bring_up_session import held_pace
 
     with errors_reported(as_json):
         if not arm:
@@ -153,21 +153,8 @@ def jog(
                 f"{motor} was not moved: jog switches a drive on only with --arm; read "
                 "docs/bring_up.md first"
             )
-        with _bus(file) as (bus, hardware, _):
-            switch = open_switch(hardware.dead_man)
-            try:
-                wait_until_held(switch, 30.0)
-                following = time.monotonic()
-
-                def next_cycle() -> bool:
-                    nonlocal following
-                    following += hardware.bus.period
-                    time.sleep(max(0.0, following - time.monotonic()))
-                    return switch.held()
-
-                track = list(bench.jog(bus, hardware, motor, angle, seconds, next_cycle))
-            finally:
-                switch.close()
+        with _bus(file) as (bus, hardware, _), held_pace(hardware) as next_cycle:
+            track = list(bench.jog(bus, hardware, motor, angle, seconds, next_cycle))
     start = track[0][1]
     farthest = max((reached - start for _, reached in track), key=abs)
     if as_json:

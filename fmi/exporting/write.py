@@ -70,7 +70,9 @@ def export(
     try:
         from pythonfmu3.builder import FmuBuilder
     except ImportError:
-        raise AloftError("an FMU is made with PythonFMU3: pip install 'aloft[fmi]'") from None
+        raise AloftError(
+            "an FMU is made with PythonFMU3: pip install 'aloft-robotics[fmi]'"
+        ) from None
     name = to.stem
     if to.suffix != ".fmu" or not name.isidentifier():
         raise AloftError(f"{to} cannot be the name of an FMU; write it as my_controller.fmu")

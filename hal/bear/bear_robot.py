@@ -57,7 +57,8 @@ class BearRobot(DrivenRobot):
 
     **Time.** A thread exchanges with all drives once every period of the bus, 1 kHz, with goals made
     from the newest command and the newest measurement; the graph runs beside it. Its clock should
-    be ``paced``, or ``robot``: then ticks begin with the thread's cycles.
+    be ``robot``, with which ticks begin with the thread's cycles, or ``paced``; an armed robot is not
+    opened with a ``free`` one.
 
     **Ends.** Every fault ends in the drives' damping mode, and the run with the reason:
 
@@ -125,6 +126,11 @@ class BearRobot(DrivenRobot):
     def open(self) -> None:
         """Connect; if armed, come to the standing pose; then begin to exchange."""
         hardware, params = self._hardware, self.params
+        if params.armed and params.time == "real" and self.context.clock.kind == "free":
+            raise BusError(
+                "the graph would run faster than the robot: nothing was switched on; give it the robot's "
+                "pace, --set clock.kind=robot"
+            )
         bus_port = open_port(hardware.bus.port, hardware.bus.baudrate)
         try:
             board_port = open_port(hardware.board.port, 115_200)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .bulk import BulkExchange
 from .bus import BearBus, BusError
 from .configuration import Hardware, MotorSettings
 from .driver import LISTENING
+from .measurement import READ
 from .motor_loop import WRITE
 from .protocol import Mode, Torque
 from .watchdog import damping_frame
@@ -30,6 +31,8 @@ STILL = 0.005
 """A drive that moves further while it is calibrated is not still [rad]."""
 MAX_JOG = 0.5
 """How far ``jog`` moves a motor at most [rad]."""
+FASTEST_ON_BENCH = 8.0
+"""A motor that turns faster in a test of single motors is damped [rad/s]."""
 _READINGS = 100
 _STOPS = 5
 
@@ -150,54 +153,144 @@ def jog(
     motor = _motor(hardware, name)
     if not 0.0 < abs(angle) <= MAX_JOG:
         raise BusError(f"jog by 0 to {MAX_JOG:g} rad, not by {angle:g}")
-    drives, current = hardware.drives, hardware.soft_start.current
-    if bus.listen(LISTENING):
-        raise BusError("another program or adapter sends instructions on the bus: stop it first")
-    bus.write(motor.id, {"torque_enable": Torque.OFF})
-    reply = bus.ping(motor.id)
-    if is_critical(reply.error_byte):
-        raise BusError(f"drive {name}: {describe_conditions(reply.error_byte)}")
+    current = hardware.soft_start.current
     start = motor.sign * bus.read(motor.id, "present_position")["present_position"] - motor.zero
     for end in (start, start + angle):
         low, high = motor.range
         if not low <= end <= high:
             raise BusError(f"{name} would be at {end:.3f} rad, beyond {low:g} to {high:g}")
     stiffness = current / abs(angle)  # A/rad: the whole current if it did not move at all
-    bus.verify(
-        motor.id,
-        {
-            "mode": Mode.DIRECT_FORCE,
-            "limit_i_max": current,
-            "watchdog_timeout": round(1e6 * drives.watchdog),
-            "p_gain_direct_force": min(1000.0, stiffness),
-            "i_gain_direct_force": 0.0,
-            "d_gain_direct_force": min(1000.0, 0.05 * stiffness),
-        },
-    )
-    bulk = BulkExchange(bus, [motor.id], ("present_position",), WRITE)
     count = max(2, math.ceil(seconds / hardware.bus.period))
-    try:
-        bulk.goals[0, 1] = motor.sign * (start + motor.zero)
-        bulk.exchange()
-        bus.write(motor.id, {"torque_enable": Torque.ON})
+    goal = np.zeros(1)
+    with PoweredDrives(bus, hardware, [name], current, stiffness, 0.05 * stiffness) as drives:
         for k in range(1, count + 1):
-            goal = start + angle * 0.5 * (1.0 - math.cos(2.0 * math.pi * k / count))
-            bulk.goals[0, 1] = motor.sign * (goal + motor.zero)
-            bulk.exchange()
-            if bulk.ages.item(0) >= hardware.bus.lost_cycles:
-                raise BusError(f"drive {name} does not answer any more")
-            condition = int(bulk.error_bytes.item(0))
-            if is_critical(condition):
-                raise BusError(f"drive {name}: {describe_conditions(condition)}")
+            goal[0] = start + angle * 0.5 * (1.0 - math.cos(2.0 * math.pi * k / count))
+            drives.exchange(goal)
             if not next_cycle():
                 raise BusError("the dead man's switch was let go")
-            yield goal, motor.sign * bulk.values.item(0) - motor.zero
-    finally:
-        for _ in range(_STOPS):
-            bus.write(motor.id, {"torque_enable": Torque.DAMPING})
-        # The answer also tells that the bytes have left: closing a port may discard them.
-        if bus.read(motor.id, "torque_enable")["torque_enable"] != Torque.DAMPING:
-            raise BusError(f"drive {name} is not certain to be in damping: switch its supply off")
+            yield goal.item(0), drives.position.item(0)
+
+
+class PoweredDrives:
+    """Some drives under power, in a ``with`` statement; it ends in damping, whatever happens.
+
+    All of them hold where they are at first. Other drives are not written to; those that are
+    ``watched`` besides are read.
+
+    Args:
+        bus: the bus.
+        hardware: addresses and limits.
+        names: the motors that are switched on.
+        current: the limit of each, in its register [A].
+        stiffness, damping: of the drives' own loops [A/rad, A s/rad].
+        watched: the motors that are read, among them ``names``; by default only those.
+
+    Attributes:
+        position, velocity, current: of the ``watched`` motors in the description's directions
+            [rad, rad/s, A].
+
+    Raises:
+        BusError: a drive does not do what it should, or turns faster than ``FASTEST_ON_BENCH``.
+    """
+
+    def __init__(
+        self, bus: BearBus, hardware: Hardware, names: Sequence[str], current: float,
+        stiffness: float = 0.0, damping: float = 0.0, watched: Sequence[str] = (),
+    ) -> None:  # fmt: skip
+        self._bus, self._hardware, self._names = bus, hardware, tuple(names)
+        self.watched = tuple(watched) or self._names
+        self._rows = [self.watched.index(name) for name in self._names]
+        self._settings = [_motor(hardware, name) for name in self._names]
+        all_settings = [_motor(hardware, name) for name in self.watched]
+        self._sign = np.array([float(motor.sign) for motor in all_settings])
+        self._zero = np.array([motor.zero for motor in all_settings])
+        self._registers = {
+            "mode": Mode.DIRECT_FORCE,
+            "limit_i_max": current,
+            "watchdog_timeout": round(1e6 * hardware.drives.watchdog),
+            "p_gain_direct_force": min(1000.0, stiffness),
+            "i_gain_direct_force": 0.0,
+            "d_gain_direct_force": min(1000.0, damping),
+        }
+        self._bulk = BulkExchange(bus, [motor.id for motor in all_settings], READ[:3], WRITE)
+        self.position, self.velocity, self.current = (np.zeros(len(self.watched)) for _ in range(3))
+
+    def __enter__(self) -> Self:
+        bus = self._bus
+        if bus.listen(LISTENING):
+            raise BusError(
+                "another program or adapter sends instructions on the bus: stop it first"
+            )
+        for name, motor in zip(self._names, self._settings, strict=True):
+            bus.write(motor.id, {"torque_enable": Torque.OFF})
+            condition = bus.ping(motor.id).error_byte
+            if is_critical(condition):
+                raise BusError(f"drive {name}: {describe_conditions(condition)}")
+            bus.verify(motor.id, self._registers)
+        try:
+            self._bulk.goals[:, 1] = [
+                bus.read(_motor(self._hardware, name).id, "present_position")["present_position"]
+                for name in self.watched
+            ]
+            self._bulk.exchange()
+            for motor in self._settings:
+                bus.write(motor.id, {"torque_enable": Torque.ON})
+            self._take()
+        except BaseException:
+            self._damp()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._damp()
+
+    def exchange(
+        self, position: Array | None = None, velocity: Array | None = None, current: Array | None = None,
+    ) -> None:  # fmt: skip
+        """Give goals to the drives that are on, each (n,) [rad, rad/s, A], and measure all.
+
+        Without a ``position`` the goal stays; without the others it is zero.
+        """
+        rows, goals = self._rows, self._bulk.goals
+        sign = self._sign[rows]
+        goals[rows, 0] = 0.0 if current is None else sign * current
+        if position is not None:
+            low, high = np.array([motor.range for motor in self._settings]).T
+            goals[rows, 1] = sign * (np.clip(position, low, high) + self._zero[rows])
+        goals[rows, 2] = 0.0 if velocity is None else sign * velocity
+        self._bulk.exchange()
+        self._take()
+
+    def _take(self) -> None:
+        bulk = self._bulk
+        self.position[:] = self._sign * bulk.values[:, 0] - self._zero
+        self.velocity[:] = self._sign * bulk.values[:, 1]
+        self.current[:] = self._sign * bulk.values[:, 2]
+        for name, row in zip(self._names, self._rows, strict=True):
+            if bulk.ages.item(row) >= self._hardware.bus.lost_cycles:
+                raise BusError(f"drive {name} does not answer any more")
+            condition = int(bulk.error_bytes.item(row))
+            if is_critical(condition):
+                raise BusError(f"drive {name}: {describe_conditions(condition)}")
+            if abs(self.velocity.item(row)) > FASTEST_ON_BENCH:
+                raise BusError(
+                    f"drive {name} turned at {self.velocity.item(row):.1f} rad/s and was damped: "
+                    f"{FASTEST_ON_BENCH:g} are allowed on the bench"
+                )
+
+    def _damp(self) -> None:
+        unsure = []
+        for motor in self._settings:
+            for _ in range(_STOPS):
+                self._bus.write(motor.id, {"torque_enable": Torque.DAMPING})
+        for name, motor in zip(self._names, self._settings, strict=True):
+            # The answer also tells that the bytes have left: closing a port may discard them.
+            if self._bus.read(motor.id, "torque_enable")["torque_enable"] != Torque.DAMPING:
+                unsure.append(name)
+        if unsure:
+            raise BusError(
+                f"drive {', '.join(unsure)} is not certain to be in damping: switch its supply off"
+            )
 
 
 def _motor(hardware: Hardware, name: str) -> MotorSettings:

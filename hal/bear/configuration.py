@@ -10,11 +10,16 @@ import os
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+import yaml
+
 from ...files.problems import Code, LoadError, Problems, listing, nearest
 from ...files.validation import place_of, read_model
+from ...mathematics.arrays import Array
+from ...mathematics.rotations import exponential, to_matrix
 from ...robots.robot_description import RobotDescription
 from ...runtime.language.block import UnmetRequirement
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
 from ..sensors.sensor import MountedSensor, mounted_sensors
 from .bus import BAUDRATE
 from .protocol import LAST_DEVICE
@@ -65,6 +70,17 @@ class BoardSettings(Parameters):
     switches: list[str] = parameter(
         list(SWITCHES), max_length=7, text="the contact point of each bit of the switches' byte"
     )
+    normally_closed: list[str] = parameter(
+        [], max_length=7, text="the contact points whose switch opens when it is pressed"
+    )
+    imu_rotation: ThreeNumbers = parameter(
+        (0.0, 0.0, 0.0), unit="rad",
+        text="rotation vector from the base's axes to the IMU's: readings are turned back by it",
+    )  # fmt: skip
+    imu_position: ThreeNumbers = parameter(
+        (0.0, 0.0, 0.0), unit="m",
+        text="where the IMU is, from the base's origin, base frame: `robot.imu_position` in a graph",
+    )  # fmt: skip
     sensors: list[str] = parameter(
         [],
         text="the robot's mounted sensors in a packet, behind the switches' byte, in their order",
@@ -92,6 +108,15 @@ class BoardSettings(Parameters):
         45.0, ge=0, le=125.0, text="hottest winding [deg C] at which they go off after the end"
     )
 
+    @property
+    def imu_to_base(self) -> Array:
+        """The rotation from the IMU's axes to the base's, (3, 3)."""
+        quaternion, matrix = np.zeros(4), np.eye(3)
+        if any(self.imu_rotation):
+            exponential(np.array(self.imu_rotation), quaternion)
+            to_matrix(quaternion, matrix)
+        return matrix
+
     def mounted(self, robot: RobotDescription) -> tuple[MountedSensor, ...]:
         """The mounted sensors in a packet, in their order."""
         known = {sensor.name: sensor for sensor in mounted_sensors(robot)}
@@ -102,8 +127,9 @@ class DriveSettings(Parameters):
     """What all drives have in common."""
 
     torque_constant: float = parameter(
-        0.35, unit="N m/A", gt=0, text="torque at the gearbox's output for a current"
-    )
+        0.35, unit="N m/A", gt=0,
+        text="torque at the gearbox's output for a current, of motors without one of their own",
+    )  # fmt: skip
     current_limit: float = parameter(
         30.0, unit="A", gt=0, le=100.0, text="register limit_i_max; a goal beyond it is ignored"
     )
@@ -164,6 +190,9 @@ class MotorSettings(Parameters):
     )
     low: float | None = parameter(None, unit="rad", text="lowest angle the drive may have")
     high: float | None = parameter(None, unit="rad", text="highest angle the drive may have")
+    torque_constant: float | None = parameter(
+        None, unit="N m/A", gt=0, text="of this motor; none: that of `drives`"
+    )
 
     @property
     def zero(self) -> float:
@@ -258,6 +287,15 @@ class Hardware(Parameters):
             if low >= high:
                 text = f"{name}: low {low:g} is not below high {high:g}"
                 found.append(UnmetRequirement(text, f"motors.{name}.low"))
+        for k, name in enumerate(self.board.normally_closed):
+            if name not in self.board.switches:
+                found.append(
+                    UnmetRequirement(
+                        f"{name!r} is none of board.switches: {', '.join(self.board.switches)}",
+                        f"board.normally_closed.{k}", found=name,
+                        nearest=nearest(name, self.board.switches),
+                    )
+                )  # fmt: skip
         drives = self.drives
         if drives.current_margin >= drives.current_limit:
             text = "current_margin leaves nothing of current_limit"
@@ -268,6 +306,21 @@ class Hardware(Parameters):
         if robot is not None:
             found += self._faults_with(robot)
         return found
+
+    def torque_constants(self, robot: RobotDescription) -> Array:
+        """The torque at the output of every motor for a current [N m/A], (n_motors,)."""
+        given = [self.motors[name].torque_constant for name in robot.transmission.motors]
+        return np.array([each or self.drives.torque_constant for each in given])
+
+    def at_ports(self, bus: str, board: str, *, virtual: bool) -> str:
+        """The text of a file that is as this one, of a twin behind these ports."""
+        data = self.model_dump(mode="json")
+        data["bus"] |= {"port": bus}
+        data["board"] |= {"port": board}
+        data["dead_man"] = {"kind": "none"}
+        if virtual:
+            data["bus"] |= {"time": "virtual", "reply_time": 5.0}
+        return yaml.safe_dump(data, sort_keys=False)
 
     def missing_calibration(self) -> list[str]:
         """What a motor lacks before the drives may be switched on, with the step that finds it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from ...files.problems import Code, Position, Problem, Report
 from ...robots.description import RobotDescription
@@ -36,6 +37,19 @@ class DrivenRobot(Robot):
         robot = context.robot
         assert isinstance(params, DriveParameters) and robot is not None
         yield from gain_requirements(params, robot)
+
+    @classmethod
+    def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
+        """As of any robot; the IMU is where the file of the hardware says."""
+        values = super().exported_values(params, context)
+        name, robot = getattr(params, "hardware", ""), context.robot
+        if not name or robot is None:
+            return values
+        try:
+            board = read_hardware(name, context, robot).board
+        except HardwareError:  # the load report says so
+            return values
+        return {**values, "imu_position": list(board.imu_position)}
 
     def setup(self) -> None:
         """Nothing is opened."""

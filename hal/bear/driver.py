@@ -123,15 +123,16 @@ def configure(
     drives = hardware.drives
     current = dict(zip("pid", drives.iq_gains, strict=True))
     for name, motor in hardware.motors.items():
+        constant = motor.torque_constant or drives.torque_constant
         bus.verify(
             motor.id,
             {
                 "mode": Mode.DIRECT_FORCE,
                 "limit_i_max": drives.current_limit,
                 "watchdog_timeout": round(1e6 * drives.watchdog),
-                "p_gain_direct_force": stiffness[name] / drives.torque_constant,
+                "p_gain_direct_force": stiffness[name] / constant,
                 "i_gain_direct_force": 0.0,
-                "d_gain_direct_force": damping[name] / drives.torque_constant,
+                "d_gain_direct_force": damping[name] / constant,
                 **{f"{letter}_gain_iq": gain for letter, gain in current.items()},
                 **{f"{letter}_gain_id": gain for letter, gain in current.items()},
             },

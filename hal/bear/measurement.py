@@ -33,7 +33,7 @@ class Measurement:
     """The newest measurements; a drive that does not answer keeps its last ones.
 
     The measured angle of a motor is ``sign * present_position - offset``, and its torque is
-    ``sign * torque_constant * present_iq``.
+    ``sign * torque_constant * present_iq``. Readings of the IMU are turned to the base's axes.
 
     Attributes:
         position, velocity, current: of every motor [rad, rad/s, A], (n_joints,).
@@ -54,7 +54,10 @@ class Measurement:
         self.sign = np.array([float(motor.sign) for motor in motors])
         self.offset = np.array([motor.zero for motor in motors])
         self._drives = hardware.drives
-        self.torque_constant = hardware.drives.torque_constant
+        self.torque_constant = hardware.torque_constants(robot)
+        self._to_base = hardware.board.imu_to_base
+        self._turned = any(hardware.board.imu_rotation)
+        self._rate, self._force = np.zeros(3), np.zeros(3)
         self.position, self.velocity, self.current = (np.zeros(n) for _ in range(3))
         self.voltage, self.temperature, self._torque = (np.zeros(n) for _ in range(3))
         self.joint_position, self.joint_velocity = np.zeros(n), np.zeros(n)
@@ -64,8 +67,10 @@ class Measurement:
         self._transmission = TransmissionMap(robot)
         self.sum, self.count = np.zeros(3), 0
         self.current_sum, self.exchanges = np.zeros(n), 0
+        self._scratch = np.zeros(n)
         points = [contact.name for contact in robot.contacts]
         self._switches = [points.index(name) for name in hardware.board.switches]
+        self._opens = [name in hardware.board.normally_closed for name in hardware.board.switches]
         self._mounted = hardware.board.mounted(robot)
         self.samples = {sensor.name: sensor.signal.allocate() for sensor in self._mounted}
         self._totals = {sensor.name: sensor.signal.allocate() for sensor in self._mounted}
@@ -101,7 +106,8 @@ class Measurement:
         """By how much [V] the pack's voltage is below that without load, from the work of the motors
         and the heat of their windings."""
         drives, current = self._drives, self.current
-        work = self.torque_constant * float(np.dot(current, self.velocity))
+        np.multiply(self.torque_constant, current, out=self._scratch)
+        work = float(np.dot(self._scratch, self.velocity))
         power = work + drives.winding_resistance * float(np.dot(current, current))
         voltage = float(self.voltage.mean())
         if power <= 0.0 or voltage <= 0.0:
@@ -109,20 +115,26 @@ class Measurement:
         return drives.pack_resistance * power / voltage
 
     def _mean_torque(self) -> None:
-        np.multiply(self.current_sum, self.torque_constant / self.exchanges, out=self._torque)
+        np.divide(self.torque_constant, self.exchanges, out=self._torque)
+        np.multiply(self._torque, self.current_sum, out=self._torque)
         self._transmission.joint_torque(self._torque, self.joint_torque)
 
     def take_board(self, board: SenseBoard) -> None:
         """Take over the newest packet of the sensor board."""
-        self.angular_velocity[:] = board.angular_velocity
+        rate, force = board.angular_velocity, board.specific_force
+        if self._turned:
+            np.dot(self._to_base, rate, out=self._rate)
+            np.dot(self._to_base, force, out=self._force)
+            rate, force = self._rate, self._force
+        self.angular_velocity[:] = rate
         if self.count == 0:
             self.sum.fill(0.0)
-        np.add(self.sum, board.specific_force, out=self.sum)
+        np.add(self.sum, force, out=self.sum)
         self._take_mounted(board)
         self.count += 1
         np.divide(self.sum, self.count, out=self.specific_force)
         for bit, point in enumerate(self._switches):
-            self.closed[point] = board.closed[bit]
+            self.closed[point] = board.closed[bit] != self._opens[bit]
 
     def _take_mounted(self, board: SenseBoard) -> None:
         """Take over the mounted sensors: the newest values, or their means since ``next_tick``."""

@@ -16,8 +16,8 @@ from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.steps import signal_call
-from .body_effects import BatteryParameters
 from .drives import DriveTrain, MotorLimits, MotorScratch
+from .effects import BatteryParameters
 from .state import PhysicsState
 
 

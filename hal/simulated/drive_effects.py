@@ -4,7 +4,7 @@ Between two physics steps a drive reads its encoder, closes its loop (``drives.p
 for a torque. Here the encoder sits on the motor, behind a gear that yields under load and has play; its
 reading is late, and the drive filters the velocity that it makes of it. The current follows the request
 through its loop, and the motor gives of it what its iron, its torque constant, its ripple and the load
-friction of the gear leave. The drive itself believes in the nominal torque constant, so that the torque
+friction of the gear leave. Cogging, the pull of magnets on teeth, acts at rest and without current, too. The drive itself believes in the nominal torque constant, so that the torque
 it reports is the one that it asked for.
 
 The gear's yield is quasi-static: rotor and joint stay one body, and only the reading of the encoder moves,
@@ -25,61 +25,11 @@ from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
 from ...robots.transmission import PLAY_TIME, PLAY_TORQUE, SLIDING_SPEED
-from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
+from .effects import EncoderEffects, MotorEffects
 from .state import PhysicsState
-
-
-class EncoderEffects(Parameters):
-    """What is not ideal in the joint encoders, besides offset and resolution; by default nothing."""
-
-    delay: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.05, text="age of angle and velocity, in whole physics steps"
-    )
-    velocity_filter: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.05,
-        text="time constant of the drive's own filter of the velocity; 0: the true velocity",
-    )  # fmt: skip
-    eccentricity: float = parameter(
-        0.0, unit="rad", ge=0.0, text="amplitude of an error once a turn, with a drawn phase"
-    )
-    compliance: float = parameter(
-        0.0, unit="rad/(N m)", ge=0.0, text="by which the gear yields before the encoder"
-    )
-    backlash: float = parameter(
-        0.0, unit="rad", ge=0.0, text="width of the gear's play before the encoder"
-    )
-
-
-class MotorEffects(Parameters):
-    """What is not ideal in the motors and their current loops; by default nothing."""
-
-    torque_constant: float = parameter(
-        1.0, gt=0.0, text="factor on the torque constants of all motors"
-    )
-    torque_constant_spread: float = parameter(
-        0.0, ge=0.0, lt=1.0, text="spread of the factor, per motor"
-    )
-    saturation: float = parameter(
-        0.0, ge=0.0, lt=1.0,
-        text="share of the torque that the iron loses at the peak torque; it grows with its square",
-    )  # fmt: skip
-    current_bandwidth: float | None = parameter(
-        None, unit="Hz", gt=0.0, text="of the current loop (first order); none: it follows at once"
-    )
-    torque_limit: float | None = parameter(
-        None, unit="N m", gt=0.0,
-        text="what a motor is limited to by its current, below its peak; none: its peak",
-    )  # fmt: skip
-    ripple: float = parameter(
-        0.0, unit="N m", ge=0.0, text="amplitude of the torque ripple, with a drawn phase"
-    )
-    ripple_periods: int = parameter(60, ge=1, text="periods of the ripple in a turn of the output")
-    load_friction: float = parameter(
-        0.0, ge=0.0, lt=1.0, text="share of the torque that the gear loses to friction under load"
-    )
 
 
 class EncoderModel(NamedTuple):
@@ -138,7 +88,8 @@ class DrawnMotors(NamedTuple):
     """All motors: what maps their torques and speeds to joints and back, (n, n); ``constant`` (n,), the
     factor on their torque constants; ``saturation`` at the ``peak`` torque (n,) [N m]; the ``share`` of a new
     torque that passes the current loop in a step; ``limit`` (n,) [N m]; ``ripple`` [N m], ``periods`` in a
-    turn and their ``phase`` (n,); ``friction``, the share that is lost under load."""
+    turn and their ``phase`` (n,); ``friction``, the share that is lost under load; ``cogging`` (n,) [N m], its
+    ``teeth`` in a turn and their phase ``at_tooth`` (n,)."""
 
     to_motor: Array2D
     to_joint: Array2D
@@ -151,6 +102,9 @@ class DrawnMotors(NamedTuple):
     periods: int
     phase: Array1D
     friction: float
+    cogging: Array1D
+    teeth: int
+    at_tooth: Array1D
 
 
 class ProducedTorque(NamedTuple):
@@ -186,6 +140,8 @@ def produce_torque(
         if model.peak[k] > 0.0:
             turned = model.periods * scratch.angle[k] + model.phase[k]
             given += model.ripple * math.sin(turned)
+        turned = model.teeth * scratch.angle[k] + model.at_tooth[k]
+        given += model.cogging[k] * math.sin(turned)
         scratch.gained[k] = given - requested[k]
     multiply_vector(model.to_joint, scratch.gained, scratch.joint)
     torque[:] += scratch.joint
@@ -233,7 +189,8 @@ class DriveEffects:
             motors.saturation, np.array(robot.motors.peak_torque),
             -math.expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
             motors.ripple, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
-            motors.load_friction,
+            motors.load_friction, motors.cogging * robot.motors.peak_torque, motors.cogging_periods,
+            turn * stream(seed, Purpose.COGGING).random(n),
         )  # fmt: skip
 
     @staticmethod

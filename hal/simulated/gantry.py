@@ -20,7 +20,7 @@ from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import standing_com
 from ...runtime.language.steps import signal_call
-from .body_effects import GantryParameters
+from .effects import GantryParameters
 from .mujoco_model import body_name
 from .state import PhysicsState
 

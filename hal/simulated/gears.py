@@ -12,7 +12,6 @@ short beside the period of the fastest rotor against its link (``longest_step``)
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,20 +21,9 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
-from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.steps import signal_call
+from .effects import GearParameters
 from .state import PhysicsState
-
-
-class GearParameters(Parameters):
-    """Gears between rotors and joints, at the output."""
-
-    stiffness: float = parameter(unit="N m/rad", gt=0.0, text="of every gear")
-    damping: float = parameter(0.0, unit="N m s/rad", ge=0.0, text="of every gear")
-    backlash: float = parameter(0.0, unit="rad", ge=0.0, text="width of the play")
-    output_share: float = parameter(
-        0.1, gt=0.0, lt=1.0, text="share of the rotor's inertia that sits behind the gear"
-    )
 
 
 class GearTrain(NamedTuple):
@@ -146,12 +134,3 @@ class YieldingGears:
     def sensing(self) -> KernelCall:
         """Brings ``position`` and ``velocity`` up to date."""
         return signal_call(sense_rotors, self._train, self._memory, self.position, self.velocity)
-
-
-def longest_step(params: GearParameters, inertia: Array) -> float:
-    """The longest step [s] at which rotors of this ``inertia`` [kg m^2] against their gears' output stages
-    are integrated well: a tenth of the shortest period."""
-    least = float(inertia[inertia > 0.0].min())
-    share = params.output_share
-    fastest = math.sqrt(params.stiffness / (least * share * (1.0 - share)))
-    return 0.2 * math.pi / fastest

@@ -19,77 +19,14 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_systems import advance, second_order, settle
 from ...mathematics.rotations import exponential, rotate_back
-from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
+from .effects import ImuEffects
 from .state import PhysicsState
 
 _AXES = 6
 """The axes of the gyroscope and of the accelerometer."""
-
-
-class ImuEffects(Parameters):
-    """What is not ideal in a simulated IMU, besides noise, bias and range; by default nothing.
-
-    A *spread* is half the width of a uniform distribution around the nominal value, drawn by the seed.
-    """
-
-    gyro_delay: float = parameter(
-        0.0,
-        unit="s",
-        ge=0.0,
-        le=0.05,
-        text="age of the gyroscope's reading, in whole physics steps",
-    )
-    accelerometer_delay: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.05, text="age of the accelerometer's reading, likewise"
-    )
-    delay_spread: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.02, text="spread of both delays, which are drawn together"
-    )
-    bandwidth: float | None = parameter(
-        None, unit="Hz", gt=0.0,
-        text="cutoff of the unit's own filter (second order, maximally flat); none: no filter",
-    )  # fmt: skip
-    mount_frequency: float | None = parameter(
-        None, unit="Hz", gt=0.0, text="at which the mount rings; none: it is rigid"
-    )
-    mount_damping: float = parameter(0.1, gt=0.0, le=2.0, text="damping ratio of the mount")
-    position: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="m", text="where the unit is beside its nominal place, base frame"
-    )
-    position_spread: float = parameter(0.0, unit="m", ge=0.0, text="spread of it, per axis")
-    rotation: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="rad",
-        text="rotation vector from the base's axes to the unit's, which nobody told",
-    )  # fmt: skip
-    rotation_spread: float = parameter(0.0, unit="rad", ge=0.0, text="spread of it, per axis")
-    gyro_scale_spread: float = parameter(
-        0.0, ge=0.0, lt=1.0, text="spread of the factor on each axis of the gyroscope"
-    )
-    accelerometer_scale_spread: float = parameter(
-        0.0, ge=0.0, lt=1.0, text="spread of the factor on each axis of the accelerometer"
-    )
-    acceleration_sensitivity: float = parameter(
-        0.0, unit="rad s/m", ge=0.0,
-        text="spread of the rate that the gyroscope reads for each m/s^2 along the same axis",
-    )  # fmt: skip
-
-    @property
-    def moved(self) -> bool:
-        """Whether the unit is not at its nominal place and angle."""
-        return any((*self.position, *self.rotation, self.position_spread, self.rotation_spread))
-
-    @property
-    def filters(self) -> int:
-        """How many filters a reading passes."""
-        return (self.mount_frequency is not None) + (self.bandwidth is not None)
-
-    @property
-    def ideal(self) -> bool:
-        """Whether the reading is the motion of the base itself."""
-        return self == ImuEffects()
 
 
 class ImuPlace(NamedTuple):

@@ -111,7 +111,7 @@ def mujoco_spec(
     spec.option.impratio = 10.0
     _add_ground(spec, scene or Terrain(), variation)
     _add_robot(spec, robot, variation)
-    _add_mounted_sensors(spec, robot)
+    _add_mounted_sensors(spec, robot, variation)
     _add_sensors(spec, robot, uneven=scene is not None and scene.uneven > 0.0)
     return spec
 
@@ -227,7 +227,8 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
 
     def add_link(name: str, parent: Any, position: tuple[float, float, float]) -> None:
         link, number = robot.link(name), names.index(name)
-        com = np.array(link.com)
+        longer = variation.factor(variation.link_length, number)
+        com = longer * np.array(link.com)
         if name == robot.base:
             com = com + variation.base_com_offset
         if variation.link_com:
@@ -236,7 +237,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         inertial: dict[str, Any] = {
             "mass": link.mass * mass, "ipos": com, "explicitinertial": True,
             "fullinertia": np.array(link.inertia)
-            * mass * variation.factor(variation.link_inertia, number),
+            * mass * variation.factor(variation.link_inertia, number) * longer**2,
         }  # fmt: skip
         # A base that is bolted to the world may have no mass.
         inertial = inertial if link.mass > 0.0 else {}
@@ -250,7 +251,8 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         for k, shape in enumerate(link.shapes):
             body.add_geom(
                 name=f"{name}/{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, mass=0.0,
-                size=[shape.radius, 0, 0], fromto=[*shape.start, *shape.end],
+                size=[shape.radius, 0, 0],
+                fromto=[longer * x for x in (*shape.start, *shape.end)],
                 **bits, **_surface(variation),
             )  # fmt: skip
         for foot in robot.feet:
@@ -259,15 +261,17 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
             for contact, centre in zip(robot.contacts, centres, strict=True):
                 if contact.foot != foot.name:
                     continue
+                centre = centre + (longer - 1.0) * np.array(contact.position)
                 body.add_geom(
                     name=contact.name, type=mujoco.mjtGeom.mjGEOM_SPHERE, mass=0.0,
                     size=[contact.radius, 0, 0], pos=centre, **bits, **_sole(variation),
                 )  # fmt: skip
                 is_ball = contact.name in balls
-                body.add_site(name=contact.name, pos=centre if is_ball else contact.position)
+                place = centre if is_ball else longer * np.array(contact.position)
+                body.add_site(name=contact.name, pos=place)
         for point, (owner, place) in robot.points.items():
             if owner == name:
-                body.add_site(name=f"point/{point}", pos=place)
+                body.add_site(name=f"point/{point}", pos=longer * np.array(place))
 
     add_link(robot.base, spec.worldbody, (0.0, 0.0, 0.0))
     BASES[robot.base_joint].add_joints(bodies[robot.base])
@@ -277,7 +281,9 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
     hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
     yes, no = mujoco.mjtLimited.mjLIMITED_TRUE, mujoco.mjtLimited.mjLIMITED_FALSE
     for k, joint in enumerate(robot.joints):
-        add_link(joint.child, bodies[joint.parent], joint.origin)
+        longer = variation.factor(variation.link_length, names.index(joint.parent))
+        x, y, z = joint.origin
+        add_link(joint.child, bodies[joint.parent], (longer * x, longer * y, longer * z))
         friction = variation.joint_friction * variation.factor(variation.friction_of_joint, k)
         bodies[joint.child].add_joint(
             name=joint.name, type=slide if joint.kind == "slide" else hinge, axis=joint.axis,
@@ -293,11 +299,14 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
     add_rotors(spec, robot, variation)
 
 
-def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription) -> None:
+def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:
     """A site for every sensor that the description mounts on a link, and what gives its true values."""
+    names = [link.name for link in robot.links]
     for sensor in mounted_sensors(robot):
         body = body_name(sensor.link)
-        spec.body(body).add_site(name=sensor.site, pos=sensor.position)
+        longer = variation.factor(variation.link_length, names.index(sensor.link))
+        place = longer * np.array(sensor.position)
+        spec.body(body).add_site(name=sensor.site, pos=place)
         sensor.add_to_model(spec, body)
 
 

@@ -96,11 +96,16 @@ class MujocoRobot(SimulatedRobot):
             },
             "motors": {
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
-                "torque_limit": 1000.0, "ripple": 0.05, "load_friction": 0.05,
+                "torque_limit": 1000.0, "ripple": 0.05, "load_friction": 0.05, "cogging": 0.01,
             },
             "battery": {"resistance": 0.03},
-            "links": {"mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1},
-            "joints": {"friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1},
+            "links": {
+                "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
+            },
+            "joints": {
+                "friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1,
+                "static_friction": 1.2, "static_friction_spread": 0.3,
+            },
             "switches": {"debounce": 0.001, "sticking": 0.002},
             "soles": {"time_constant": 0.006, "damping_ratio": 0.8},
             "cable": {"pull": 0.2, "weight": 0.1},

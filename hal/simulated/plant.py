@@ -42,9 +42,11 @@ from .base import BASES
 from .battery import Battery, spread_voltage
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
+from .effects import SwitchEffects
 from .gantry import Gantry
 from .gears import YieldingGears
 from .imu_effects import ImuModel
+from .joint_effects import falling_friction
 from .mujoco_model import body_name, build_world, number_of_soles
 from .sensors import SimulatedSensors
 from .simulated_robot import SimulatorParameters
@@ -66,7 +68,7 @@ from .state import (
     read_encoders,
     record_step,
 )
-from .switch_effects import SwitchDelays, SwitchEffects
+from .switch_effects import SwitchDelays
 from .truth import TruthReport
 from .variation import Variation, draw_pull, draw_variation
 
@@ -349,6 +351,12 @@ class Plant:
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
         self._step1, self._step2 = step_calls(model, data)
+        self._falling: list[Call] = []
+        if self.variation.static_friction:
+            self._falling.append(falling_friction(
+                self.velocity, model.dof_frictionloss[base.velocities :],
+                self.variation.static_friction, self._params.joints.stribeck_velocity,
+            ))  # fmt: skip
         self.forces = ExternalForces(model, data, self._robot)
         self.gantry = None
         if self._params.gantry is not None and base.velocities:
@@ -374,7 +382,8 @@ class Plant:
         attitude = stream(params.seed_of_noise, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
-        place_standing(model, data, base, robot, attitude * params.initial_attitude_error)
+        tilt, level = attitude * params.initial_attitude_error, bool(self.variation.link_length)
+        place_standing(model, data, base, robot, tilt, level)
         if self.gantry is not None and params.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.gantry.height]))
             mujoco.mj_kinematics(model, data)
@@ -465,7 +474,8 @@ class Plant:
         if self.gantry is not None:
             one.append(self.gantry.pulling(step))
         one += [
-            self._step2, *self._sensing, self._note, *self.sensors.after_step(), self._step1,
+            self._step2, *self._sensing, self._note, *self.sensors.after_step(), *self._falling,
+            self._step1,
             *self._seeing,
         ]  # fmt: skip
         return CallSequence([self.forces.releasing(), *(one * steps)])
@@ -517,7 +527,8 @@ class Plant:
             self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
         )
         self.streams.load(self.physics.random)
-        self._step1.run()
+        for call in (*self._falling, self._step1):
+            call.run()
         if self.gears is not None:
             self.gears.sensing().run()
 
@@ -548,6 +559,7 @@ class Plant:
             ),
             **({} if self.imu is None else self.imu.metrics()),
             **(self.drives.metrics() if self.drives.has_motors else {}),
+            **self.variation.metrics(),
         }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
@@ -18,19 +19,22 @@ from ..drive_control import DriveGains
 from ..robot import Robot
 from ..sensors.sensor import MountedSensor
 from . import scenes
-from .body_effects import (
+from .effects import (
     BatteryParameters,
     CableParameters,
+    EncoderEffects,
     GantryParameters,
+    GearParameters,
+    ImuEffects,
     JointEffects,
     LinkEffects,
+    MotorEffects,
     SoleParameters,
+    SwitchEffects,
+    longest_gear_step,
+    longest_stribeck_step,
 )
-from .drive_effects import EncoderEffects, MotorEffects
-from .gears import GearParameters, longest_step
-from .imu_effects import ImuEffects
 from .state import PhysicsState, SensorMemory
-from .switch_effects import SwitchEffects
 from .tiles import UnevenParameters
 
 
@@ -237,17 +241,35 @@ def too_fast_effects(
                 parameter="imu", expected=f"imu.{name} up to {fastest:g} Hz",
                 found=f"{frequency:g} Hz", fix=f"timestep: {0.45 / frequency:.2g} s, or less",
             )  # fmt: skip
-    if params.gears is not None:
-        joints = params.joints
-        least = joints.rotor_inertia * (1.0 - joints.rotor_inertia_spread)
-        longest = longest_step(params.gears, least * robot.motors.rotor_inertia)
+    for what, longest in _longest_steps(params, robot):
         if step > longest:
             yield UnmetRequirement(
-                f"gears of {params.gears.stiffness:g} N m/rad move faster than physics steps of "
-                f"{step:g} s follow",
+                f"{what} faster than physics steps of {step:g} s follow",
                 parameter="timestep", expected=f"up to {longest:.3g} s",
                 found=f"{step:g} s", fix=f"timestep: {next(each for each in _STEPS if each <= longest):g} s",
             )  # fmt: skip
+
+
+def _longest_steps(
+    params: SimulatorParameters, robot: RobotDescription
+) -> Iterator[tuple[str, float]]:
+    """What moves in the drives, and the longest steps [s] that follow it."""
+    joints, motors, rated = params.joints, params.motors, robot.motors
+    rotors = joints.rotor_inertia * (1.0 - joints.rotor_inertia_spread) * rated.rotor_inertia
+    if params.gears is not None:
+        longest = longest_gear_step(params.gears, rotors)
+        yield f"gears of {params.gears.stiffness:g} N m/rad move", longest
+    friction = params.joint_friction * (1.0 + joints.friction_spread) * rated.friction
+    longest = longest_stribeck_step(joints, friction, rotors)
+    yield f"static friction of {joints.static_friction:g} times that in motion falls", longest
+    fastest = float(rated.no_load_speed.max(initial=0.0))
+    for size, name, periods in (
+        (motors.ripple, "torque ripple", motors.ripple_periods),
+        (motors.cogging, "cogging", motors.cogging_periods),
+    ):  # fmt: skip
+        if size and 0.0 < fastest < math.inf:
+            text = f"{name} of {periods} periods a turn changes at {fastest:g} rad/s"
+            yield text, math.pi / (periods * fastest)  # two samples a period
 
 
 class SimulatedRobot(Robot, ABC):

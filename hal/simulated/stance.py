@@ -36,12 +36,14 @@ class StartError(BlockError):
 
 
 def place_standing(
-    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array
-) -> None:
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array,
+    level: bool = False,
+) -> None:  # fmt: skip
     """Put the robot into its standing pose with the soles flat on the ground around the origin and
     the base rotated by the rotation vector ``attitude`` [rad, world].
 
-    The legs take the base's rotation up (Newton's method on the contact points). A robot without
+    The legs take the base's rotation up (Newton's method on the contact points), and with ``level``
+    also what links longer or shorter than described leave between soles and ground. A robot without
     feet is put down upright on its lowest shape instead; a fixed base stays where it is.
 
     Raises:
@@ -70,6 +72,8 @@ def place_standing(
         down[2] -= height
     base.shift(down)
     places += down
+    if level:
+        places[:, 2] = below
     base.turn(attitude)
     legs = _leg_joints(robot)
     jacobian = np.zeros((3, model.nv))

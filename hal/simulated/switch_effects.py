@@ -7,21 +7,9 @@ import math
 from ...mathematics.arrays import Flags, Flags1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.steps import signal_call
+from .effects import SwitchEffects
 from .state import PhysicsState
-
-
-class SwitchEffects(Parameters):
-    """What delays the foot switches; by default nothing."""
-
-    debounce: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.1,
-        text="for how long a switch must be pressed or free before the board says so",
-    )  # fmt: skip
-    sticking: float = parameter(
-        0.0, unit="s", ge=0.0, le=0.1, text="for how long a switch stays closed that is free again"
-    )
 
 
 @kernel

@@ -11,7 +11,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
-from .body_effects import CableParameters
+from .effects import CableParameters, JointEffects
 from .imu_effects import NOMINAL, ImuPlace, draw_place, draw_spread
 from .simulated_robot import SimulatorParameters
 
@@ -23,8 +23,8 @@ class Variation:
     ``friction`` is the coefficient of the ground, ``contact_stiffness`` a factor on the stiffness of the
     contacts, ``mass`` a factor on every mass and inertia, ``base_com_offset`` [m, base frame] that of the
     base link's CoM, and ``joint_friction`` a factor on friction and damping of the motors. The others
-    have an element for each link (``link_mass`` and ``link_inertia``, factors, and ``link_com`` [m, link
-    frame]), joint (``friction_of_joint``, a factor) or motor (``rotor_inertia``, a factor); empty: all
+    have an element for each link (``link_mass``, ``link_inertia`` and ``link_length``, factors, and ``link_com`` [m, link
+    frame]), joint (``friction_of_joint`` and ``static_friction``, factors) or motor (``rotor_inertia``, a factor); empty: all
     nominal. ``imu`` is where the IMU is. ``rotor_share`` is the share of the
     rotors' inertia that the bodies carry; gears that yield have the rest. ``sole`` is the time constant [s]
     and the damping ratio of the contact points' contacts, ``gravity`` [m/s^2] is seen from the floor.
@@ -44,10 +44,22 @@ class Variation:
     rotor_share: float = 1.0
     sole: tuple[float, float] | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
+    link_length: tuple[float, ...] = ()
+    static_friction: tuple[float, ...] = ()
 
     def factor(self, of: tuple[float, ...], k: int) -> float:
         """The factor of a link, joint or motor."""
         return of[k] if of else 1.0
+
+    def metrics(self) -> dict[str, float]:
+        """The extremes of what differs from link to link and from joint to joint, where it does."""
+        found: dict[str, float] = {}
+        for name, values in (
+            ("link_length", self.link_length), ("static_friction", self.static_friction)
+        ):  # fmt: skip
+            if values:
+                found |= {f"robot_least_{name}": min(values), f"robot_largest_{name}": max(values)}
+        return found
 
     def rotors(self, robot: RobotDescription) -> Array:
         """The inertias of all rotors at their outputs [kg m^2], (n_motors,)."""
@@ -62,6 +74,15 @@ def _gravity(params: SimulatorParameters) -> tuple[float, float, float]:
     heading = 2.0 * math.pi * float(stream(params.seed, Purpose.FLOOR_TILT).random())
     along, down = GRAVITY * math.sin(params.floor_tilt), GRAVITY * math.cos(params.floor_tilt)
     return along * math.cos(heading), along * math.sin(heading), -down
+
+
+def _static_friction(joints: JointEffects, seed: int, n: int) -> tuple[float, ...]:
+    """Static friction of each of ``n`` joints as a multiple of Coulomb friction; empty: no difference."""
+    if joints.static_friction == 1.0:
+        return ()
+    draws = stream(seed, Purpose.STATIC_FRICTION).uniform(-1.0, 1.0, n)
+    beyond = (joints.static_friction - 1.0) * (1.0 + joints.static_friction_spread * draws)
+    return tuple((1.0 + beyond).tolist())
 
 
 def draw_pull(cable: CableParameters, seed: int) -> tuple[float, float, float]:
@@ -109,5 +130,6 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         draw_place(params.imu, params.seed) if params.imu.moved else NOMINAL,
         1.0 if params.gears is None else params.gears.output_share,
         None if params.soles is None else (params.soles.time_constant, params.soles.damping_ratio),
-        _gravity(params),
+        _gravity(params), factors(Purpose.LINK_LENGTH, links.length_spread, len(robot.links)),
+        _static_friction(joints, params.seed, n),
     )  # fmt: skip

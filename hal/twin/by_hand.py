@@ -1,81 +1,66 @@
-"""A robot without power whose joints, body and switches a person moves, as its ports see it.
+"""A robot on the bench and the person beside it, as its ports see them.
 
-It has no dynamics: drives are off, and a hand puts every joint where it wants. ``Wiring`` says how
-the robot is really built and wired, which its hardware's file may say otherwise.
+Without power it has no dynamics: drives are off, and a hand puts every joint where it wants, as exactly
+as hands do. With power it is a ``Twin`` that hangs in a gantry.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...blocks.signals import ImuReading
-from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
 from ...robots.robot_description import RobotDescription
 from ..bear.bring_up.session import PACKET_TIME, Request
+from ..simulated.effects import GantryParameters
+from ..simulated.simulated_robot import SimulatorParameters
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
+from .twin import Twin
+from .wiring import Wiring
 
-GRAVITY = 9.81
-_MOVE = 0.26
+_MOVE = 0.35
 _TURN_PACKETS = 400
 _UP = {"back": (1.0, 0.0, 0.0), "right side": (0.0, 1.0, 0.0), "feet": (0.0, 0.0, 1.0)}
+_IN_THE_AIR, _ABOVE_GROUND = 0.1, 0.04
+"""How high the soles hang for tests in the air, and before the robot is lowered [m]."""
+_LOWERED_AFTER = 0.6
+"""From the first command of a graph until the person lowers the robot [s]."""
 
 
-@dataclass
-class Wiring:
-    """How a robot is really built.
+@dataclass(frozen=True)
+class HandErrors:
+    """Standard deviations of what a person does and measures, and of sensors at rest: estimates.
 
     Attributes:
-        addresses: of every motor, by name; a motor that is left out is not on the bus.
-        signs, zeros: of every motor: its drive says ``sign * (angle + zero)``.
-        ratios: of every motor, how far its drive turns for its angle.
-        jig_error: by how much every joint is off in the jig of the zero pose [rad].
-        limits: of every joint [rad], by name.
-        lengths: what a rule shows at a joint [m], by name.
-        mass: what the scale shows [kg].
-        deaf: whether the bus runs at another rate than the file says.
-        voltage: of the supply [V].
-        imu, gyro: columns are the robot's axes in the frame of accelerometer and gyroscope.
-        force_scale, gyro_scale: of the sensors.
-        bits: the contact point of each bit.
-        inverted, stuck, broken: contact points whose switch is so; a stuck one is always closed.
-        board_dead: whether the board sends nothing.
+        length, mass: of a rule [m] and a scale [share].
+        move, shake: of the angle by which a joint is moved [share], and of the other joints meanwhile [rad].
+        stop, jig: of a joint at its stop and in the jig [rad].
+        side, turn, axis: of the side on which the robot lies [rad], of a turn [share] and its axis [rad].
+        encoder, gyro, force: noise of a reading [rad, rad/s, m/s^2].
+        gyro_bias, force_bias: half the width of the biases [rad/s, m/s^2].
     """
 
-    addresses: dict[str, int]
-    limits: dict[str, tuple[float, float]]
-    lengths: dict[str, float]
-    mass: float
-    bits: list[str]
-    signs: dict[str, int] = field(default_factory=dict)
-    zeros: dict[str, float] = field(default_factory=dict)
-    ratios: dict[str, float] = field(default_factory=dict)
-    jig_error: dict[str, float] = field(default_factory=dict)
-    deaf: bool = False
-    errors: dict[str, int] = field(default_factory=dict)
-    enabled: set[str] = field(default_factory=set)
-    voltage: float = 14.8
-    imu: Array = field(default_factory=lambda: np.eye(3))
-    gyro: Array | None = None
-    force_scale: float = 1.0
-    gyro_scale: float = 1.0
-    inverted: set[str] = field(default_factory=set)
-    stuck: set[str] = field(default_factory=set)
-    broken: set[str] = field(default_factory=set)
-    board_dead: bool = False
+    length: float = 0.001
+    mass: float = 0.005
+    move: float = 0.2
+    shake: float = 0.01
+    stop: float = 0.008
+    jig: float = 0.003
+    side: float = 0.02
+    turn: float = 0.03
+    axis: float = 0.03
+    encoder: float = 0.0003
+    gyro: float = 0.02
+    force: float = 0.1
+    gyro_bias: float = 0.01
+    force_bias: float = 0.1
 
-    @classmethod
-    def of(cls, robot: RobotDescription) -> Wiring:
-        """The wiring that a robot should have: addresses from 1, no signs and zeros."""
-        return cls(
-            addresses={name: k + 1 for k, name in enumerate(robot.transmission.motors)},
-            limits={joint.name: joint.limits or (-1.0, 1.0) for joint in robot.joints},
-            lengths={joint.name: float(np.linalg.norm(joint.origin)) for joint in robot.joints},
-            mass=robot.total_mass,
-            bits=[contact.name for contact in robot.contacts],
-        )
+
+STEADY = HandErrors(**dict.fromkeys(HandErrors.__dataclass_fields__, 0.0))
+"""A person without errors, and ideal sensors."""
 
 
 class RobotByHand:
@@ -84,14 +69,23 @@ class RobotByHand:
     Args:
         robot: the description.
         wiring: how it is really built.
+        seed: draws the errors of the person and of the sensors.
+        errors: how large they are.
 
     Attributes:
         bus_port, board_port: where the drives and the sensor board are.
         joints: where the hand has put them [rad], (n_joints,).
+        twin: the robot under power; ``None`` before it was hung up.
     """
 
-    def __init__(self, robot: RobotDescription, wiring: Wiring) -> None:
+    def __init__(
+        self, robot: RobotDescription, wiring: Wiring, seed: int = 0, errors: HandErrors = STEADY
+    ) -> None:
         self.robot, self.wiring = robot, wiring
+        self.twin: Twin | None = None
+        self._seed, self._errors, self._draw = seed, errors, np.random.default_rng(seed)
+        self._gyro_bias = errors.gyro_bias * self._draw.uniform(-1.0, 1.0, 3)
+        self._force_bias = errors.force_bias * self._draw.uniform(-1.0, 1.0, 3)
         self.joints = np.array(robot.standing_position, dtype=float)
         self.up = np.array([0.0, 0.0, 1.0])
         self.rate = np.zeros(3)
@@ -106,7 +100,7 @@ class RobotByHand:
             shared[address] = shared.get(address, 0) + 1
         self._shared = {address for address, count in shared.items() if count > 1}
         self.bus_port = HandPort(self._answer)
-        self.board_port = HandPort(lambda data: b"", self._packet)
+        self.board_port = HandPort(self._command, self._packet)
         self._bus = EmulatedBus(self._actuators.values(), self._collide)
         self._board = EmulatedBoard()
         self._imu = ImuReading.allocate()
@@ -116,38 +110,65 @@ class RobotByHand:
 
     def measure(self, request: Request) -> float:
         """What a rule or the scale shows."""
+        normal = self._draw.standard_normal()
         if request.target == "mass":
-            return self.wiring.mass
-        return 1e3 * self.wiring.lengths[request.target]
+            return self.wiring.mass * (1.0 + self._errors.mass * normal)
+        places = dict(zip(("imu x", "imu y", "imu z"), self.wiring.imu_position, strict=True))
+        true = places.get(request.target, self.wiring.lengths.get(request.target, 0.0))
+        return 1e3 * (true + self._errors.length * normal)
 
     def do(self, request: Request, observe: Callable[[], None]) -> None:
-        """Move, place, turn or press, as asked."""
+        """Move, place, turn, press or hang up, as asked."""
         names = [joint.name for joint in self.robot.joints]
+        errors, normal = self._errors, self._draw.standard_normal
+        self.twin = None  # it is switched off, unless it is hung up now
         match request.act:
             case "move":
-                self.joints[names.index(request.target)] += _MOVE
+                self.joints += errors.shake * normal(len(names))
+                self.joints[names.index(request.target)] += _MOVE * (1.0 + errors.move * normal())
             case "stops":
                 j = names.index(request.target)
                 before = self.joints.item(j)
                 for angle in self.wiring.limits[request.target]:
-                    self.joints[j] = angle
+                    self.joints[j] = angle + errors.stop * normal()
                     self._put()
                     observe()
                 self.joints[j] = before
             case "pose":
                 self.joints[:] = [self.wiring.jig_error.get(name, 0.0) for name in names]
+                self.joints += errors.jig * normal(len(names))
             case "place":
-                self.up[:] = _UP[request.target]
+                self.up[:] = _UP[request.target] + errors.side * normal(3)
+                self.up /= np.linalg.norm(self.up)
             case "turn":
                 self._turn("xyz".index(request.target), observe)
             case "press":
                 self.pressed = request.target
+            case "hang":
+                self.twin = self._hung(held=False, height=_IN_THE_AIR, lower_after=None)
+            case "ready":
+                self.twin = self._hung(held=True, height=_ABOVE_GROUND, lower_after=_LOWERED_AFTER)
             case _:
                 raise ValueError(f"a hand cannot {request.act}")
         self._put()
 
+    def _hung(self, *, held: bool, height: float, lower_after: float | None) -> Twin:
+        """The robot in a gantry, in the noise of the errors."""
+        errors = self._errors
+        params = SimulatorParameters(
+            seed=self._seed, timestep=PACKET_TIME if lower_after is None else 0.0005,
+            gyro_noise=errors.gyro, gyro_bias=errors.gyro_bias,
+            accelerometer_noise=errors.force, accelerometer_bias=errors.force_bias,
+            joint_velocity_noise=0.05 if errors.gyro else 0.0,
+            gantry=GantryParameters(height=height, lower_after=lower_after),
+        )  # fmt: skip
+        return self.wiring.twin(self.robot, params, held=held)
+
     def _turn(self, axis: int, observe: Callable[[], None]) -> None:
-        self.rate[axis] = 0.5 * np.pi / (_TURN_PACKETS * PACKET_TIME)
+        errors, normal = self._errors, self._draw.standard_normal
+        turn = errors.axis * normal(3)
+        turn[axis] = 1.0 + errors.turn * normal()
+        self.rate[:] = turn * 0.5 * np.pi / (_TURN_PACKETS * PACKET_TIME)
         for _ in range(_TURN_PACKETS):
             observe()
         self.rate.fill(0.0)
@@ -161,24 +182,36 @@ class RobotByHand:
         for k, name in enumerate(self.robot.transmission.motors):
             if name in self._actuators:
                 turned = wiring.ratios.get(name, 1.0) * angles.item(k) + wiring.zeros.get(name, 0.0)
+                noise = self._errors.encoder * self._draw.standard_normal()
                 self._actuators[name].status["present_position"] = (
-                    wiring.signs.get(name, 1) * turned
+                    wiring.signs.get(name, 1) * turned + noise
                 )
 
     def _answer(self, data: bytes) -> bytes:
+        if self.twin is not None:
+            return self.twin.write_bus(data)
         return b"" if self.wiring.deaf else self._bus.receive(data)
 
     def _collide(self, device: int, answer: bytes) -> bytes:
         """Two drives with one address answer at once, and damage each other's bytes."""
         return answer[:-1] + bytes((answer[-1] ^ 0x55,)) if device in self._shared else answer
 
+    def _command(self, data: bytes) -> bytes:
+        if self.twin is not None:
+            self.twin.write_board(data)
+        return b""
+
     def _packet(self) -> bytes:
-        wiring = self.wiring
+        if self.twin is not None:
+            return self.twin.read_board()
+        wiring, errors, normal = self.wiring, self._errors, self._draw.standard_normal
         if wiring.board_dead:
             return b""
         gyro = wiring.imu if wiring.gyro is None else wiring.gyro
-        self._imu.specific_force[:] = wiring.force_scale * GRAVITY * (wiring.imu @ self.up)
-        self._imu.angular_velocity[:] = wiring.gyro_scale * (gyro @ self.rate)
+        force = wiring.force_scale * GRAVITY * (wiring.imu @ self.up)
+        rate = wiring.gyro_scale * (gyro @ self.rate)
+        self._imu.specific_force[:] = force + self._force_bias + errors.force * normal(3)
+        self._imu.angular_velocity[:] = rate + self._gyro_bias + errors.gyro * normal(3)
         closed = [self._closed(point) for point in wiring.bits]
         return self._board.packet(self._imu, np.array(closed))
 

@@ -64,6 +64,8 @@ class EmulatedActuator:
         errors: the bits of errors that are set.
         corrupt: whether a packet arrived damaged since the last answer.
         silent_time: since something was written last [s].
+        has_watchdog: whether it looks at that.
+        fixed: registers that it does not take, as if they were damaged.
     """
 
     device: int
@@ -78,6 +80,8 @@ class EmulatedActuator:
     errors: int = 0
     corrupt: bool = False
     silent_time: float = 0.0
+    has_watchdog: bool = True
+    fixed: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         self.config["id"] = self.device
@@ -118,7 +122,13 @@ class EmulatedActuator:
         self.silent_time += seconds
         timeout = 1e-6 * self.config["watchdog_timeout"]
         in_mode = self.config["mode"] in (Mode.TORQUE, Mode.DIRECT_FORCE)
-        if timeout and in_mode and self.driving and self.silent_time > timeout:
+        if (
+            self.has_watchdog
+            and timeout
+            and in_mode
+            and self.driving
+            and self.silent_time > timeout
+        ):
             self.fail(WATCHDOG)
         if self.stopped:
             self.fail(WATCHDOG)
@@ -194,7 +204,11 @@ class EmulatedActuator:
     def _set(self, register: Register, value: float, values: dict[str, float]) -> None:
         """Take over a value, unless it is beyond what the actuator takes."""
         name = register.name
-        if not register.writable or not register.least <= value <= register.most:
+        if (
+            not register.writable
+            or name in self.fixed
+            or not register.least <= value <= register.most
+        ):
             return
         if name == "torque_enable":
             self._enable(int(value))

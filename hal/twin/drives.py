@@ -28,8 +28,8 @@ class EmulatedDrives:
 
     In the modes torque and direct force the current is ``goal_iq``, in direct force plus
     ``P (goal_position - position) + D (goal_velocity - velocity)``, within ``limit_i_max``. The
-    torque at the output is ``torque_constant`` times that, within the motor's torque-speed curve.
-    An actuator in damping brakes with ``braking`` [N m s/rad], as shorted windings do; one that is
+    torque at the output is ``current_sign`` times the motor's torque constant times that, within its
+    torque-speed curve. An actuator in damping brakes with ``braking`` [N m s/rad], as shorted windings do; one that is
     off gives no torque.
 
     Goals that the bus has brought act from the physics step that ``take_goals`` is given, so that
@@ -62,8 +62,12 @@ class EmulatedDrives:
         self.sign = np.array([float(motor.sign) for motor in settings])
         """1 where a drive turns as the description's motor does, -1 where it does not."""
         self._offset = np.array([motor.zero for motor in settings])
-        self._constant = hardware.drives.torque_constant
-        self._braking = braking
+        self._constant = hardware.torque_constants(robot)
+        self.current_sign = np.ones(n)
+        """-1 for a drive whose current turns its motor against its encoder."""
+        self.velocity_sign = np.ones(n)
+        """-1 for a drive that reads its velocity with the wrong sign."""
+        self._brake = braking / self._constant
         self.current = np.zeros(n)
         """The torque current of every actuator [A]."""
         self.position = np.zeros(n)
@@ -136,6 +140,7 @@ class EmulatedDrives:
         moving = self._moving()
         np.copyto(self.position, self._fresh_position, where=moving)
         np.copyto(self.velocity, self._fresh_velocity, where=moving)
+        np.multiply(self.velocity, self.velocity_sign, out=self.velocity, where=moving)
 
     def _moving(self) -> NDArray[np.bool_]:
         np.logical_not(self.stuck, out=self._not_stuck)
@@ -158,9 +163,11 @@ class EmulatedDrives:
         np.maximum(current, requested, out=current)
         np.multiply(current, self.enabled, out=current)
         np.multiply(self._fresh_velocity, self.damped, out=requested)
-        np.multiply(requested, self._braking / self._constant, out=requested)
+        np.multiply(requested, self._brake, out=requested)
+        np.multiply(current, self.current_sign, out=self._torque)
         np.subtract(current, requested, out=current)
-        np.multiply(current, self._constant, out=self._torque)
+        np.subtract(self._torque, requested, out=self._torque)
+        np.multiply(self._torque, self._constant, out=self._torque)
         np.multiply(self._torque, self.sign, out=self._torque)
         self._transmission.joint_torque(self._torque, self._limited)
         self._moving_at[:] = speed
@@ -172,7 +179,9 @@ class EmulatedDrives:
     def mean_current(self, out: Array) -> None:
         """Write the mean torque current of every actuator [A] since this was last called: with
         the sign of its own direction."""
-        np.divide(self.torque_sum, max(1, self.torque_steps) * self._constant, out=out)
+        np.multiply(self._constant, max(1, self.torque_steps), out=out)
+        np.divide(self.torque_sum, out, out=out)
+        np.multiply(out, self.current_sign, out=out)
         np.multiply(out, self.sign, out=out)
         self.torque_sum.fill(0.0)
         self.torque_steps = 0

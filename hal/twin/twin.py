@@ -100,6 +100,9 @@ class Twin:
         self._imu = ImuReading.allocate()
         self.closed = np.zeros(len(self._points), dtype=np.bool_)
         self._packet_closed = np.zeros(len(self._order), dtype=np.bool_)
+        self._to_base = hardware.board.imu_to_base
+        self._turned = any(hardware.board.imu_rotation)
+        self._opens = [name in hardware.board.normally_closed for name in hardware.board.switches]
         self.before, self._force = np.zeros(3), np.zeros(3)
         self.counted = 0
         self._current, self._nothing = np.zeros(n), np.zeros(n)
@@ -276,6 +279,9 @@ class Twin:
         self._begin_packet()
         imu = self._imu
         self._reading_imu.run()
+        if self._turned:
+            for reading in (imu.specific_force, imu.angular_velocity):
+                reading[:] = np.dot(reading, self._to_base)
         self._read_switches()
         if self.faults.active("frozen_imu"):
             imu.specific_force[:], imu.angular_velocity[:] = self.last_packet
@@ -297,7 +303,7 @@ class Twin:
                 if self.faults.of(name, "bouncing_switch"):
                     closed[k] = bool(self.faults.draw(name, 2).random() < 0.5)
         for bit, point in enumerate(self._order):
-            self._packet_closed[bit] = closed[point]
+            self._packet_closed[bit] = closed[point] != self._opens[bit]
 
     # -- what goes wrong ---------------------------------------------------------------------
 

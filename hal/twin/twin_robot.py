@@ -15,7 +15,11 @@ from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
 from ..simulated.plant import Plant
-from ..simulated.simulated_robot import SimulatedRobot, SimulatorParameters
+from ..simulated.simulated_robot import (
+    SimulatedRobot,
+    SimulatorParameters,
+    too_fast_effects,
+)
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from ..simulated.unsupported import uneven_contacts, unsupported_motor
 from .faults import InjectedFault
@@ -133,6 +137,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
             yield UnmetRequirement(complaint, fix="correct the robot's description")
+        yield from too_fast_effects(params, robot)
         if len(robot.contacts) > 7:
             yield UnmetRequirement(
                 f"{robot.name} has {len(robot.contacts)} contact points, and a packet of the "

@@ -1,4 +1,4 @@
-"""Recordings for other programs: CSV, Parquet and MCAP, with every number exact.
+"""Recordings for other programs: CSV, Parquet, MCAP and bags of ROS 2, with every number exact.
 
 A stretch of the recording is in memory at a time. An MCAP file has, beside every signal, channels
 that Foxglove, PlotJuggler and ROS 2's tools know by their type. These show the robot in 3D (``/tf``,
@@ -12,8 +12,10 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from errno import EEXIST
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -371,9 +373,11 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise ExportError("MCAP needs the library mcap; pip install 'aloft[mcap]'") from None
+        raise ExportError(
+            "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"
+        ) from None
     if find_spec("rosbags") is None:
-        raise ExportError("MCAP needs the library rosbags; pip install 'aloft[mcap]'")
+        raise ExportError("MCAP needs the library rosbags; pip install 'aloft-robotics[mcap]'")
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)
@@ -402,6 +406,36 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
         writer.finish()
 
 
+def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
+    """Write a bag of ROS 2, a folder with an MCAP file: the topics of ``known_channels`` that have ROS 2's types.
+
+    Raises:
+        ExportError: the library ``rosbags`` is not installed; the recording has no such topic, or some signals
+            are asked for, which have no type of ROS 2.
+        OSError: the folder cannot be written.
+    """
+    if find_spec("rosbags") is None:
+        raise ExportError("a bag needs the library rosbags; pip install 'aloft-robotics[mcap]'")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    if names:
+        raise ExportError("a bag has only what has a type of ROS 2; --mcap writes any signal")
+    channels = [each for each in known_channels(run) if each.encoding == "cdr"]
+    if not channels:
+        raise ExportError("nothing in this recording has a type of ROS 2; --mcap writes any signal")
+    types = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        topics = [bag.add_connection(each.topic, each.type, typestore=types) for each in channels]
+        for topic, channel in zip(topics, channels, strict=True):
+            for instant, data in channel.once:
+                bag.write(topic, instant, data)
+        for batch in run.batches():
+            for topic, channel in zip(topics, channels, strict=True):
+                for instant, data in channel.messages(batch):
+                    bag.write(topic, instant, data)
+
+
 def _json_messages(fields: Sequence[RecordedField], batch: RecordedRows) -> Iterator[Timed]:
     """One message a tick with all fields of a port."""
     instants = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
@@ -426,6 +460,7 @@ EXPORTS: Mapping[str, Callable[[RecordedRun, Path, Sequence[str]], None]] = {
     "csv": export_csv,
     "parquet": export_parquet,
     "mcap": export_mcap,
+    "bag": export_bag,
 }
 """By the file name's ending."""
 
@@ -440,13 +475,16 @@ def export(kind: str, run: RecordedRun, path: Path, names: Sequence[str] = ()) -
         ExportError, KeyError: see the exports.
         OSError: the file cannot be written.
     """
-    if path.exists() and not path.is_file():  # such as /dev/stdout
+    if path.is_char_device() or path.is_fifo():  # such as /dev/stdout
         EXPORTS[kind](run, path, names)
         return
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    folder = path.with_name(f"{path.name}.part")
+    shutil.rmtree(folder, ignore_errors=True)  # of an export that was killed
+    folder.mkdir()
     try:
-        EXPORTS[kind](run, part, names)
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+        EXPORTS[kind](run, folder / path.name, names)
+        if path.is_dir():
+            raise FileExistsError(EEXIST, "the folder is there already", str(path))
+        os.replace(folder / path.name, path)
+    finally:
+        shutil.rmtree(folder)

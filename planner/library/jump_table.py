@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -109,10 +109,7 @@ def table_rows(table: JumpTable) -> TableRows:
     """A table as ``read_table`` takes it."""
     n = len(table.time)
     columns = [table.columns[name].reshape(n, -1) for name in COLUMNS]
-    fed = np.concatenate([
-        np.full(rows.shape[1], name in _FED_FORWARD)
-        for name, rows in zip(COLUMNS, columns, strict=True)
-    ])  # fmt: skip
+    fed = _fed([rows.shape[1] for rows in columns])
     rows = np.ascontiguousarray(np.concatenate(columns, axis=1), dtype=np.float64)
     first = (table.thrust_time, table.lift_off_time, table.touchdown_time)
     jumps = np.array([first, *table.later_jumps], dtype=np.float64)
@@ -123,6 +120,30 @@ def table_rows(table: JumpTable) -> TableRows:
         lands_in_part(table.time, contact, jumps[:, 2]), np.ascontiguousarray(contact),
         np.zeros(rows.shape[1]),
     )  # fmt: skip
+
+
+def _fed(widths: Sequence[int]) -> NDArray[np.bool_]:
+    """Which columns are fed forward, where those of ``COLUMNS`` are so wide."""
+    names = zip(COLUMNS, widths, strict=True)
+    return np.concatenate([np.full(width, name in _FED_FORWARD) for name, width in names])
+
+
+def fed_forward(n_feet: int, n_joints: int) -> NDArray[np.bool_]:
+    """Which columns of a robot's table are fed forward, (width,)."""
+    feet = (3 * n_feet, 3 * n_feet, n_feet, n_feet)
+    return _fed((3, 3, 3, 4, 3, 3, 3, *feet, *(n_joints,) * 4))
+
+
+@kernel
+def integrate_rows(table: TableRows) -> None:
+    """Write the sums of a table whose rows have changed."""
+    for k in range(table.rows.shape[1]):
+        table.sums[0, k] = 0.0
+    for row in range(1, table.rows.shape[0]):
+        half = 0.5 * (table.time[row] - table.time[row - 1])
+        for k in range(table.rows.shape[1]):
+            risen = half * (table.rows[row, k] + table.rows[row - 1, k])
+            table.sums[row, k] = table.sums[row - 1, k] + risen
 
 
 @kernel

@@ -107,11 +107,12 @@ def likeness(differences: Any) -> Any:
 
 
 def launch_of(task: JumpTask) -> Launch | None:
-    """What a task of one jump means at lift-off; ``None`` for somersaults and rows of jumps."""
-    hops, end = task.hops(), task.places()[-1]
-    if len(hops) != 1 or hops[0].rotation:
-        return None
+    """What a task means at lift-off, by the first jump of a row; ``None`` for somersaults and rows of jumps
+    that differ."""
+    hops, end = task.hops(), task.places()[1]
     hop = hops[0]
+    if hop.rotation or any(other != hop for other in hops):
+        return None
     if hop.rise is not None:
         upwards = math.sqrt(2.0 * GRAVITY * hop.rise)
         fall = math.sqrt(2.0 * GRAVITY * max(hop.rise - end.z, 0.0))

@@ -13,7 +13,7 @@ nevertheless receives these variables, which agree with the planned forces.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +36,27 @@ CENTROIDAL = ("com", "com_velocity", "angular_momentum")
 
 STEP = 0.002
 """Longest time between two rows [s]."""
+COARSE_STEPS = {Phase.SQUAT: 0.01, Phase.THRUST: 0.005, Phase.FLIGHT: 0.005, Phase.LANDING: 0.02}
+"""The same by phase, for a table that is made while the robot moves."""
 
 
-def reference_table(plan: PlannedJump, robot: RobotDescription, stand_time: float) -> JumpTable:
-    """The plan as a table that begins with standing still for ``stand_time`` [s]."""
+def reference_table(
+    plan: PlannedJump,
+    robot: RobotDescription,
+    stand_time: float,
+    steps: Mapping[Phase, float] | None = None,
+) -> JumpTable:
+    """The plan as a table that begins with standing still for ``stand_time`` [s].
+
+    Two rows are at most ``STEP`` apart, or what ``steps`` says for a phase [s].
+    """
     dynamics = ExactDynamics(plan.task.equipped(robot))
     forces = _MiddleValues(plan, plan.contact_force)
     torques = _MiddleValues(plan, plan.joint_torque)
     rows: dict[str, list[Array]] = {}
     times: list[float] = []
     intervals: list[int] = []
-    for time, k, q, v, bend in _states(plan, dynamics):
+    for time, k, q, v, bend in _states(plan, dynamics, steps or {}):
         times.append(time)
         intervals.append(k)
         row = _row(dynamics, q, v, forces.at(time, k))
@@ -104,7 +114,9 @@ def _contacts(plan: PlannedJump, intervals: list[int]) -> NDArray[np.bool_] | No
     return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
 
 
-def _states(plan: PlannedJump, dynamics: ExactDynamics) -> Iterator[State]:
+def _states(
+    plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]
+) -> Iterator[State]:
     """The motion, knots and what lies between them; two rows at an impact."""
     angles = euler_angles(plan.position[:, 3:7])
     last = len(plan.time) - 1
@@ -115,7 +127,8 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics) -> Iterator[State]:
             continue
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
         base = _base_motion(plan, dynamics, angles, k, h)
-        count = math.ceil(h / STEP - 1e-9)
+        step = steps.get(Phase(int(plan.phase[k])), STEP)
+        count = math.ceil(h / step - 1e-9)
         for i in range(1, count):
             yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
     still = np.zeros(plan.velocity.shape[1] - 6)

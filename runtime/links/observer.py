@@ -21,7 +21,7 @@ from zlib import crc32
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
 from ..running.sinks import Note
-from ..transports.registry import network_transport
+from ..transports.registry import network_transport, silent_endpoint
 from ..transports.transport import MessageCallback, Transport, rows_key, status_key, window_key
 from .free_link import LatestReceiver
 from .identity import Identity
@@ -240,6 +240,12 @@ class Observer:
         if status["hash"] != self._hash:
             return "another graph"
         return str(status["phase"])
+
+    def why_silent(self, name: str) -> str:
+        """What can be found out about a machine that is silent; empty for one that is heard."""
+        if self.state_of(name) != "silent":
+            return ""
+        return silent_endpoint(self.placed.machine(name).endpoint)
 
     def _take(self, data: bytes) -> None:
         with suppress(Exception):  # whatever bytes do, a thread of the network goes on

@@ -68,6 +68,9 @@ class ClockOffset:
 
 REPEAT = 0.05
 """Seconds between two beacons while a part waits for the others."""
+REFUSED_FOR = 4.0
+"""Seconds for which a part that is refused goes on asking: longer than any transport needs to notice that a
+process has ended, so that a part may be started again at once."""
 
 
 class PartPhase(IntEnum):
@@ -133,6 +136,8 @@ class PeerStates:
         self._states: dict[str, Mapping[str, Any]] = {}
         self._failed: dict[str, tuple[int, PeerError]] = {}
         self._gone: dict[str, None] = {}
+        self._refused: dict[str, str] = {}
+        self._refused_since: dict[str, float] = {}
         self._changed_event = threading.Event()
         self._transport = transport
         self._publishers: dict[str, MessageCallback] = {}
@@ -256,7 +261,8 @@ class PeerStates:
             self._compare()
             now = time.monotonic()
             if now >= next_time:  # not on all news, or two parts would answer each other for ever
-                if self._phase < phase and (before is None or before()):
+                ready = not self._refused_since and (before is None or before())
+                if self._phase < phase and ready:
                     self._phase = phase
                 self.send_beacon()
                 next_time = now + REPEAT
@@ -313,6 +319,7 @@ class PeerStates:
             "clock": self._clocks[name].stamp(time.monotonic_ns()),
             "checked": list(self._checked),
             "heard": self._states.get(name, {}).get("phase", -1),
+            "refuses": self._refused.get(name, ""),
         }
         if self._phase is PartPhase.HELLO:
             state["graph"] = self._identity.graph
@@ -329,7 +336,12 @@ class PeerStates:
                 return
             now = time.monotonic_ns()
             before = self._states.get(name, {})
+            self._take_refusal(name, state)
             if before and before["run"] != state["run"]:
+                if self._runs_with(name):  # somebody has started a second one
+                    self._refused[name] = state["run"]
+                    self._send_beacon_to(name)
+                    return
                 self._forget(name)
                 before = {}
             self._clocks[name].update(state["clock"], now)
@@ -350,6 +362,28 @@ class PeerStates:
             if int(state["heard"]) < self._phase:
                 self._send_beacon_to(name)
 
+    def _runs_with(self, name: str) -> bool:
+        """Whether this part is in a run with the part ``name``, which is still there."""
+        return (
+            self._phase >= PartPhase.STARTED
+            and self._states[name]["phase"] == PartPhase.STARTED
+            and name not in self._gone
+            and name not in self._failed
+        )
+
+    def _take_refusal(self, name: str, state: Mapping[str, Any]) -> None:
+        """Give up where another part has a run with somebody else in this one's place."""
+        if state["refuses"] != self.run.hex():
+            self._refused_since.pop(name, None)
+            return
+        now = time.monotonic()
+        if now - self._refused_since.setdefault(name, now) > REFUSED_FOR:
+            text = (
+                f"{self.machine!r} is running already, with {name!r}, and that run goes on: stop it first, or "
+                "call this machine otherwise"
+            )
+            self.fail(name, -1, PeerError(text))
+
     def _on_lost(self, name: str) -> None:
         heard = self._states.get(name)
         if heard is None or heard["phase"] >= PartPhase.RESTING:
@@ -363,6 +397,7 @@ class PeerStates:
     def _forget(self, name: str) -> None:
         """Another part was started again: what was known of it no longer holds."""
         self._gone.pop(name, None)
+        self._refused.pop(name, None)
         self._failed.pop(name, None)
         for link in [link for link, sender in self._senders.items() if sender == name]:
             self._checked.pop(link, None)

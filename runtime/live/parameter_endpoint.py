@@ -222,12 +222,37 @@ def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
         time.sleep(0.1)
 
 
+def _connected(path: Path) -> socket.socket:
+    """A connection to the graph that listens at ``path``.
+
+    Linux refuses at once (EAGAIN) a connection that would have to wait behind others, where the socket has a
+    timeout, so the wait is made here.
+
+    Raises:
+        TimeoutError: it has not taken the connection within ``REQUEST_TIMEOUT``.
+        OSError: nobody listens there.
+    """
+    end = time.monotonic() + REQUEST_TIMEOUT
+    while True:
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            connection.settimeout(REQUEST_TIMEOUT)
+            connection.connect(str(path))
+            return connection
+        except BlockingIOError:
+            connection.close()
+            if time.monotonic() > end:
+                raise TimeoutError("too many wait for it") from None
+            time.sleep(0.02)
+        except BaseException:
+            connection.close()
+            raise
+
+
 def _exchange(path: Path, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[int]]:
     descriptors: list[int] = []
     try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(REQUEST_TIMEOUT)
-            connection.connect(str(path))
+        with _connected(path) as connection:
             connection.sendall(json.dumps(request).encode() + b"\n")
             begun, descriptors, _, _ = socket.recv_fds(connection, 4096, 1)
             with connection.makefile("rb") as file:
@@ -245,9 +270,9 @@ def _exchange(path: Path, request: Mapping[str, Any]) -> tuple[dict[str, Any], l
 def answers(path: Path) -> bool:
     """Whether some run listens at ``path``."""
     try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-            connection.settimeout(REQUEST_TIMEOUT)
-            connection.connect(str(path))
+        _connected(path).close()
+    except TimeoutError:
+        return True  # it is busy
     except OSError:
         return False
     return True

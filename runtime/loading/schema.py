@@ -71,19 +71,18 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
     """The part of the schema that only blocks of this type have: their parameters and inputs."""
     model = block_type.Params.model_json_schema()
     for inner, schema in model.pop("$defs", {}).items():
-        definitions[f"{name}.{inner}"] = _relocate(schema, name)
+        inside = definitions[f"{name}.{inner}"] = _relocate(schema, name)
+        for key, value in inside.get("properties", {}).items():
+            if value.pop("unit", ""):
+                inside["properties"][key] = {"anyOf": [value, *_quantity(value)]}
     in_unit = getattr(block_type.Params, "in_unit", ())
     properties: Schema = {}
     for key, schema in _relocate(model.get("properties", {}), name).items():
         schema.pop("live", None)
         description = " ".join(filter(None, [schema.pop("description", ""), _unit_text(schema)]))
         options = [schema, _REFERENCE, _EXPORTED]
-        if (
-            schema.pop("unit", "") or key in in_unit
-        ):  # a text with a unit may stand for each number, also in a list
-            per_joint = "PerJoint" in json.dumps(schema)
-            inside = {"type": "object"} if per_joint else {"type": "array"}
-            options += [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
+        if schema.pop("unit", "") or key in in_unit:
+            options += _quantity(schema)
         properties[key] = {"anyOf": options, "description": description}
     summary = (block_type.__doc__ or "").strip().partition("\n")[0]
     return {
@@ -107,6 +106,13 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
             },
         },
     }
+
+
+def _quantity(schema: Schema) -> list[Schema]:
+    """What else a value with a unit may be: a text with a unit may stand for each number, also in a list."""
+    per_joint = "PerJoint" in json.dumps(schema)
+    inside = {"type": "object"} if per_joint else {"type": "array"}
+    return [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
 
 
 def _further_inputs(block_type: type[Block]) -> Schema | bool:

@@ -134,7 +134,7 @@ def _library() -> tuple[Any, Any, Any]:
         from cryptography.hazmat.primitives.asymmetric import ec
     except ImportError as error:
         raise AloftError(
-            "certificates are made with the library cryptography: pip install 'aloft[keys]'"
+            "certificates are made with the library cryptography: pip install 'aloft-robotics[keys]'"
         ) from error
     return x509, hashes, ec
 

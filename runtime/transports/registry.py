@@ -7,6 +7,7 @@ class with the methods of ``NetworkTransport`` in a file of its own, and a line 
 from __future__ import annotations
 
 import re
+import socket
 from collections.abc import Sequence
 from ipaddress import ip_address
 from pathlib import Path
@@ -53,6 +54,42 @@ def endpoint_fault(text: str) -> str:
         if address.is_multicast:
             return "a multicast address is not the address of one machine"
     return TRANSPORTS[match["scheme"]].host_fault(host)
+
+
+def open_endpoints(machines: Sequence[MachineSpec]) -> list[str]:
+    """What should be known of machines that anybody in their network can reach: one text for each
+    whose endpoint is beyond the loopback and asks for no keys."""
+    return [
+        f"machine {spec.name!r} listens at {spec.endpoint}: whoever reaches it can read and command this "
+        "graph; `aloft keys` makes certificates for tls/ endpoints"
+        for spec in machines
+        if not spec.endpoint.startswith("tls/") and not _is_loopback(spec.endpoint)
+    ]
+
+
+def _is_loopback(endpoint: str) -> bool:
+    match = _ENDPOINT.match(endpoint)
+    assert match is not None, "it was checked when the graph was loaded"
+    host = match["host"].strip("[]")
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
+    """What one can find out about a machine that was not heard: whether anybody listens at its
+    endpoint. Opens a connection and sends nothing."""
+    scheme, _, address = endpoint.partition("/")
+    if scheme not in ("tcp", "tls"):
+        return "nothing was heard"
+    host, _, port = address.rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout).close()
+    except OSError as error:
+        return f"no connection to {endpoint}: {error.strerror or error}"
+    keys = "are the keys of this graph's authority? Or does it" if scheme == "tls" else "does it"
+    return f"{endpoint} listens and says nothing of this graph: {keys} run another graph?"
 
 
 def transport_type(machines: Sequence[MachineSpec]) -> type[NetworkTransport]:

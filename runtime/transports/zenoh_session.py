@@ -108,7 +108,7 @@ def access_control(
         if other == machine:
             continue
         theirs, mine = keys_from(placed, other, machine), keys_from(placed, machine, other)
-        alive, here = [f"{prefix}/alive/{other}"], [f"{prefix}/alive/{machine}"]
+        alive, here = [f"{prefix}/alive/{other}/*"], [f"{prefix}/alive/{machine}/*"]
         token = ["liveliness_token"]
         asks = ["declare_liveliness_subscriber", "liveliness_query"]
         subjects.append({"id": other, "cert_common_names": [other]})

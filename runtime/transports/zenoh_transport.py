@@ -105,21 +105,29 @@ class ZenohTransport(NetworkTransport):
                 f"use it, or the address is not one of this machine; --set machines.{machine}=..."
             ) from error
         liveliness = self._session.liveliness()
+        present: dict[str, set[str]] = {name: set() for name in names}
 
         def changed(sample: Any) -> None:
-            if sample.kind == zenoh.SampleKind.DELETE:
-                lost(str(sample.key_expr).rpartition("/")[2])
+            name, session = str(sample.key_expr).rsplit("/", 2)[1:]
+            if sample.kind != zenoh.SampleKind.DELETE:
+                present[name].add(session)
+                return
+            present[name].discard(session)
+            if not present[name]:  # a second one that was refused leaves the first where it is
+                lost(name)
 
         for name in names:
             if name != machine:
                 self._keep(
                     liveliness.declare_subscriber(
-                        f"{self._prefix}/alive/{name}",
+                        f"{self._prefix}/alive/{name}/*",
                         zenoh.handlers.Callback(changed, indirect=False),
                         history=True,
                     )
                 )
-        self._keep(liveliness.declare_token(f"{self._prefix}/alive/{machine}"))
+        self._keep(
+            liveliness.declare_token(f"{self._prefix}/alive/{machine}/{self._session.zid()}")
+        )
 
     def _keep(self, declared: Any) -> None:
         self._declared.append(declared)

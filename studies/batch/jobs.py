@@ -425,7 +425,7 @@ def _connected(address: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError as error:
         raise AloftError(
-            "a Dask cluster needs the package distributed: pip install 'aloft[cluster]'"
+            "a Dask cluster needs the package distributed: pip install 'aloft-robotics[cluster]'"
         ) from error
     loop = running_loop()
     try:
@@ -458,4 +458,4 @@ def _check_workers(client: Any, address: str) -> None:
 
 def _version() -> str:
     """The version of aloft that is installed in the process that calls this."""
-    return version("aloft")
+    return version("aloft-robotics")

@@ -16,7 +16,8 @@ import numpy as np
 from ...robots.description import find_robot
 from ..expansion import load_cell
 from .curves import draw_jump, draw_push, jump_numbers, push_numbers
-from .strip import Moment, Motion, NoRendererError, View, draw_strip, moments_of
+from .offscreen import NoRendererError, View
+from .strip import Moment, Motion, draw_strip, moments_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
@@ -184,7 +185,7 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
 
 def scene_of(cell: Cell) -> Terrain:
     """The ground that a cell's simulated robot jumps on."""
-    checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin).checked
+    checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin, cell.behind).checked
     params: Any = next(spec.params for spec in checked.blocks if spec.path == "robot")
     scene: Terrain = params.build_scene(None)
     return scene

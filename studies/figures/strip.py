@@ -1,170 +1,22 @@
-"""Draws a motion as a strip of frames, each with its time and what happens at it.
-
-Pictures of the simulated robot without a screen: MuJoCo's renderer on EGL.
-
-Needs PyOpenGL (``pip install 'aloft[pictures]'``) and, on Linux, a driver for OpenGL without a
-screen; Mesa's does it on the processor: ``apt-get install libegl1 libgl1-mesa-dri``.
-"""
+"""Draws a motion as a strip of frames, each with its time and what happens at it."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...hal.simulated.mujoco_model import mujoco_spec
 from ...mathematics.arrays import Array
 from ...plotting import FAINT, image, new_figure, style
-from ...runtime.language.errors import AloftError
 from ...runtime.language.terrain import Terrain
+from .offscreen import Offscreen, View
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
     from ...robots.description import RobotDescription
-
-
-Pixels = NDArray[np.uint8]
-
-REMEDY = (
-    "pip install 'aloft[pictures]' and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
-    "figures of frames are left out without"
-)
-PAINT = {
-    "torso": (0.20, 0.36, 0.58), "hip": (0.33, 0.36, 0.40), "thigh": (0.87, 0.55, 0.20),
-    "calf": (0.42, 0.46, 0.52), "foot": (0.16, 0.17, 0.19),
-}  # fmt: skip
-BLOCK, BONE = (0.78, 0.74, 0.66), (0.33, 0.36, 0.40)
-
-
-class NoRendererError(AloftError):
-    """Raised if nothing can be drawn without a screen."""
-
-
-@dataclass(frozen=True)
-class View:
-    """Where the camera looks [m, world], from how far [m] and which way [deg]."""
-
-    look_at: tuple[float, float, float]
-    distance: float
-    azimuth: float = 112.0
-    elevation: float = -9.0
-
-
-class Offscreen:
-    """Draws a robot in a scene. It is a context manager that holds the renderer.
-
-    Raises:
-        NoRendererError: the libraries for it are missing; the text says which to install.
-    """
-
-    def __init__(self, robot: RobotDescription, scene: Terrain, width: int, height: int) -> None:
-        import mujoco
-
-        self._gl = _context(width, height)
-        self._model = _painted(robot, scene, width, height)
-        self._data = mujoco.MjData(self._model)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=200)
-        self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
-        self._option.sitegroup[:] = 0
-        self._option.flags[mujoco.mjtVisFlag.mjVIS_TENDON] = 0
-        try:
-            self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        except mujoco.FatalError as error:
-            self._gl.free()
-            raise NoRendererError(f"MuJoCo cannot draw here: {error}; {REMEDY}") from error
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-        self._area = mujoco.MjrRect(0, 0, width, height)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._context.free()
-        self._gl.free()
-
-    def picture(self, base: Array, quaternion: Array, joints: Array, view: View) -> Pixels:
-        """The robot in a pose (quaternion x, y, z, w), (height, width, 3)."""
-        import mujoco
-
-        data, camera = self._data, self._camera
-        data.qpos[:3] = base
-        data.qpos[3], data.qpos[4:7] = quaternion[3], quaternion[:3]
-        data.qpos[7:] = joints
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_camlight(self._model, data)
-        camera.lookat[:] = view.look_at
-        camera.distance, camera.azimuth = view.distance, view.azimuth
-        camera.elevation = view.elevation
-        mujoco.mjv_updateScene(
-            self._model, data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
-        )
-        mujoco.mjr_render(self._area, self._scene, self._context)
-        pixels = np.zeros((self._area.height, self._area.width, 3), np.uint8)
-        mujoco.mjr_readPixels(pixels, None, self._area, self._context)
-        return np.flipud(pixels)
-
-
-def _context(width: int, height: int) -> Any:
-    """A new OpenGL context, made current."""
-    try:
-        if sys.platform == "linux":
-            from mujoco.egl import GLContext
-        elif sys.platform == "darwin":
-            from mujoco.cgl import GLContext
-        else:
-            from mujoco.glfw import GLContext
-        context = GLContext(width, height)
-        context.make_current()
-    except Exception as error:  # whatever a missing or broken driver raises
-        raise NoRendererError(f"no OpenGL without a screen ({error}); {REMEDY}") from error
-    return context
-
-
-def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -> Any:
-    """The simulator's own model with a floor pattern, colours, lights and bones between joints."""
-    import mujoco
-
-    spec = mujoco_spec(robot, scene=scene)
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-    spec.visual.quality.shadowsize = 2048
-    spec.stat.extent, spec.stat.center = 1.5, [0.2, 0.0, 0.2]  # what the shadows have to cover
-    spec.visual.headlight.ambient = [0.45, 0.45, 0.45]
-    spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
-    spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=32, height=32,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, rgb1=[0.97, 0.98, 1.0], rgb2=[0.90, 0.93, 0.97],
-    )  # fmt: skip
-    spec.add_texture(
-        name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, width=256, height=256,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, rgb1=[0.80, 0.83, 0.87],
-        rgb2=[0.88, 0.90, 0.93],
-    )  # fmt: skip
-    tiles = spec.add_material(name="tiles", texrepeat=[10, 10], texuniform=True)
-    tiles.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
-    spec.worldbody.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=[0.35, 0.45, -1.0], pos=[-1.0, -1.0, 3.0],
-        diffuse=[0.6, 0.6, 0.6], castshadow=True,
-    )  # fmt: skip
-    for geom in spec.geoms:
-        if geom.name == "floor":
-            geom.material = "tiles"
-        elif geom.name.startswith(("box/", "field/")):
-            geom.rgba = [*BLOCK, 1.0]
-        else:
-            part = next((c for p, c in PAINT.items() if p in geom.name), PAINT["foot"])
-            geom.rgba = [*part, 1.0]
-    for joint in robot.joints:
-        if max(abs(x) for x in joint.origin) > 0.0:
-            spec.body(joint.parent).add_geom(
-                type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.012, 0, 0], mass=0.0, contype=0,
-                conaffinity=0, fromto=[0.0, 0.0, 0.0, *joint.origin], rgba=[*BONE, 1.0],
-            )  # fmt: skip
-    return spec.compile()
 
 
 FRAME = (2.3, 2.43)

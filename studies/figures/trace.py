@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...runtime.graph import Graph
 from ...runtime.language.errors import AloftError
 from ..execution import outcome_of
-from ..expansion import Job, load_cell
+from ..expansion import Job, seeded_graph
 from ..journal import Outcome
 
 TRUTH: tuple[str, ...] = (
@@ -86,11 +84,7 @@ def make_trace(task_and_job: tuple[str, Job]) -> Trace:
         AloftError: the run broke, or the process was told to stop.
     """
     task, work = task_and_job
-    graph, origin = Path(work.graph), Path(work.origin)
-    include = [Path(file) for file in work.include]
-    seeded: Graph = load_cell(graph, include, work.overrides, origin)
-    seeds = dict.fromkeys(seeded.seed_parameters, work.seed)
-    result = load_cell(graph, include, {**work.overrides, **seeds}, origin).run()
+    result = seeded_graph(work).run()
     outcome = outcome_of(result)
     if outcome.error:
         raise AloftError(f"{task}: {outcome.error}")

@@ -53,3 +53,12 @@ def test_the_report_of_a_wrong_graph_as_json(
     (problem, *_) = answer["problems"]
     assert answer["success"] is False and answer["count"] == len(answer["problems"])
     assert (problem["code"], problem["line"]) == ("unknown-parameter", 3)
+
+
+def test_an_open_endpoint_is_a_warning(folder: Path, call: Call, call_json: CallJson) -> None:
+    text = (folder / "count.yaml").read_text()
+    text += "machines: {one: tcp/127.0.0.1:7450, two: tcp/10.9.8.7:7450}\nplace: {counter: one, double: two}\n"
+    (folder / "count.yaml").write_text(text)
+    (warning,) = call_json("check", "count.yaml")["warnings"]
+    assert warning.startswith("machine 'two' listens at tcp/10.9.8.7:7450: whoever reaches it can")
+    assert f"warning: {warning}\n" in call("check", "count.yaml").stdout

@@ -50,7 +50,7 @@ def test_the_whole_way(recorded: Path, call: Call, call_json: CallJson) -> None:
     problem = call_json("log", "export", "count.rrd", "--csv", "--signal", "countr", code=2)
     assert "no signal 'countr'; the nearest are counter." in problem["reason"]
     problem = call_json("log", "export", "count.rrd", code=2)
-    assert problem["reason"] == "say one of --csv, --parquet and --mcap"
+    assert problem["reason"] == "say one of --csv, --parquet, --mcap and --bag"
     problem = call_json("log", "export", "count.rrd", "--csv", "-o", "no/a.csv", code=2)
     assert problem["reason"].startswith("no/a.csv cannot be written")
     assert "none.rrd cannot be read" in call_json("log", "info", "none.rrd", code=2)["reason"]
@@ -110,4 +110,4 @@ def test_without_mcap_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "mcap", None)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     problem = call_json("log", "export", "count.rrd", "--mcap", code=2)
-    assert problem["reason"] == "MCAP needs the library mcap; pip install 'aloft[mcap]'"
+    assert problem["reason"] == "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"

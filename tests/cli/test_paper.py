@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from aloft.cli.shared import paper
-from aloft.studies.figures import strip
+from aloft.studies.figures import offscreen
 from aloft.studies.figures.paper import page
 from aloft.studies.reading import read_study
 
@@ -46,14 +46,14 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     study.write_text(text + "set: {duration: 40 ms}\n")
     screen = console(quiet=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(strip, "_context", unavailable)
+        patch.setattr(offscreen, "_context", unavailable)
         code = paper.draw_paper(folder / "out", "", 1, screen, False, study)
     assert code == 0
     return folder / "out", json.loads((folder / "out" / "paper.json").read_text())
 
 
 def unavailable(width: int, height: int) -> Any:
-    raise strip.NoRendererError(f"no OpenGL without a screen (none here); {strip.REMEDY}")
+    raise offscreen.NoRendererError(f"no OpenGL without a screen (none here); {offscreen.REMEDY}")
 
 
 @pytest.mark.long

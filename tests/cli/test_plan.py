@@ -44,6 +44,10 @@ def test_many_tasks_as_json(folder: Path, call_json: CallJson) -> None:
     first = result["plans"][0]
     assert first["kept"] is True and first["valid"] is True
     assert first["figures"]["rise_m"] == pytest.approx(0.15, abs=1e-3)
+    heat = first["winding_heat_j"]
+    assert set(heat) == set(find_robot("bruce").transmission.motors)
+    assert 15.0 < heat["left_knee_motor"] == max(heat.values()) < 60.0
+    assert heat["left_knee_motor"] == pytest.approx(heat["right_knee_motor"], rel=1e-3)
     assert {"name", "passed", "value", "limit", "unit", "where", "text"} <= set(first["tests"][0])
     assert not (folder / "plans").exists()
 

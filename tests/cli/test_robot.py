@@ -47,6 +47,27 @@ def test_show_prints_the_tree_the_motors_the_feet_and_the_sensors() -> None:
     assert not [line for line in lines if line.startswith("note:")]
 
 
+def test_show_lists_the_effects_that_can_be_simulated() -> None:
+    found = run_for_json("robot", "show", "bruce", "--effects")["effects"]
+    rows = {".".join(filter(None, (row["group"], row["parameter"]))): row for row in found}
+    bandwidth = rows["imu.bandwidth"]
+    assert bandwidth["unit"] == "Hz" and bandwidth["default"] is None
+    assert bandwidth["trial"] == "100 Hz"
+    assert bandwidth["source"] == "data sheets of MEMS units: 5 to 400 Hz to choose from"
+    assert rows["switch_threshold"]["trial"] == ["1 N", "6 N"], "the last trial decides"
+    assert rows["gyro_noise"]["trial"] == "0.02 rad/s", "of an included trial"
+    assert rows["gears.stiffness"]["required"] and rows["gears.stiffness"]["group_is_off"]
+    assert rows["gears.stiffness"]["trial"] is None
+    taken = {
+        f"robot.{name}": row["trial"] for name, row in rows.items() if row["trial"] is not None
+    }
+    graph = aloft.load(Path(aloft.__file__).parent / "graphs/jump.yaml", overrides=taken)
+    assert graph is not None, "every path and value is one that a graph takes"
+    text = run_here("robot", "show", "bruce", "--effects").stdout
+    line = next(line for line in text.splitlines() if " motors.saturation " in line)
+    assert line.split()[:3] == ["motors.saturation", "0.0", "0.1"]
+
+
 def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "cart.xml").write_text(CART_POLE)
     monkeypatch.chdir(tmp_path)

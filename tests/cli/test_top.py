@@ -149,7 +149,11 @@ def test_who_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "graph.yaml").write_text(GRAPH.replace("745", "1"))
     monkeypatch.chdir(tmp_path)
     found = run_for_json("top", "graph.yaml", "--once", "--wait", "0.2", code=1)
-    assert found["reason"] == "nothing was heard of onboard, ground"
+    assert found["reason"] == (
+        "onboard: no connection to tcp/127.0.0.1:10: Connection refused; "
+        "ground: no connection to tcp/127.0.0.1:11: Connection refused"
+    )
     assert found["machines"]["ground"] == {"state": "silent", "silent_s": None}
-    assert "silent" in run_here("top", "graph.yaml", "--once", "--wait", "0.2", code=1).stdout
+    shown = run_here("top", "graph.yaml", "--once", "--wait", "0.2", code=1)
+    assert "silent" in shown.stdout and "ground: no connection to tcp/" in shown.stderr
     assert "--json is for --once" in run_for_json("top", "graph.yaml", code=2)["reason"]

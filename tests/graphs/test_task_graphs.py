@@ -74,3 +74,11 @@ def test_no_number_serves_one_jump() -> None:
         assert lines[0] == "include: [jump.yaml]"
         assert len(lines) == 2
         assert lines[1].startswith("set: {plan.task: tasks/")
+
+
+@pytest.mark.parametrize("robot", ["bruce", "go2", "g1", "solo12"])
+def test_each_robot_that_jumps_loads_in_the_trial_real(robot: str, tmp_path: Path) -> None:
+    graph = GRAPHS / ("jump.yaml" if robot == "bruce" else f"robots/{robot}_jump.yaml")
+    path = tmp_path / "real.yaml"
+    path.write_text(f"include: [{graph}, {GRAPHS / 'trials' / 'real'}.yaml]\n")
+    assert not check(path).problems

@@ -18,7 +18,7 @@ from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.calibration import Calibration, calibrate_robot, fragment
 from aloft.robots.description import find_robot
 from aloft.robots.identification import IdentificationError, MeasuredRun
-from aloft.robots.sensor_identification import fit, play_positions, shifted, smooth, standing_span
+from aloft.robots.sensor_identification import fit, shifted, smooth, standing_span
 from aloft.studies.oracle import reading_ages
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
@@ -103,3 +103,33 @@ def test_the_filter_is_not_late_and_a_shift_is() -> None:
     np.testing.assert_allclose(smooth(wave, 0.002)[inner], wave[inner], atol=1e-3)
     later = np.sin(2.0 * math.pi * (time + 0.003))[:, None]
     np.testing.assert_allclose(shifted(wave, 1.5)[inner], later[inner], atol=1e-3)
+
+
+def test_a_foot_that_rocks_spoils_no_fit() -> None:
+    """Errors that are large now and then count less; those that are always there, as least squares says."""
+    random = np.random.default_rng(7)
+    rows, truth = random.normal(size=(4000, 3, 2)), np.array([0.7, -0.3])
+    noise = 0.01 * random.normal(size=(4000, 3))
+    prior = np.ones(2)
+    clean, covariance, left = fit(rows, rows @ truth + noise, prior, 0.002, 0.002)
+    np.testing.assert_allclose(clean, truth, atol=4.0 * math.sqrt(covariance.max()))
+    assert left == pytest.approx(0.01, rel=0.05)
+    rocking = noise + np.where(np.arange(4000)[:, None] % 40 < 4, 0.5, 0.0)
+    found, _, _ = fit(rows, rows @ truth + rocking, prior, 0.002, 0.002)
+    np.testing.assert_allclose(found, truth, atol=2e-3)
+
+
+def test_readings_of_slow_motions_are_as_old_as_the_simulator_makes_them() -> None:
+    params = next(b.params for b in aloft.load(GRAPH).checked.blocks if b.path == "robot")
+    step = params.timestep
+    exact = params.model_copy(update={
+        "imu": params.imu.model_copy(update={"bandwidth": None, "gyro_delay": 0.0, "accelerometer_delay": 0.0}),
+        "encoders": params.encoders.model_copy(update={"delay": 0.0, "velocity_filter": 0.0}),
+    })  # fmt: skip
+    rate, _, position, velocity = reading_ages(exact)
+    assert (rate, position, velocity) == (0.5 * step, 0.0, 0.5 * step)
+    filtered = exact.model_copy(update={
+        "encoders": exact.encoders.model_copy(update={"velocity_filter": 2e-3}),
+    })  # fmt: skip
+    # a filter of the first order, sampled, is late by its time constant less about half a step
+    assert reading_ages(filtered).velocity == pytest.approx(2e-3, abs=0.05 * step)

@@ -49,14 +49,15 @@ def test_gaps_and_what_does_not_fit_are_counted() -> None:
         block = made.block
         for number in (1, 2, 5):
             block.hear(twist(float(number)), attachment(number, 0, bytes(16)))
-        block.hear(b"nonsense")
+        block.hear(b"nonsense", attachment(6, 0, bytes(16)))
         block.hear(twist(9.0)[:-1])
         block.hear(twist(float("nan")))
+        block.hear(twist(7.0), attachment(7, 0, bytes(16)))
         made.step()
-        assert block.message.linear[0] == 5.0
+        assert block.message.linear[0] == 7.0
         health = block.health
-        assert (health.received, health.lost, health.refused) == (3, 2, 3)
-        assert block.metrics() == {"received": 3, "refused": 3}
+        assert (health.received, health.lost, health.refused) == (4, 2, 3)
+        assert block.metrics() == {"received": 4, "refused": 3}
         assert 0.0 <= float(health.age) < 60.0 and not health.late
 
 

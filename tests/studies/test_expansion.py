@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.loading import LoadError
-from aloft.studies.expansion import Cell, cells, checked_cells, load_cell
+from aloft.studies.expansion import Cell, cells, checked_cells, job, load_cell, seeded_graph
 from aloft.studies.study import Study
 
 Read = Callable[[str], Study]
@@ -64,6 +64,25 @@ def test_included_files_come_before_the_graphs_own(folder: Path, study: Read) ->
     loaded = load_cell(cell.graph, cell.include, cell.sets, cell.origin).checked
     goals = [loaded.block(name).params.goal for name in ("counter", "double")]  # type: ignore[attr-defined]
     assert goals == [7, 9]
+
+
+def test_what_an_arm_includes_follows_the_graph(folder: Path, study: Read) -> None:
+    (folder / "more.yaml").write_text(
+        "blocks: {last: {use: blocks.Constant, with: {value: [1]}}}\nset: {counter.goal: 9}\n"
+    )
+    found = study("arms: {plain: {}, more: {set: {double.goal: 8}, include: more.yaml}}\n")
+    plain, more = (seeded_graph(job(cell, 3)).checked for cell in cells(found))
+    assert [spec.path for spec in more.blocks if spec.path == "last"] == ["last"]
+    assert not any(spec.path == "last" for spec in plain.blocks)
+    goals = [more.block(name).params.goal for name in ("counter", "double")]  # type: ignore[attr-defined]
+    assert goals == [9, 8]
+    first, second = keys_of(found)
+    assert first != second
+
+
+def test_a_file_that_an_arm_includes_must_exist(study: Read) -> None:
+    with pytest.raises(LoadError, match=r"there is no file .*missing.yaml"):
+        study("arms: {more: {include: missing.yaml}}\n")
 
 
 def keys_of(found: Study) -> list[str]:

@@ -194,5 +194,7 @@ def test_optuna_is_asked_for(study: Read, monkeypatch: pytest.MonkeyPatch) -> No
     import sys
 
     monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(AloftError, match=r"aloft tune needs Optuna: pip install 'aloft\[tune\]'"):
+    with pytest.raises(
+        AloftError, match=r"aloft tune needs Optuna: pip install 'aloft-robotics\[tune\]'"
+    ):
         searched(study(SEARCHING_TEXT))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ....mathematics.arrays import Array
-from .session import PACKET_TIME, Outcome, Request, Session
+from ....mathematics.rotations import from_matrix, logarithm
+from .session import PACKET_TIME, Request, Session, StepReport
 
 GRAVITY = 9.81
 GRAVITY_ERROR = 0.1
@@ -13,8 +14,14 @@ GRAVITY_ERROR = 0.1
 QUARTER = 0.5 * np.pi
 TURN_ERROR = 0.2
 """The share of a quarter turn by which the gyroscope may differ: it is turned by hand."""
-STRAIGHT = 0.9
+STRAIGHT = 0.95
 """The least cosine between a measured direction and the axis that it belongs to."""
+AXES_ERROR = 0.35
+"""The angle between the mountings that accelerometer and gyroscope show [rad]: it is turned by hand."""
+SQUARE_ERROR = 0.1
+"""A board that is this near to a mounting along the robot's axes is taken for mounted so [rad]."""
+PLACE_ERROR = 0.004
+"""How far the board may be from its told place [m], for a rule."""
 STILL_PACKETS = 50
 POLLS = 20000
 _SIDES = (
@@ -28,77 +35,139 @@ _AXES = (
     ("z", "turn the robot by 90 deg about its upward axis, to its left"),
 )
 
+_PLACES = (
+    "measure how far the IMU's chip is ahead of the torso's origin, the middle between the hips [mm]",
+    "measure how far it is to the left of it [mm]",
+    "measure how far it is above it [mm]",
+)
 
-def check_imu(session: Session) -> Outcome:
+
+def check_imu(session: Session) -> StepReport:
     """Compare gravity in three positions, and three quarter turns, with the robot's axes."""
-    outcome = Outcome()
+    report = StepReport()
     force, turned = np.zeros((3, 3)), np.zeros((3, 3))
     for k, (side, text) in enumerate(_SIDES):
         session.do(Request("place", side, text))
         mean = _mean_force(session)
         if mean is None:
-            outcome.add(
+            report.add(
                 "board.port", "packets of the sensor board", "none",
                 f"check that the board at {session.hardware.board.port} is powered and streams",
             )  # fmt: skip
-            return outcome
+            return report
         force[:, k] = mean
     for k, (axis, text) in enumerate(_AXES):
         turned[:, k] = _turn(session, Request("turn", axis, text))
-    outcome.values |= {"specific_force": force.tolist(), "turned": turned.tolist()}
+    report.values |= {"specific_force": force.tolist(), "turned": turned.tolist()}
     for k, (side, _) in enumerate(_SIDES):
         size = float(np.linalg.norm(force[:, k]))
         if abs(size / GRAVITY - 1.0) > GRAVITY_ERROR:
-            outcome.add(
+            report.add(
                 f"accelerometer, robot on its {side}", f"{GRAVITY:.2f} m/s^2", f"{size:.2f} m/s^2",
                 "its range or its unit is another: configure the board",
             )  # fmt: skip
     for k, (axis, _) in enumerate(_AXES):
         size = float(np.linalg.norm(turned[:, k]))
         if abs(size / QUARTER - 1.0) > TURN_ERROR:
-            outcome.add(
+            report.add(
                 f"gyroscope, turn about {axis}", "90 deg", f"{np.degrees(size):.0f} deg",
                 "its range or its unit is another (board.gyro_range), or it was turned too fast",
             )  # fmt: skip
-    if not outcome.findings:
-        _compare_axes(force / GRAVITY, turned / QUARTER, outcome)
-    return outcome
+    if not report.discrepancies:
+        rotation = _mounting(force / GRAVITY, turned / QUARTER, report)
+        if rotation is not None:
+            _note_mounting(session, rotation, report)
+    return report
 
 
-def _compare_axes(force: Array, turned: Array, outcome: Outcome) -> None:
-    """Note a mounting that is turned or mirrored; columns are the robot's axes in the board's frame."""
-    axes, spins = np.rint(force), np.rint(turned)
-    straight = min(float((a * b).sum(axis=0).min()) for a, b in ((axes, force), (spins, turned)))
-    if straight < STRAIGHT or not np.array_equal(np.abs(axes).sum(axis=0), np.ones(3)):
-        outcome.add(
-            "IMU", "gravity and turns along its axes", "directions between its axes",
-            "lay and turn the robot squarely; if it was, the board is mounted askew",
-        )  # fmt: skip
-    elif not np.array_equal(axes, spins):
-        outcome.add(
-            "IMU", "accelerometer and gyroscope with the same axes",
-            f"accelerometer {_words(axes)}, gyroscope {_words(spins)}",
-            "they are combined wrongly on the board: correct its firmware's axes",
-        )  # fmt: skip
-    elif np.linalg.det(axes) < 0.0:
-        outcome.add(
-            "IMU", "right-handed axes", f"left-handed: {_words(axes)}",
+def _mounting(force: Array, turned: Array, report: StepReport) -> Array | None:
+    """The rotation from the base's axes to the board's (3, 3) that explains both sensors; columns are the
+    robot's axes in the board's frame. ``None`` if there is none, which is noted."""
+    axes, spins = _nearest_rotation(force), _nearest_rotation(turned)
+    straight = min(_straightness(axes, force), _straightness(spins, turned))
+    between = np.arccos(np.clip(0.5 * (np.trace(axes.T @ spins) - 1.0), -1.0, 1.0))
+    left_handed = np.linalg.det(force) < 0.0 and np.linalg.det(turned) < 0.0
+    place = "IMU"
+    if left_handed:
+        report.add(
+            place, "right-handed axes", f"left-handed: {_words(force)}",
             "one axis is inverted: correct the board's firmware",
         )  # fmt: skip
-    elif not np.array_equal(axes, np.eye(3)):
-        outcome.add(
-            "IMU", "x forward, y left, z up", _words(axes),
-            "mount the board along the robot's axes",
+    elif np.linalg.det(force) * np.linalg.det(turned) < 0.0 or between > AXES_ERROR:
+        report.add(
+            place, "accelerometer and gyroscope with the same axes",
+            f"accelerometer {_words(force)}, gyroscope {_words(turned)}",
+            "they are combined wrongly on the board: correct its firmware's axes",
         )  # fmt: skip
+    elif straight < STRAIGHT:
+        report.add(
+            place, "three directions at right angles", f"a cosine of {straight:.2f}",
+            "lay and turn the robot squarely, and hold it still",
+        )  # fmt: skip
+    else:
+        return _nearest_rotation(np.hstack([force, turned]), np.hstack([np.eye(3)] * 2))
+    return None
+
+
+def _nearest_rotation(measured: Array, known: Array | None = None) -> Array:
+    """The rotation that turns the columns of ``known`` nearest to those of ``measured`` (Kabsch)."""
+    u, _, v = np.linalg.svd(measured @ (np.eye(3) if known is None else known).T)
+    keep = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(v)])
+    rotation: Array = u @ keep @ v
+    return rotation
+
+
+def _straightness(rotation: Array, measured: Array) -> float:
+    """The least cosine between a measured column and that of the rotation."""
+    sizes = np.linalg.norm(measured, axis=0)
+    return float(((rotation * measured).sum(axis=0) / sizes).min())
+
+
+def _note_mounting(session: Session, rotation: Array, report: StepReport) -> None:
+    """Write how the board is mounted: square where a hand's error allows it, else as it was measured."""
+    square = np.rint(rotation)
+    is_square = np.array_equal(np.abs(square).sum(axis=0), np.ones(3))
+    if is_square and _straightness(square, rotation) > np.cos(SQUARE_ERROR):
+        rotation = square
+    quaternion, turn = np.zeros(4), np.zeros(3)
+    from_matrix(np.ascontiguousarray(rotation.T), quaternion)
+    logarithm(quaternion, turn)
+    written = [round(float(angle), 4) for angle in turn]
+    told = session.hardware.board.imu_to_base
+    apart = np.arccos(np.clip(0.5 * (np.trace(told @ rotation) - 1.0), -1.0, 1.0))
+    report.values["imu_rotation"] = written
+    if apart > SQUARE_ERROR:
+        report.add(
+            "board.imu_rotation", _words(told.T), _words(rotation), "written", mended=True
+        )  # fmt: skip
+        session.write({}, {"imu_rotation": written})
+    place = [
+        1e-3 * session.operator.measure(Request("measure", f"imu {axis}", text))
+        for axis, text in zip("xyz", _PLACES, strict=True)
+    ]
+    report.values["imu_position"] = place
+    before = np.array(session.hardware.board.imu_position)
+    if np.abs(place - before).max() > PLACE_ERROR:
+        report.add(
+            "board.imu_position", _millimetres(before), _millimetres(np.array(place)), "written",
+            mended=True,
+        )  # fmt: skip
+        session.write({}, {"imu_position": [round(each, 4) for each in place]})
+
+
+def _millimetres(place: Array) -> str:
+    return ", ".join(f"{1e3 * each:.0f}" for each in place.tolist()) + " mm"
 
 
 def _words(axes: Array) -> str:
-    """Where each axis of the board points, in words."""
+    """Where each axis of the board points, in words; columns are the robot's axes in its frame."""
     ways = (("forward", "backward"), ("left", "right"), ("up", "down"))
     named = []
     for k, axis in enumerate("xyz"):
         robot = int(np.abs(axes[k]).argmax())
-        named.append(f"{axis} {ways[robot][0 if axes[k, robot] > 0.0 else 1]}")
+        way = ways[robot][0 if axes[k, robot] > 0.0 else 1]
+        off = np.degrees(np.arccos(min(1.0, abs(axes[k, robot]) / np.linalg.norm(axes[k]))))
+        named.append(f"{axis} {way}" + (f" but for {off:.0f} deg" if off > 10.0 else ""))
     return ", ".join(named)
 
 

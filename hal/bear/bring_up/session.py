@@ -1,21 +1,22 @@
-"""What the steps of a bring-up share: the devices, the person who helps, findings and the journal."""
+"""What the steps of a bring-up share: the devices, the person who helps, discrepancies and the record."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 import yaml
 
 from ....mathematics.arrays import Array
 from ....robots.robot_description import RobotDescription
-from ..bus import BearBus
+from ..bus import BearBus, BusError
 from ..configuration import Hardware
 from ..sense_board import SenseBoard
 
@@ -29,12 +30,13 @@ class Request:
 
     Attributes:
         act: ``measure``, ``move`` a joint, ``stops`` of a joint, take a ``pose``, ``place`` or
-            ``turn`` the robot, ``press`` a switch.
-        target: of what: a length, a joint, a side, an axis, a contact point.
+            ``turn`` the robot, ``press`` a switch, ``hang`` the robot up with its feet in the air, be
+            ``ready`` to lower it, and to watch what it does next.
+        target: of what: a length, a joint, a side, an axis, a contact point, a motion.
         text: the instruction in words.
     """
 
-    act: Literal["measure", "move", "stops", "pose", "place", "turn", "press"]
+    act: Literal["measure", "move", "stops", "pose", "place", "turn", "press", "hang", "ready"]
     target: str
     text: str
 
@@ -50,7 +52,7 @@ class Operator(Protocol):
 
 
 @dataclass(frozen=True)
-class Finding:
+class Discrepancy:
     """Something that is not as it should be.
 
     Attributes:
@@ -70,34 +72,125 @@ class Finding:
 
 
 @dataclass
-class Outcome:
+class StepReport:
     """What a step found out."""
 
     values: dict[str, Any] = field(default_factory=dict)
-    findings: list[Finding] = field(default_factory=list)
+    discrepancies: list[Discrepancy] = field(default_factory=list)
 
     @property
     def passed(self) -> bool:
         """Whether the next step may follow."""
-        return all(finding.mended for finding in self.findings)
+        return all(discrepancy.mended for discrepancy in self.discrepancies)
 
     def add(self, place: str, expected: str, found: str, fix: str, mended: bool = False) -> None:
-        """Note a finding."""
-        self.findings.append(Finding(place, expected, found, fix, mended))
+        """Note a discrepancy."""
+        self.discrepancies.append(Discrepancy(place, expected, found, fix, mended))
+
+
+class LetGoError(BusError):
+    """Somebody let go of the dead man's switch."""
+
+
+def go_on(next_cycle: Callable[[], bool]) -> None:
+    """Wait for the next cycle.
+
+    Raises:
+        LetGoError: the dead man's switch is not held.
+    """
+    if not next_cycle():
+        raise LetGoError("the dead man's switch was let go")
+
+
+class Devices(NamedTuple):
+    """The open bus of the drives and the open sensor board."""
+
+    bus: BearBus
+    board: SenseBoard
+
+
+class BringUpRun(Protocol):
+    """The outcome of a graph's run."""
+
+    @property
+    def success(self) -> bool:
+        """Whether the run went as its graph intends."""
+
+    @property
+    def reason(self) -> str:
+        """Why it ended, or what failed."""
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """What the blocks say of it."""
+
+
+class GraphRunner(Protocol):
+    """Runs a graph with the robot of a session, as `aloft run` does, with its ports closed here."""
+
+    def __call__(self, graph: str, settings: Mapping[str, Any]) -> BringUpRun:
+        """Run the ``graph``, by its name, with these parameters besides the hardware's file."""
 
 
 class Session:
     """A robot on the bench: its file, its devices, and who stands beside it.
 
-    Nothing that it offers switches a drive on.
+    Args:
+        file: of the hardware.
+        robot: the description.
+        connect: opens the devices; their ports are closed again while a graph runs.
+        operator: the person.
+        hold: gives what waits for the next cycle of the bus, and says whether to go on.
+        run_graph: runs a graph on this robot.
+
+    Nothing that it offers switches a drive on by itself.
     """
 
     def __init__(
-        self, file: Path, robot: RobotDescription, bus: BearBus, board: SenseBoard, operator: Operator,
+        self, file: Path, robot: RobotDescription, connect: Callable[[Hardware], Devices],
+        operator: Operator, hold: Callable[[Hardware], AbstractContextManager[Callable[[], bool]]],
+        run_graph: GraphRunner,
     ) -> None:  # fmt: skip
-        self.file, self.robot, self.bus, self.board = file, robot, bus, board
-        self.operator = operator
+        self.file, self.robot, self.operator = file, robot, operator
+        self._connect, self._hold, self._run_graph = connect, hold, run_graph
+        self._devices: Devices | None = None
         self.hardware = Hardware.read(file, robot)
+
+    @property
+    def bus(self) -> BearBus:
+        """The bus of the drives."""
+        return self._opened().bus
+
+    @property
+    def board(self) -> SenseBoard:
+        """The sensor board."""
+        return self._opened().board
+
+    def _opened(self) -> Devices:
+        if self._devices is None:
+            self._devices = self._connect(self.hardware)
+        return self._devices
+
+    def close(self) -> None:
+        """Close the ports; they are opened again when they are needed."""
+        if self._devices is not None:
+            devices, self._devices = self._devices, None
+            devices.bus.close()
+            devices.board.port.close()
+
+    def hold(self) -> AbstractContextManager[Callable[[], bool]]:
+        """Wait until the dead man's switch is held; gives what waits for the next cycle."""
+        return self._hold(self.hardware)
+
+    def run_graph(self, graph: str, settings: Mapping[str, Any]) -> BringUpRun:
+        """Run a graph on this robot."""
+        self.close()
+        return self._run_graph(graph, settings)
+
+    @property
+    def friction_file(self) -> Path:
+        """What the joints have of friction beyond the description's, as a graph's fragment."""
+        return self.file.with_suffix(".friction.yaml")
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -141,7 +234,7 @@ class Session:
         self.hardware = Hardware.read(self.file, self.robot)
 
 
-class Journal:
+class BringUpRecord:
     """The record of all steps, beside the hardware's file: ``NAME.bring_up.json``."""
 
     def __init__(self, hardware: Path) -> None:
@@ -150,14 +243,14 @@ class Journal:
         if self.path.exists():
             self.entries = json.loads(self.path.read_text(encoding="utf-8"))["steps"]
 
-    def add(self, step: str, outcome: Outcome) -> dict[str, Any]:
-        """Note a step's outcome, and write the file."""
+    def add(self, step: str, report: StepReport) -> dict[str, Any]:
+        """Note a step's report, and write the file."""
         entry = {
             "step": step,
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "passed": outcome.passed,
-            "values": outcome.values,
-            "findings": [asdict(finding) for finding in outcome.findings],
+            "passed": report.passed,
+            "values": report.values,
+            "discrepancies": [asdict(discrepancy) for discrepancy in report.discrepancies],
         }
         self.entries.append(entry)
         _write(self.path, json.dumps({"steps": self.entries}, indent=2) + "\n")

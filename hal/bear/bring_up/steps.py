@@ -1,6 +1,6 @@
-"""The steps before power: which robot, drives, directions, zero, limits, IMU, switches.
+"""All steps, and those before power: which robot, drives, directions, zero, limits.
 
-Each step reads, never switches a drive on, and returns what it found. A finding names the place,
+The steps here read, never switch a drive on, and return what they found. A discrepancy names the place,
 what was expected, what was found, and the fix.
 """
 
@@ -14,8 +14,9 @@ import numpy as np
 from ....mathematics.arrays import Array
 from ...bear import bench
 from ..bus import BusError
+from . import power_steps, standing_steps
 from .imu_step import check_imu
-from .session import Outcome, Request, Session
+from .session import Request, Session, StepReport
 from .switch_step import check_switches
 
 LENGTH_ERROR, MASS_ERROR = 0.004, 0.05
@@ -36,17 +37,17 @@ MARGIN = 0.02
 
 
 @dataclass(frozen=True)
-class Step:
+class BringUpStep:
     """A step: its name, what could go wrong with it, and what it does."""
 
     name: str
     risk: str
-    run: Callable[[Session], Outcome]
+    run: Callable[[Session], StepReport]
 
 
-def check_robot(session: Session) -> Outcome:
+def check_robot(session: Session) -> StepReport:
     """Whether this is the described robot: lengths of the legs and mass, measured by a person."""
-    outcome = Outcome()
+    report = StepReport()
     robot = session.robot
     for joint in robot.joints:
         length = float(np.linalg.norm(joint.origin))
@@ -54,36 +55,36 @@ def check_robot(session: Session) -> Outcome:
             continue
         text = f"measure from the axis above to the axis of {joint.name} [mm]"
         found = 1e-3 * session.operator.measure(Request("measure", joint.name, text))
-        outcome.values[joint.name] = found
+        report.values[joint.name] = found
         if abs(found - length) > LENGTH_ERROR:
-            outcome.add(
+            report.add(
                 f"robot: length to {joint.name}", f"{1e3 * length:.1f} mm", f"{1e3 * found:.1f} mm",
                 f"this is another variant of {robot.name}: describe it and name it in `robot`",
             )  # fmt: skip
     mass = session.operator.measure(Request("measure", "mass", "weigh the robot [kg]"))
-    outcome.values["mass"] = mass
+    report.values["mass"] = mass
     if abs(mass / robot.total_mass - 1.0) > MASS_ERROR:
-        outcome.add(
+        report.add(
             "robot: mass", f"{robot.total_mass:.3f} kg", f"{mass:.3f} kg",
             "another variant, or a battery is missing: describe the robot as it is",
         )  # fmt: skip
-    return outcome
+    return report
 
 
-def check_drives(session: Session) -> Outcome:
+def check_drives(session: Session) -> StepReport:
     """Whether exactly the file's drives answer, healthy, off, and with a good supply."""
-    outcome = Outcome()
+    report = StepReport()
     hardware = session.hardware
     answered = {
         each.device: each for each in bench.scan(session.bus, hardware, range(LAST_ADDRESS + 1))
     }
-    outcome.values["answered"] = sorted(answered)
+    report.values["answered"] = sorted(answered)
     if not answered:
-        outcome.add(
+        report.add(
             "bus.baudrate", f"answers at {hardware.bus.baudrate} bit/s from {hardware.bus.port}",
             "no answer from any address", "check supply, bus.port and bus.baudrate",
         )  # fmt: skip
-        return outcome
+        return report
     names = {motor.id: name for name, motor in hardware.motors.items()}
     damaged = session.bus.counts.damaged
     for device in sorted(set(names) - set(answered)):
@@ -91,11 +92,11 @@ def check_drives(session: Session) -> Outcome:
         fix = "two drives may have one address: connect them one at a time" if damaged else (
             "check its cable and its address; a drive on another's address disturbs its answers"
         )  # fmt: skip
-        outcome.add(
+        report.add(
             f"motors.{names[device]}.id", f"a drive at address {device}", text, fix
         )  # fmt: skip
     for device in sorted(set(answered) - set(names)):
-        outcome.add(
+        report.add(
             "motors", "only the file's addresses", f"a drive at address {device}",
             "give the drive the address of the motor that is missing",
         )  # fmt: skip
@@ -106,34 +107,34 @@ def check_drives(session: Session) -> Outcome:
             continue
         volts = float(row["input_voltage"])
         if not drives.lowest_voltage <= volts <= drives.highest_voltage:
-            outcome.add(
+            report.add(
                 place, f"{drives.lowest_voltage:g} to {drives.highest_voltage:g} V", f"{volts:.1f} V",
                 "charge the pack, or check the drive's supply",
             )  # fmt: skip
         if row["trouble"]:
-            outcome.add(place, "a healthy drive", str(row["trouble"]), "switch it off and on")
+            report.add(place, "a healthy drive", str(row["trouble"]), "switch it off and on")
         if row["torque_enable"]:
-            outcome.add(
+            report.add(
                 place, "torque off", f"torque_enable = {row['torque_enable']:g}",
                 "end the program that drives it, then `aloft robot estop`",
             )  # fmt: skip
-    return outcome
+    return report
 
 
-def check_directions(session: Session) -> Outcome:
+def check_directions(session: Session) -> StepReport:
     """Which drive moves with which joint, and which way round; writes ``sign``.
 
     A joint moved by hand turns the drives by a column of the map from joints to motors. All
     joints together give a row for every drive, which tells the motor that it drives and its sign.
     """
-    outcome = Outcome()
+    report = StepReport()
     robot, names = session.robot, session.motors
     n = len(names)
     seen = np.zeros((n, n))
     for j, joint in enumerate(robot.joints):
         axis = " ".join(f"{value:g}" for value in joint.axis)
         text = (
-            f"move {joint.name} alone by about 15 deg, counter-clockwise about its axis ({axis}; "
+            f"move {joint.name} alone by about 20 deg, counter-clockwise about its axis ({axis}; "
             "forward, left, up)"
         )
         before = session.raw_positions()
@@ -142,12 +143,12 @@ def check_directions(session: Session) -> Outcome:
     farthest = np.abs(seen).max(axis=0)
     for j, joint in enumerate(robot.joints):
         if farthest[j] < LEAST_MOVE:
-            outcome.add(
+            report.add(
                 joint.name, f"drives that turn by more than {LEAST_MOVE:g} rad",
                 f"{farthest[j]:.3f} rad", "move it further; if it was, its encoder is dead",
             )  # fmt: skip
-    if outcome.findings:
-        return outcome
+    if report.discrepancies:
+        return report
     turned = seen / farthest
     expected = robot.joint_to_motor / np.abs(robot.joint_to_motor).max(axis=0)
     signs: dict[str, int] = {}
@@ -156,14 +157,14 @@ def check_directions(session: Session) -> Outcome:
         match = _closest_motor(turned[k], expected)
         if match is None:
             moved = [robot.joints[j].name for j in np.flatnonzero(np.abs(turned[k]) > RATIO_ERROR)]
-            outcome.add(
+            report.add(
                 f"motors.{name}", "motion with its joints", f"motion with {', '.join(moved) or 'none'}",
                 "check its gear, its belt and its encoder; move one joint at a time",
             )  # fmt: skip
             continue
         found, sign = match
         if found != k:
-            outcome.add(
+            report.add(
                 f"motors.{name}.id", f"address {motor.id} turns with {name}",
                 f"it turns with {names[found]}",
                 f"swap the cables, or give {names[found]} the id {motor.id}",
@@ -171,13 +172,13 @@ def check_directions(session: Session) -> Outcome:
             continue
         signs[name] = sign
         if sign != motor.sign:
-            outcome.add(
+            report.add(
                 f"motors.{name}.sign", f"{motor.sign:+d}", f"{sign:+d}", "written", mended=True
             )
-    outcome.values["signs"] = signs
-    if outcome.passed:
+    report.values["signs"] = signs
+    if report.passed:
         session.write({name: {"sign": sign} for name, sign in signs.items()})
-    return outcome
+    return report
 
 
 def _closest_motor(row: Array, expected: Array) -> tuple[int, int] | None:
@@ -189,27 +190,27 @@ def _closest_motor(row: Array, expected: Array) -> tuple[int, int] | None:
     return None
 
 
-def set_zero(session: Session) -> Outcome:
+def set_zero(session: Session) -> StepReport:
     """Take the offsets with the robot in the jig of its zero pose; writes ``offset``."""
-    outcome = Outcome()
+    report = StepReport()
     session.do(Request("pose", "zero", "put the legs into the jig of the zero pose, and let go"))
     try:
         pose = np.zeros(len(session.robot.joints))
         offsets = bench.calibrate(session.bus, session.hardware, session.robot, pose)
     except BusError as error:
-        outcome.add("jig", "drives off and at rest", str(error), "hold the robot still, try again")
-        return outcome
-    outcome.values["offsets"] = offsets
+        report.add("jig", "drives off and at rest", str(error), "hold the robot still, try again")
+        return report
+    report.values["offsets"] = offsets
     session.write({name: {"offset": offset} for name, offset in offsets.items()})
-    return outcome
+    return report
 
 
-def measure_limits(session: Session) -> Outcome:
+def measure_limits(session: Session) -> StepReport:
     """Move every joint to both stops, and compare with the description; writes ``low`` and ``high``.
 
     Both ends shifted alike tell a wrong zero; another width tells another part or an obstacle.
     """
-    outcome = Outcome()
+    report = StepReport()
     robot = session.robot
     n = len(robot.joints)
     lowest, highest = np.zeros(n), np.zeros(n)
@@ -224,7 +225,7 @@ def measure_limits(session: Session) -> Outcome:
         if joint.limits is None:
             continue
         low, high = joint.limits
-        outcome.values[joint.name] = [lowest.item(j), highest.item(j)]
+        report.values[joint.name] = [lowest.item(j), highest.item(j)]
         shift = 0.5 * (lowest.item(j) + highest.item(j) - low - high)
         wider = (highest.item(j) - lowest.item(j)) - (high - low)
         should, are = f"stops at {low:.3f} and {high:.3f} rad", (
@@ -235,16 +236,16 @@ def measure_limits(session: Session) -> Outcome:
                 "it was not moved to both stops, or something is in the way" if wider < 0.0
                 else "a stop is missing, or this is another variant of the robot"
             )  # fmt: skip
-            outcome.add(f"limits of {joint.name}", should, are, fix)
+            report.add(f"limits of {joint.name}", should, are, fix)
         elif abs(shift) > STOP_ERROR:
-            outcome.add(
+            report.add(
                 f"zero of {joint.name}", should, are,
                 f"its zero is off by {shift:+.3f} rad ({np.degrees(shift):+.1f} deg): check the jig and "
                 "the gear's teeth, then --from zero",
             )  # fmt: skip
-    if outcome.passed:
+    if report.passed:
         session.write(_motor_ranges(session, lowest + MARGIN, highest - MARGIN))
-    return outcome
+    return report
 
 
 def _motor_ranges(session: Session, low: Array, high: Array) -> dict[str, dict[str, float]]:
@@ -259,12 +260,39 @@ def _motor_ranges(session: Session, low: Array, high: Array) -> dict[str, dict[s
 
 
 STEPS = (
-    Step("robot", "another variant of the robot has other legs, masses and gears", check_robot),
-    Step("drives", "a drive is silent, has another's address, or no supply", check_drives),
-    Step("directions", "cables are swapped, or a motor turns the other way", check_directions),
-    Step("zero", "the jig is not seated, or a drive is on", set_zero),
-    Step("limits", "a zero is off by a tooth, or a leg is not free", measure_limits),
-    Step("imu", "the board is turned, or its range is another", check_imu),
-    Step("switches", "switches are swapped, stuck, or inverted", check_switches),
+    BringUpStep(
+        "robot", "another variant of the robot has other legs, masses and gears", check_robot
+    ),
+    BringUpStep("drives", "a drive is silent, has another's address, or no supply", check_drives),
+    BringUpStep(
+        "directions", "cables are swapped, or a motor turns the other way", check_directions
+    ),
+    BringUpStep("zero", "the jig is not seated, or a drive is on", set_zero),
+    BringUpStep("limits", "a zero is off by a tooth, or a leg is not free", measure_limits),
+    BringUpStep("imu", "the board is turned, or its range is another", check_imu),
+    BringUpStep("switches", "switches are swapped, stuck, or inverted", check_switches),
+    BringUpStep(
+        "current",
+        "a motor turns against its encoder, and would run away",
+        power_steps.check_currents,
+    ),
+    BringUpStep(
+        "watchdog", "a drive goes on when the cable is pulled", power_steps.check_watchdogs
+    ),
+    BringUpStep(
+        "motors", "a motor is weaker than it says, or a joint is tight", power_steps.check_motors
+    ),
+    BringUpStep("gains", "a loop oscillates, or does not hold", power_steps.hold_in_the_air),
+    BringUpStep("stand", "a switch stays open, or the robot falls", standing_steps.stand),
+    BringUpStep("sit", "it sinks fast, or drives stay on", standing_steps.sit),
+    BringUpStep("squat", "a leg gives way under load", standing_steps.squat),
+    *(
+        BringUpStep(
+            f"hop_{100.0 * rise:g}cm",
+            "it falls, or jumps higher than it should",
+            standing_steps.hop(rise),
+        )
+        for rise in standing_steps.HOPS
+    ),
 )
 """All steps, in their order."""

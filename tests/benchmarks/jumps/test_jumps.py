@@ -32,7 +32,7 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         ]
 
     tasks = [make_task({"name": "low", "rise": 0.1}), make_task({"name": "high", "rise": 0.9})]
-    monkeypatch.setattr(module, "random_tasks", lambda count, seed: tasks)
+    monkeypatch.setattr(module, "random_tasks", lambda count, seed, harder: tasks)
     monkeypatch.setattr(module, "plan_and_run", stand_in)
     monkeypatch.setattr(module, "job_results", in_this_process)
     monkeypatch.setattr(module, "compile_functions", lambda tasks, robot: 9.0)

@@ -31,6 +31,19 @@ def test_every_kind_is_drawn_within_its_range() -> None:
     assert said == {"name", "rise", "distance_x", "distance_y", "twist", "landing_height"}
 
 
+def test_harder_tasks_reach_farther() -> None:
+    tasks = random_tasks(200, 1, harder=True)
+    assert {task.name.rpartition(" ")[0] for task in tasks} == set(module._HARDER)
+    assert 0.24 < max(task.rise or 0.0 for task in tasks) <= 0.26
+    assert 0.58 < max(task.distance_x for task in tasks) <= 0.62
+    assert -0.28 <= min(task.distance_x for task in tasks) < -0.26
+    assert 0.31 < max(abs(task.distance_y) for task in tasks) <= 0.35
+    assert any(task.twist and task.distance_y for task in tasks)
+    assert max(abs(task.twist) for task in tasks if task.distance_x) > 1.9
+    assert -0.30 <= min(task.landing_height for task in tasks) < -0.25
+    assert random_tasks(8, 1, harder=True) == tasks[:8]
+
+
 def test_what_fails_is_counted_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def solve(task: object, robot: object) -> None:
         if getattr(task, "distance_y", 0.0) == 0.0 and getattr(task, "twist", 0.0) == 0.0:

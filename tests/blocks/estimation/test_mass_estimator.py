@@ -30,7 +30,7 @@ class Standing:
         self.filter = BlockBench(MassEstimator, params, robot=ROBOT)
         self.phase = Phase.STAND
         self.gyro_noise, self.random = 0.0, np.random.default_rng(11)
-        self.disturbance = np.zeros(len(ROBOT.joints))
+        self.disturbance, self.speed = np.zeros(len(ROBOT.joints)), 0.0
 
     def torque(self):
         """The torques that hold the true robot, its weight shared by the feet as statics ask."""
@@ -55,6 +55,7 @@ class Standing:
             terms = self.terms(self.model)
             measured = {name: array.copy() for name, array in terms}
             measured["velocity"][3:6] += self.random.normal(0.0, 1.0, 3) * self.gyro_noise
+            measured["velocity"][6:] += self.speed
             self.filter.set("terms", **measured)
             self.filter.set("joints", torque=torque + self.disturbance)
             self.filter.set("phase", phase=self.phase, stance=np.ones(POINTS, bool))
@@ -94,6 +95,20 @@ def test_friction_leaves_an_uncertainty_that_covers_its_effect():
         assert 0.01 < float(found.mass_std) / ROBOT.total_mass < 0.05
     assert np.abs(errors).max() < 3.0
     assert np.abs(errors).max() > 0.1, "friction does disturb"
+
+
+def test_friction_that_is_told_is_not_taken_for_a_torso_elsewhere():
+    further = {joint.name: 0.1 for joint in ROBOT.joints}
+
+    def offset(**said):
+        robot = Standing(**said)
+        robot.speed = 0.5  # faster than what is uncertain at rest
+        robot.disturbance[:] = ROBOT.motors.friction + 0.1 + 0.5 * (ROBOT.motors.damping + 0.1)
+        return float(np.linalg.norm(robot.stand(300).com_offset))
+
+    told, untold = offset(friction=further, damping=further), offset()
+    assert told < 1e-3
+    assert untold > 5 * told
 
 
 def test_a_push_is_left_out():

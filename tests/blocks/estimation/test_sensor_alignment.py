@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from aloft.blocks.estimation.sensor_alignment import SensorAlignment
 from aloft.robots.description import find_robot
+from aloft.robots.transmission import PLAY_TIME
 from aloft.runtime.testing.bench import BlockBench
 
 
@@ -106,3 +107,17 @@ def test_play_is_taken_off_by_the_sign_of_the_torque() -> None:
         expected = np.full(len(joints), 0.3)
         expected[knees] -= math.copysign(0.005, torque)
         np.testing.assert_allclose(bench.get("joints").position, expected, atol=1e-6)
+
+
+def test_play_is_taken_off_at_the_time_of_its_torque() -> None:
+    """Angles that are brought to an older time have the play of that time."""
+    bench: BlockBench[Any] = BlockBench(
+        SensorAlignment, {"play": {"*": 0.01}, "rate": 0.006}, robot="bruce", rate=500.0
+    )
+    play, share = 0.0, -math.expm1(-0.002 / PLAY_TIME)
+    for tick in range(200):
+        torque = 2.0 if tick % 40 < 20 else -2.0
+        play += share * (math.copysign(0.005, torque) - play)
+        bench.set("measured_joints", position=0.3 + play, torque=torque)
+        bench.step()
+        np.testing.assert_allclose(bench.get("joints").position, 0.3, atol=1e-6)

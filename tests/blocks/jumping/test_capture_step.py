@@ -261,3 +261,24 @@ def test_the_swinging_foot_rises_lands_flat_and_turns_to_its_heading():
     ahead = position[2, :2] - position[3, :2]
     assert position[2:, :2].mean(axis=0) == pytest.approx(goal[:2], abs=0.01)
     assert math.atan2(ahead[1], ahead[0]) == pytest.approx(heading, abs=0.02)
+
+
+def test_a_foot_that_has_not_touched_seeks_the_ground():
+    for speed in (0.0, 0.8):
+        bench = make(steps=0, seek_speed=speed, seek_damping=50.0)
+        bench.set("terms", contact_velocity=[[0, 0, 0], [0, 0, 0], [0.1, 0, -0.3], [0.1, 0, -1.0]])
+        bench.set("reference", time=2.0, lift_off_time=3.0)  # also where another jump follows
+        seen = run(bench, 0.01, stance=(True, False, False, False))
+        out = bench.get("phase")
+        assert np.all(seen == np.array([False, False, speed > 0.0, speed > 0.0]))
+        assert out.stance.tolist() == [True, False, False, False]
+        assert not out.step_acceleration[:2].any()
+        if speed > 0.0:
+            wanted = [[-5.0, 0.0, -25.0], [-5.0, 0.0, 10.0]]
+            assert out.step_acceleration[2:] == pytest.approx(np.array(wanted))
+
+
+def test_no_foot_seeks_the_ground_while_none_stands_nor_after_the_landing():
+    bench = make(steps=0, seek_speed=0.8)
+    assert not np.any(run(bench, 0.3, stance=(False,) * 4))
+    assert not np.any(run(bench, 0.6, stance=(True, True, False, False), landing_time=0.0))

@@ -366,21 +366,6 @@ def test_a_foot_still_in_the_air_goes_on_to_the_ground():
     assert bench.get("feet").position[1] == pytest.approx(wanted, abs=1e-12)
 
 
-def test_on_unknown_ground_a_foot_in_the_air_goes_on_down_from_where_it_is():
-    feet = {}
-    for speed in (0.0, 0.4):
-        bench = make(**GAINS, seek_speed=speed)
-        fly(bench, 0.3, 0.0)
-        down = np.array([[0.02, -0.08, 0.001], [0.02, 0.08, 0.012]])
-        bench.set("terms", foot_position=down, com=COM - [0.0, 0.0, 0.01])
-        bench.set("phase", phase=Phase.LANDING)
-        bench.step()
-        feet[speed] = bench.get("feet").position.copy(), bench.get("feet").velocity.copy()
-    below = feet[0.4][0][:, 2] - feet[0.0][0][:, 2]
-    assert below == pytest.approx([-0.02, 0.011 - 0.02], abs=1e-12)
-    assert (feet[0.4][1] - feet[0.0][1])[:, 2] == pytest.approx([-0.4, -0.4], abs=1e-12)
-
-
 def test_retraction_ends_at_zero_height_with_the_asked_speed():
     assert retraction(0.0, 0.4, 0.06) == (0.0, 0.4)
     assert retraction(0.06, 0.4, 0.06) == (0.0, 0.0)

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.blocks.jumping.stand_reference import NEVER, StandReference, plan_stand
+from aloft.blocks.jumping.stand_reference import (
+    NEVER,
+    StandReference,
+    TriggeredStandReference,
+    plan_stand,
+)
 from aloft.blocks.signals import Phase
 from aloft.robots.description import find_robot
 from aloft.runtime.language.context import Clock, Context
@@ -82,3 +87,22 @@ def test_too_few_joints_are_in_the_load_report():
             StandReference.Params(), Context("block", Clock(0.002), robot=robot)
         )
     )
+
+
+def test_after_the_trigger_it_is_the_motion_of_a_run_that_begins():
+    late, usual = (
+        BlockBench(kind, {"squat_depth": 0.04}, robot=quadruped(), rate=500.0)
+        for kind in (TriggeredStandReference, StandReference)
+    )
+    late.set("phase", phase=Phase.HANG)
+    for _ in range(100):
+        late.step()
+        assert float(late.get("reference").time) < 0.0
+    late.set("phase", phase=Phase.STAND)
+    for _ in range(600):
+        late.step()
+        usual.step()
+        mine, other = late.get("reference"), usual.get("reference")
+        assert float(mine.time) == pytest.approx(float(other.time), abs=1e-9)
+        assert mine.phase == other.phase
+        assert mine.com == pytest.approx(other.com, abs=1e-9)

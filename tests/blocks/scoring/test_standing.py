@@ -132,7 +132,7 @@ def stand(
 ) -> None:  # fmt: skip
     seen = truth(contact_position=np.add(POINTS, (*shift, 0.0)), contact_touched=touched)
     tick(record, time, seen)
-    record_feet(seen.contact_touched, record, given(**changes), constants(), stay)
+    record_feet(seen, record, given(**changes), constants(), stay)
 
 
 def test_feet_slide_from_where_they_are_when_they_should_stay() -> None:
@@ -143,6 +143,24 @@ def test_feet_slide_from_where_they_are_when_they_should_stay() -> None:
     assert record.foot_slip == pytest.approx(0.005)
     stand(record, 0.03, (0.2, 0.0))
     assert record.foot_slip == pytest.approx(0.005), "the farthest counts"
+
+
+@pytest.mark.parametrize(("clearance", "height", "lifted"), [
+    (-1.0, 0.0, 0.01), (0.01, 0.009, 0.0), (0.01, 0.011, 0.01),
+])  # fmt: skip
+def test_on_uneven_ground_a_foot_near_it_may_stand_between_its_points(
+    clearance: float, height: float, lifted: float
+) -> None:
+    record, known = begun(), constants()
+    known.clearance[()] = clearance
+    above = np.array([height, 0.05, 0.0, 0.0])
+    seen = truth(
+        contact_position=np.add(POINTS, np.outer(above, [0.0, 0.0, 1.0])),
+        contact_touched=[False, False, True, True],
+    )
+    tick(record, 0.01, seen)
+    record_feet(seen, record, given(), known, True)
+    assert record.lifted_time.tolist() == pytest.approx([lifted, 0.0])
 
 
 RIGHT_UP = np.array([False, False, True, True])

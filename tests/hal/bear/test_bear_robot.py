@@ -244,6 +244,20 @@ def test_an_instruction_is_told_from_an_answer() -> None:
     assert instruction[4] < 0x80 <= answer[4]
 
 
+def test_an_armed_robot_in_real_time_is_not_run_as_fast_as_it_goes(tmp_path: Path) -> None:
+    file = tmp_path / "bench.yaml"
+    file.write_text(Hardware.for_twin(ROBOT).at_ports("nowhere", "nowhere", virtual=False))
+    graphs = Path(aloft.__file__).parent / "graphs"
+    armed = {"robot.hardware": str(file), "robot.armed": True}
+    for clock, reason in (
+        ("free", "--set clock.kind=robot"),
+        ("robot", "nowhere cannot be opened"),
+    ):
+        graph = aloft.load(graphs / "jump_robot.yaml", {**armed, "clock.kind": clock})
+        result = graph.run(0.1)
+        assert not result.success and reason in result.reason
+
+
 def test_the_kernel_of_the_goals_is_compiled_with_the_graph() -> None:
     """The driver opens later; goals by plain Python would take longer than all else in a cycle."""
     graph = aloft.load(Path(aloft.__file__).parent / "graphs" / "jump_robot.yaml")

@@ -37,6 +37,7 @@ def test_every_fault_has_its_place(tmp_path: Path) -> None:
     data["motors"]["left_knee_motor"]["id"] = 4
     data["motors"]["left_ankle"] = data["motors"].pop("left_ankle_motor")
     data["board"]["switches"][1] = "right_hel"
+    data["board"]["normally_closed"] = ["left_toes"]
     data["drives"]["lowest_voltage"] = "18 V"
     data["motors"]["right_yaw_motor"] |= {"low": 1.0, "high": 0.5}
     file = tmp_path / "bench.yaml"
@@ -49,13 +50,14 @@ def test_every_fault_has_its_place(tmp_path: Path) -> None:
         "bruce has no motor 'left_ankle'; did you mean left_ankle_motor?",
         "motor left_ankle_motor is missing",
         "bruce has no contact point 'right_hel': right_toe, right_heel, left_toe, left_heel",
+        "'left_toes' is none of board.switches: right_toe, right_hel, left_toe, left_heel",
         "lowest_voltage is above highest_voltage",
         "right_yaw_motor: low 1 is not below high 0.5",
-        "bench.yaml: 6 problems",
+        "bench.yaml: 7 problems",
     ):
         assert part in text, text
     heads = [line for line in text.splitlines() if line and not line.startswith("    ")]
-    assert len(heads) == 7 and all(line.startswith(f"{file}:") for line in heads)
+    assert len(heads) == 8 and all(line.startswith(f"{file}:") for line in heads)
 
 
 def test_another_robots_file_is_refused() -> None:

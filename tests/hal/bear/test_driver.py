@@ -262,6 +262,9 @@ def test_drives_get_the_gains_and_limits_of_the_file() -> None:
     written: dict[int, dict[str, float]] = {}
     bus = SimpleNamespace(verify=lambda device, values: written.update({device: dict(values)}))
     settings, names = hardware(), ROBOT.transmission.motors
+    settings.motors[names[2]] = settings.motors[names[2]].model_copy(
+        update={"torque_constant": 0.5}
+    )
     stiffness = {name: 2.0 + k for k, name in enumerate(names)}
     damping = {name: 0.1 * (1 + k) for k, name in enumerate(names)}
     configure(bus, settings, stiffness, damping)  # type: ignore[arg-type]
@@ -269,9 +272,10 @@ def test_drives_get_the_gains_and_limits_of_the_file() -> None:
     for name in names:
         values = written[settings.motors[name].id]
         # what the drive computes in amperes gives the motor's torque
-        torque = drives.torque_constant * values["p_gain_direct_force"]
+        constant = 0.5 if name == names[2] else drives.torque_constant
+        torque = constant * values["p_gain_direct_force"]
         assert torque == pytest.approx(stiffness[name])
-        torque = drives.torque_constant * values["d_gain_direct_force"]
+        torque = constant * values["d_gain_direct_force"]
         assert torque == pytest.approx(damping[name])
         assert values["watchdog_timeout"] == pytest.approx(1e6 * drives.watchdog, abs=1.0)
         assert values["limit_i_max"] == drives.current_limit and values["mode"] == 3

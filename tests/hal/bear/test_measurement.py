@@ -8,7 +8,8 @@ from aloft.hal.bear.bulk import BulkExchange
 from aloft.hal.bear.bus import BearBus
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.measurement import READ, Measurement, Supervision
-from aloft.hal.twin.twin_robot import VirtualBusPort
+from aloft.hal.bear.sense_board import SenseBoard
+from aloft.hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
@@ -41,6 +42,45 @@ def test_torques_are_means_over_the_exchanges_of_a_tick(bulk: BulkExchange) -> N
         np.testing.assert_array_equal(measured.current, np.full(10, currents[-1]))
         measured.next_tick()
         np.testing.assert_allclose(measured.joint_torque, joints_of(mean), atol=1e-12)
+
+
+def with_settings(motors: dict[str, float] | None = None, **board: object) -> Hardware:
+    """The hardware with other torque constants and another sensor board."""
+    data = HARDWARE.model_dump()
+    data["board"] |= board
+    for name, constant in (motors or {}).items():
+        data["motors"][name]["torque_constant"] = constant
+    return Hardware.model_validate(data)
+
+
+def test_a_motor_may_have_a_torque_constant_of_its_own(bulk: BulkExchange) -> None:
+    hardware = with_settings({"left_yaw_motor": 0.5 * CONSTANT})
+    measured = Measurement(ROBOT, hardware)
+    bulk.values[:, 2] = 2.0
+    measured.take_drives(bulk)
+    motors = np.full(10, 2.0 * CONSTANT)
+    motors[ROBOT.transmission.motors.index("left_yaw_motor")] *= 0.5
+    np.testing.assert_allclose(measured.joint_torque, ROBOT.joint_to_motor.T @ motors, atol=1e-12)
+
+
+def test_readings_of_an_imu_that_is_turned_come_in_the_bases_axes() -> None:
+    """The board's x points to the robot's left: its rotation vector is 90 deg about z."""
+    measured = Measurement(ROBOT, with_settings(imu_rotation=(0.0, 0.0, np.pi / 2)))
+    board = SenseBoard(VirtualBoardPort(None))  # type: ignore[arg-type]
+    board.specific_force[:] = 1.0, 2.0, 9.0
+    board.angular_velocity[:] = 0.1, 0.2, 0.3
+    measured.take_board(board)
+    np.testing.assert_allclose(measured.specific_force, [-2.0, 1.0, 9.0], atol=1e-12)
+    np.testing.assert_allclose(measured.angular_velocity, [-0.2, 0.1, 0.3], atol=1e-12)
+
+
+def test_a_normally_closed_switch_is_closed_when_its_bit_is_not_set() -> None:
+    measured = Measurement(ROBOT, with_settings(normally_closed=["right_heel"]))
+    board = SenseBoard(VirtualBoardPort(None))  # type: ignore[arg-type]
+    for bits in ([False, True, False, False], [True, False, False, True]):
+        board.closed[:] = bits
+        measured.take_board(board)
+        assert measured.closed.tolist() == [bits[0], not bits[1], bits[2], bits[3]]
 
 
 def test_restored_measurements_are_not_counted_twice(bulk: BulkExchange) -> None:

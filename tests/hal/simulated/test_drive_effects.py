@@ -10,10 +10,16 @@ import numpy as np
 import pytest
 
 from aloft.hal.simulated.battery import Battery
-from aloft.hal.simulated.body_effects import BatteryParameters
-from aloft.hal.simulated.drive_effects import DriveEffects, EncoderEffects, MotorEffects
+from aloft.hal.simulated.drive_effects import DriveEffects
 from aloft.hal.simulated.drives import MotorLimits
-from aloft.hal.simulated.gears import GearParameters, YieldingGears, longest_step
+from aloft.hal.simulated.effects import (
+    BatteryParameters,
+    EncoderEffects,
+    GearParameters,
+    MotorEffects,
+    longest_gear_step,
+)
+from aloft.hal.simulated.gears import YieldingGears
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.robots.description import find_robot
 
@@ -135,6 +141,36 @@ def test_ripple_has_its_amplitude_and_no_mean() -> None:
     assert abs(given.mean()) < 1e-9 and abs(given).max() == pytest.approx(0.1, rel=0.02)
 
 
+def test_cogging_pulls_at_rest_and_without_current() -> None:
+    turn, peak = 2.0 * math.pi / 12, np.array(ROBOT.motors.peak_torque)
+    angles = np.linspace(0.0, turn, 32, endpoint=False)
+    given = np.array([giver(angle=float(a), cogging=0.02, cogging_periods=12)(0.0) for a in angles])
+    turned = np.array(ROBOT.joint_to_motor @ np.ones(N))
+    turns = abs(turned) > 0.5
+    amplitude = abs(given).max(axis=0)[turns]
+    np.testing.assert_allclose(amplitude, 0.02 * peak[turns], rtol=0.05)
+    assert abs(given.mean(axis=0)[turns]).max() < 1e-9
+    phases = given[:, turns].argmax(axis=0)
+    assert len(set(phases.tolist())) > 1, "each motor has a phase of its own"
+
+
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        ({"motors": {"cogging": 0.01, "cogging_periods": 500}}, "cogging of 500 periods a turn changes"),
+        ({"motors": {"ripple": 0.1, "ripple_periods": 500}}, "torque ripple of 500 periods a turn"),
+        (
+            {"joints": {"static_friction": 3.0, "stribeck_velocity": 0.01}},
+            "static friction of 3 times that in motion falls faster than physics steps of 0.0005 s",
+        ),
+    ],
+)  # fmt: skip
+def test_what_changes_within_a_step_is_refused(effects: Any, message: str) -> None:
+    with pytest.raises(Exception, match=message):
+        bench(**effects)
+    bench(**effects, timestep=1e-5)
+
+
 @pytest.mark.parametrize("velocity", [-5.0, 5.0])
 def test_load_friction_opposes_the_motion_and_takes_its_share(velocity: float) -> None:
     give = giver(velocity=velocity, load_friction=0.05)
@@ -204,7 +240,7 @@ def test_gears_that_are_too_stiff_for_the_steps_are_refused() -> None:
     with pytest.raises(Exception, match=r"move faster than physics steps of 0\.0005 s"):
         bench(gears={"stiffness": 20000.0})
     params = GearParameters.model_validate({"stiffness": 2000.0})
-    assert longest_step(params, np.full(3, 1e-3)) == pytest.approx(
+    assert longest_gear_step(params, np.full(3, 1e-3)) == pytest.approx(
         0.1 * 2 * math.pi * math.sqrt(1e-3 * 0.09 / 2000.0)
     )
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.hal.simulated.imu_effects import ImuEffects, ImuModel
+from aloft.hal.simulated.effects import ImuEffects
+from aloft.hal.simulated.imu_effects import ImuModel
 from aloft.hal.simulated.state import PhysicsState
 
 from .simulated_bruce import bench, hold, lift

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.hal.simulated.effects import SwitchEffects
 from aloft.hal.simulated.mujoco_model import build_world
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.state import PhysicsState
-from aloft.hal.simulated.switch_effects import SwitchDelays, SwitchEffects
+from aloft.hal.simulated.switch_effects import SwitchDelays
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.description import find_robot
 
@@ -37,6 +38,48 @@ def test_links_differ_each_by_itself() -> None:
     inertia = other.body_inertia[1:] / nominal.body_inertia[1:] / mass[:, None]
     assert (abs(inertia - 1.0) <= 0.2 + 1e-9).all()
     np.testing.assert_allclose(inertia, inertia[:, :1].repeat(3, axis=1), rtol=1e-6)
+
+
+def test_links_are_longer_in_all_directions() -> None:
+    nominal, other = world(), world(seed=2, links={"length_spread": 0.02})
+    variation = draw_variation(
+        SimulatorParameters.model_validate({"seed": 2, "links": {"length_spread": 0.02}}), ROBOT
+    )
+    factor = np.array([1.0, *variation.link_length])  # of the world and of the links
+    assert len(set(variation.link_length)) == len(ROBOT.links)
+    assert (abs(factor - 1.0) <= 0.02).all()
+    bodies = [nominal.body("base").id if name == "base" else nominal.body(name).id for name in (
+        link.name for link in ROBOT.links)]  # fmt: skip
+    of_body = dict(zip(bodies, factor[1:], strict=True))
+    for body in bodies:
+        np.testing.assert_allclose(
+            other.body_ipos[body], of_body[body] * nominal.body_ipos[body], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            other.body_inertia[body], of_body[body] ** 2 * nominal.body_inertia[body], rtol=1e-6
+        )
+        parent = nominal.body_parentid[body]
+        if parent:
+            longer = of_body[int(parent)] * nominal.body_pos[body]
+            np.testing.assert_allclose(other.body_pos[body], longer, atol=1e-12)
+    for contact in ROBOT.contacts:
+        body = int(nominal.site(contact.name).bodyid[0])
+        place = of_body[body] * np.array(contact.position)
+        np.testing.assert_allclose(other.site(contact.name).pos, place, atol=1e-12)
+        centre = other.geom(contact.name).pos - other.site(contact.name).pos
+        np.testing.assert_allclose(centre, [0.0, 0.0, contact.radius], atol=1e-12)
+    np.testing.assert_allclose(other.body_mass, nominal.body_mass)
+
+
+def test_on_legs_of_different_length_a_robot_stands_on_all_points() -> None:
+    for seed in range(4):
+        robot = bench(seed=seed, links={"length_spread": 0.01})
+        hold(robot)
+        robot.step(100)
+        robot.block.emit()
+        assert (robot.get("truth").contact_force[:, 2] > 2.0).all()
+    metrics = robot.block.metrics()
+    assert 0.99 <= metrics["robot_least_link_length"] < metrics["robot_largest_link_length"] <= 1.01
 
 
 def test_joints_and_rotors_differ() -> None:

@@ -108,10 +108,10 @@ def test_a_command_to_damp_damps() -> None:
     assert "success" not in robot.block.metrics()
 
 
-def write_hardware(folder: Path, **motor: Any) -> str:
+def write_hardware(folder: Path, board: dict[str, Any] | None = None, **motor: Any) -> str:
     names, whole = ROBOT.transmission.motors, {"offset": 0.0, "low": -25.0, "high": 25.0}
     settings = {
-        "robot": "bruce", "bus": {"port": "twin"}, "board": {"port": "twin"},
+        "robot": "bruce", "bus": {"port": "twin"}, "board": {"port": "twin", **(board or {})},
         "motors": {name: {"id": 30 + k, **whole, **motor} for k, name in enumerate(names)},
         "soft_start": {"duration": 0.3},
     }  # fmt: skip
@@ -130,6 +130,21 @@ def test_addresses_directions_and_offsets_do_not_show(tmp_path: Path) -> None:
     for name in ("position", "velocity", "torque"):
         first, second = (getattr(robot.get("joints"), name) for robot in (plain, turned))
         np.testing.assert_allclose(first, second, atol=2e-2)
+
+
+def test_a_turned_imu_inverted_switches_and_other_motors_do_not_show(tmp_path: Path) -> None:
+    board = {"imu_rotation": [0.3, -1.2, 0.7], "normally_closed": ["left_toe"]}
+    file = write_hardware(tmp_path, board, torque_constant=0.5)
+    plain, other = bench(), bench(tmp_path, hardware=file)
+    for robot in (plain, other):
+        hold(robot)
+        robot.step(30)
+    assert other.block.driver.board.specific_force[2] < 8.0, "the board itself is turned"
+    for port, name in (
+        ("imu", "specific_force"), ("imu", "angular_velocity"), ("contacts", "closed"), ("joints", "torque")
+    ):  # fmt: skip
+        first, second = (getattr(robot.get(port), name) for robot in (plain, other))
+        np.testing.assert_allclose(np.asarray(first, float), np.asarray(second, float), atol=2e-2)
 
 
 def test_gains_that_no_drives_can_give_are_refused() -> None:

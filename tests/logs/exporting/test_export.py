@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from aloft import load
 from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_off_tick
-from aloft.logs.exporting.export import EXPORTS, export_mcap, export_parquet
+from aloft.logs.exporting.export import EXPORTS, ExportError, export, export_mcap, export_parquet
 from aloft.logs.file.reader import READ_ALONE, PackedRows, RecordedRun, read
 from aloft.logs.recording.recorder import Recorder
 from aloft.mathematics.rotations import matrices_of_quaternions, quaternions_of_matrices
@@ -195,6 +195,29 @@ def test_what_cannot_be_compared_is_said(runs: list[RecordedRun]) -> None:
     slow = replace(runs[1], header=replace(runs[1].header, base_rate=250.0))
     with pytest.raises(ComparisonError, match=r"a\.rrd has 500 ticks a second and .*b\.rrd 250"):
         compare_runs(runs[0], slow)
+
+
+def test_a_bag_is_one_that_ros2s_readers_take(
+    runs: list[RecordedRun], messages: dict[str, list[tuple[Any, Any, Any]]], tmp_path: Path
+) -> None:
+    from rosbags.highlevel import AnyReader
+
+    path = tmp_path / "a_bag"
+    export("bag", runs[0], path)
+    with AnyReader([path]) as bag:
+        heard = defaultdict(list)
+        for topic, instant, data in bag.messages():
+            heard[topic.topic].append((instant, bytes(data)))
+            bag.deserialize(data, topic.msgtype)
+    cdr = {t: all_ for t, all_ in messages.items() if all_[0][1].message_encoding == "cdr"}
+    assert set(heard) == set(cdr) and "/joint_states" in heard and "/log" not in heard
+    for topic, known in cdr.items():
+        assert heard[topic] == [(m.log_time, m.data) for _, _, m in known]
+    with pytest.raises(FileExistsError, match="the folder is there already"):
+        export("bag", runs[0], path)
+    with pytest.raises(ExportError, match="only what has a type of ROS 2; --mcap writes any"):
+        export("bag", runs[0], tmp_path / "b_bag", ["robot.truth"])
+    assert [each.name for each in tmp_path.iterdir()] == ["a_bag"]
 
 
 @pytest.mark.long

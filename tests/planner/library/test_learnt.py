@@ -42,9 +42,11 @@ def test_launches_are_those_of_a_throw() -> None:
     assert down[3] == pytest.approx(0.1 * 0.5 / flight)
 
 
-def test_rows_of_jumps_and_somersaults_have_no_launch() -> None:
+def test_a_row_has_the_launch_of_its_jumps_and_somersaults_have_none() -> None:
     tasks = SHIPPED.parent / "tasks"
-    assert launch_of(read_task(tasks / "hops_10.yaml")) is None
+    single = launch_of(make_task({"name": "", "rise": 0.06}))
+    assert launch_of(read_task(tasks / "hops_10.yaml")) == single
+    assert launch_of(read_task(tasks / "hops_rough_10.yaml")) is None
     assert launch_of(read_task(tasks / "somersault.yaml")) is None
     assert LearntJumps("bruce", (LESSON,)).correction(None) == (ZERO, ZERO)
 

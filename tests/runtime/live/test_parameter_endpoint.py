@@ -4,16 +4,21 @@ import json
 import socket
 import stat
 import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
 
 from aloft.blocks.general.arithmetic import Gain
 from aloft.blocks.general.sources import SineWave
+from aloft.runtime.live import parameter_endpoint
 from aloft.runtime.live.parameter_endpoint import (
     EndpointError,
     ParameterEndpoint,
+    answers,
     ask,
     set_parameters,
 )
@@ -86,3 +91,33 @@ def test_nobody_answers(path: Path) -> None:
         ask(path, {"verb": "list"})
     with pytest.raises(EndpointError, match="no socket at"):
         ParameterEndpoint(path.parent / "missing" / "run.sock")
+
+
+def test_a_client_waits_behind_others(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linux refuses it at once, with "Resource temporarily unavailable"."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as server, ExitStack() as waiting:
+        server.bind(str(path))
+        server.listen(0)
+        for _ in range(2):
+            other = waiting.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM))
+            other.setblocking(False)
+            with suppress(BlockingIOError):
+                other.connect(str(path))
+        with ThreadPoolExecutor(1) as pool:
+            monkeypatch.setattr(parameter_endpoint, "REQUEST_TIMEOUT", 0.1)
+            assert answers(path), "a graph that is busy is there"
+            with pytest.raises(EndpointError, match="too many wait for it"):
+                ask(path, {"verb": "list"})
+            monkeypatch.setattr(parameter_endpoint, "REQUEST_TIMEOUT", 30.0)
+            answer = pool.submit(ask, path, {"verb": "list"})
+            time.sleep(0.1)
+            assert not answer.done()
+            waiting.close()
+            asked = b""
+            while not asked:  # those that went away ask nothing
+                connection, _ = server.accept()
+                with connection:
+                    asked = connection.recv(100)
+                    if asked:
+                        connection.sendall(b'{"parameters": []}\n')
+            assert answer.result(30.0) == {"parameters": []}

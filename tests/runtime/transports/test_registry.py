@@ -1,6 +1,7 @@
 """Endpoints are checked by the registry of transports, which also finds the class for a graph."""
 
 import re
+import socket
 from ipaddress import IPv4Address
 from pathlib import Path
 
@@ -14,9 +15,13 @@ from aloft.runtime.transports.registry import (
     TRANSPORTS,
     endpoint_fault,
     endpoint_pattern,
+    open_endpoints,
+    silent_endpoint,
     transport_type,
 )
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
+
+from ...waiting import free_port
 
 ENDPOINTS = {scheme: f"{scheme}/127.0.0.1:7450" for scheme in TRANSPORTS}
 
@@ -42,6 +47,36 @@ def test_every_scheme_is_taken_and_has_its_class() -> None:
 def test_a_wrong_endpoint_is_explained(endpoint: str, fault: str) -> None:
     assert endpoint_fault(endpoint).startswith(fault)
     assert endpoint_fault("tcp/[::1]:7450") == "" and endpoint_fault("tls/robot.local:7450") == ""
+
+
+def test_endpoints_that_anybody_reaches_are_named() -> None:
+    reached = ("tcp/10.0.0.7:1", "tcp/robot.local:1", "tcp/[fe80::1]:1")
+    safe = (
+        "tcp/127.0.0.1:1",
+        "tcp/127.9.9.9:1",
+        "tcp/[::1]:1",
+        "tcp/localhost:1",
+        "tls/10.0.0.7:1",
+    )
+    for endpoint in reached:
+        (text,) = open_endpoints([MachineSpec("arm", endpoint)])
+        assert f"machine 'arm' listens at {endpoint}: whoever reaches it" in text
+        assert "`aloft keys`" in text
+    assert open_endpoints([MachineSpec("arm", endpoint) for endpoint in safe]) == []
+
+
+def test_why_a_machine_is_silent() -> None:
+    port = free_port()
+    assert silent_endpoint(f"tcp/127.0.0.1:{port}").startswith(
+        f"no connection to tcp/127.0.0.1:{port}: "
+    )
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        at = f"127.0.0.1:{server.getsockname()[1]}"
+        assert silent_endpoint(f"tcp/{at}").endswith(
+            "nothing of this graph: does it run another graph?"
+        )
+        assert "are the keys of this graph's authority?" in silent_endpoint(f"tls/{at}")
+    assert silent_endpoint("udp/127.0.0.1:7450") == "nothing was heard"
 
 
 def test_the_schemes_are_listed() -> None:

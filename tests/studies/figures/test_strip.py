@@ -5,16 +5,9 @@ import pytest
 
 from aloft.hal.simulated.scenes import step
 from aloft.robots.description import find_robot
-from aloft.studies.figures import strip
-from aloft.studies.figures.strip import (
-    Moment,
-    Motion,
-    NoRendererError,
-    Offscreen,
-    View,
-    draw_strip,
-    moments_of,
-)
+from aloft.studies.figures import offscreen
+from aloft.studies.figures.offscreen import NoRendererError, Offscreen, View
+from aloft.studies.figures.strip import Moment, Motion, draw_strip, moments_of
 
 ROBOT = find_robot("bruce")
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
@@ -72,7 +65,7 @@ def test_moments_follow_the_jump() -> None:
 def test_where_nothing_draws_the_error_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(strip.sys, "platform", "linux")
+    monkeypatch.setattr(offscreen.sys, "platform", "linux")
     monkeypatch.setitem(__import__("sys").modules, "mujoco.egl", None)
     with pytest.raises(NoRendererError, match=r"no OpenGL .* apt-get install libegl1 libgl1-mesa"):
         Offscreen(ROBOT, step(0.05, 0.1), 16, 16)

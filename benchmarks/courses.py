@@ -1,0 +1,93 @@
+"""Random courses of jumps: each command becomes known when the jump before has landed.
+
+A course has ten jumps of 5 to 30 cm, ahead, back or aside, with turns of up to 45 degrees. They are planned in the
+background by ``graphs/steer.yaml`` in the robust trial. Virtual time waits for the planner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..planner.library.library import shipped_folder
+from ..studies.expansion import load_cell
+from ..studies.summary import wilson_interval
+from .rows import Row
+
+SEEDS = range(31500, 31520)
+"""Of courses and robots; nothing is tuned on them."""
+JUMPS = 10
+DIRECTIONS = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)
+"""Ahead, back, to the left and to the right."""
+MISSED_GOAL = 0.05
+"""The largest good share of courses with a fall."""
+PLACE_GOAL = 0.03
+"""m"""
+LONGEST = 40.0
+"""s of the graph's time"""
+
+
+def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:
+    """The commands of a seed; the same on every machine."""
+    rng = np.random.default_rng(seed)
+    commands = []
+    for _ in range(jumps):
+        direction = DIRECTIONS[int(rng.integers(len(DIRECTIONS)))]
+        distance, turn = rng.uniform(0.05, 0.30), rng.uniform(-0.25 * math.pi, 0.25 * math.pi)
+        commands.append(
+            {
+                "ahead": round(distance * math.cos(direction), 4),
+                "aside": round(distance * math.sin(direction), 4),
+                "turn": round(turn, 4),
+            }
+        )
+    return commands
+
+
+def courses(seeds: Sequence[int] = SEEDS) -> list[Row]:
+    """Rows: the shares of courses with a fall and off their places, errors of place, times of planning."""
+    found = [run_course(seed) for seed in seeds]
+    n, fallen = len(found), [one for one in found if fell(one)]
+    whole = [one for one in found if one.get("jumps") == JUMPS]
+    low, high = wilson_interval(len(fallen), n)
+    worst = [float(one["worst_place_error_m"]) for one in found if one.get("jumps")]
+    off = sum(not one["success"] for one in found)
+    longest = [float(one["planning_longest_s"]) for one in found]
+    median = [float(one["planning_median_s"]) for one in found]
+    plans = {
+        name: sum(int(one[f"plans_{name}"]) for one in found)
+        for name in ("planned", "nearest", "unsolved", "invalid")
+    }
+    note = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    return [
+        Row("courses with a fall", len(fallen) / n, "", goal=MISSED_GOAL,
+            note=f"{n} courses of {JUMPS} jumps, 95 % interval {low:.2f} to {high:.2f}"),
+        Row("courses that are no success", off / n, "", note=note),
+        Row("courses that came to their end", len(whole), ""),
+        Row("largest error of place in a course, median", float(np.median(worst)), "m", goal=PLACE_GOAL),
+        Row("largest error of place", max(worst), "m"),
+        Row("planning, solver and check, median", float(np.median(median)), "s", goal=0.06,
+            note=", ".join(f"{count} {name}" for name, count in plans.items())),
+        Row("planning, solver and check, longest", max(longest), "s", goal=0.12),
+    ]  # fmt: skip
+
+
+def fell(metrics: Mapping[str, Any]) -> bool:
+    """Whether a course ended with a fall."""
+    return str(metrics["reason"]).startswith("fell")
+
+
+def run_course(seed: int) -> dict[str, Any]:
+    """The metrics of a course, with its ``seed``."""
+    graphs = shipped_folder()
+    sets: dict[str, Any] = {
+        "commands.commands": course(seed), "robot.seed": seed, "duration": LONGEST,
+    }  # fmt: skip
+    graph = load_cell(
+        graphs / "steer.yaml", [graphs / "trials/robust.yaml"], sets, graphs / "bench.yaml"
+    )
+    result = graph.run()
+    return {"seed": seed, "success": result.success, "reason": result.reason, **result.metrics}

@@ -1,0 +1,159 @@
+"""Plans the next jump while the robot moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...planner.online.hop_request import HopRequest
+from ...robots.description import RobotDescription
+from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
+from ...runtime.language.errors import BlockError
+from ...runtime.language.parameters import Parameters
+from ...runtime.language.signals import Field, Signal
+from ..signals import PlanOutcome, PlanPart, PlanRequest
+from ..signals.steering import PART_ROWS, PLAN_ROWS, plan_width
+
+if TYPE_CHECKING:
+    from ...planner.online.next_hop import HopPlan
+
+
+class PlanAnswer(Signal):
+    """The state of ``OnlinePlanner``: the last plan, and how much of it has been handed over."""
+
+    number = Field(dtype="int64", text="of the request that was planned last")
+    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference, side by side")
+    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jump = Field(3, unit="s", text="when thrust, flight and landing begin")
+    toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
+    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
+    parts = Field(dtype="int64", text="how many parts it has")
+    given = Field(dtype="int64", text="how many of them have been given")
+    outcomes = Field(
+        len(PlanOutcome), dtype="int64", text="how many plans were of each PlanOutcome"
+    )
+
+
+class OnlinePlanner(Block):
+    """Plans the jump that was asked for, and hands the plan over, a part in every run.
+
+    It belongs in the background (``background: {latency: 500 ms}``): a plan takes 0.2 to 0.5 s of processor time.
+    The motion to begin with is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``).
+    From it the solver takes a fixed number of iterations on the whole-body problem of ``aloft plan``, on 44 knots with
+    all coordinates. The plan must pass the check with exact dynamics that every plan passes. A jump out of
+    reach is replaced by the nearest within it; where no motion is found, or it fails the check, the
+    nearest stored plan is the answer. ``part.outcome`` says so, and the metrics count it.
+
+    A plan follows from its request alone: the same requests give the same bytes on the same machine.
+    The metrics have the times of planning.
+    """
+
+    needs = ("floating base", "feet")
+    array_allocations = 10**9
+    allocation_reason = (
+        "a plan is made by the planner and its solver; run this block in the background"
+    )
+    request = Input(PlanRequest, text="the jump that should be planned")
+    part = Output(PlanPart, text="the next rows of its plan")
+    answer = State(PlanAnswer, text="the plan that is handed over")
+
+    @classmethod
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
+        """The width of a plan's rows."""
+        return (
+            {} if robot is None else {"plan_width": plan_width(len(robot.feet), len(robot.joints))}
+        )
+
+    @classmethod
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a robot without stored plans."""
+        from ...planner.online.hop_plans import missing_plans
+
+        assert context.robot is not None
+        return missing_plans(context.robot)
+
+    @classmethod
+    def example_inputs(
+        cls, rng: np.random.Generator, dimensions: Mapping[str, int]
+    ) -> Mapping[str, Mapping[str, object]]:
+        """No request: a plan takes long."""
+        return {"request": {"number": 0}}
+
+    def setup(self) -> None:
+        from ...planner.online.hop_plans import hop_table, shipped_samples, side_by_side
+        from ...planner.online.next_hop import HopPlanner
+        from ...planner.task.plan import PlanFileError
+
+        try:
+            samples = shipped_samples(self.robot.name)
+        except PlanFileError as error:
+            raise BlockError(str(error)) from error
+        self._planner = HopPlanner(self.robot, samples)
+        self._planner.plan(
+            HopRequest(0.0, 0.0, 0.0)
+        )  # loads compiled functions and makes the solver
+        self._table, self._columns = hop_table, side_by_side
+        self._times: list[float] = []
+
+    def step(self) -> None:
+        request, answer, part = self.request, self.answer, self.part
+        number = int(request.number)
+        if number != int(answer.number):
+            found = self._planner.plan(
+                HopRequest(float(request.ahead), float(request.aside), float(request.turn))
+            )
+            self._keep(found, number)
+        answer.given[()] = min(int(answer.given) + 1, int(answer.parts))
+        number = max(int(answer.given) - 1, 0)
+        rows = slice(number * PART_ROWS, (number + 1) * PART_ROWS)
+        part.number[()], part.part[()], part.parts[()] = answer.number, number, answer.parts
+        part.time[:] = answer.time[rows]
+        part.rows[:] = answer.rows[rows]
+        part.contact[:] = answer.contact[rows]
+        part.marks[:], part.jump[:] = answer.marks, answer.jump
+        part.toes_first[()], part.outcome[()] = answer.toes_first, answer.outcome
+        part.ahead[()], part.aside[()], part.turn[()] = answer.done
+
+    def _keep(self, found: HopPlan, number: int) -> None:
+        """Write a plan's table into the state."""
+        answer = self.answer
+        table = self._table(found.plan, self.robot)
+        n = len(table.time)
+        if n > PLAN_ROWS:
+            raise BlockError(f"the plan has {n} rows, which is more than {PLAN_ROWS}")
+        answer.time[:n], answer.rows[:n] = table.time, self._columns(table)
+        contact = np.ones((n, 1), np.bool_) if table.contact is None else table.contact
+        answer.contact[:n] = contact
+        for array in (answer.time, answer.rows, answer.contact):
+            array[n:] = array[n - 1]
+        answer.number[()], answer.given[()] = number, 0
+        answer.parts[()] = -(-n // PART_ROWS)
+        answer.outcomes[found.outcome] += 1
+        answer.marks[:] = table.squat_time, table.recover_time
+        answer.jump[:] = table.thrust_time, table.lift_off_time, table.touchdown_time
+        after = min(int(np.searchsorted(table.time, table.touchdown_time, side="right")), n - 1)
+        loaded = answer.contact[after]
+        answer.toes_first[()] = bool(loaded.any() and not loaded.all())
+        answer.outcome[()] = int(found.outcome)
+        answer.done[:] = found.done
+        self._times.append(found.solve_s + found.check_s)
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """How many plans there were of each kind, and the processor time of solver and check."""
+        counts = {
+            f"plans_{outcome.name.lower()}": int(self.answer.outcomes[outcome])
+            for outcome in PlanOutcome
+            if outcome != PlanOutcome.NONE
+        }
+        if not self._times:
+            return counts
+        return {
+            **counts,
+            "planning_median_s": float(np.median(self._times)),
+            "planning_longest_s": float(max(self._times)),
+        }

@@ -1,0 +1,370 @@
+"""Plays jumps one after the other, each of which is asked for when the one before has landed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ...mathematics.arrays import Array1D, Array2D, Flags1D
+from ...mathematics.kernel import kernel
+from ...mathematics.rotations import mean_heading, turn_about_vertical
+from ...planner.library.jump_table import (
+    FlightRotation,
+    TableRows,
+    fed_forward,
+    integrate_rows,
+)
+from ...planner.online.hop_plans import missing_plans, standing_row
+from ...robots.description import RobotDescription
+from ...robots.limb import FootKind, foot_shape
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
+from ...runtime.language.context import Clock
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import (
+    CourseGoal,
+    DelayEstimate,
+    DynamicsTerms,
+    JumpCommand,
+    JumpFrame,
+    JumpReference,
+    Phase,
+    PhaseState,
+    PlanOutcome,
+    PlanPart,
+    PlanRequest,
+)
+from ..signals.steering import PART_ROWS, PLAN_ROWS, plan_width
+from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, follow_plan
+
+NEVER = 1e6
+"""The time [s] of a lift-off that is not planned."""
+BEHIND = 10.0
+"""Rows behind the last one of a plan repeat it, so far apart [s]."""
+
+
+class ReceivedPlan(Signal):
+    """The plan that is handed over, row by row."""
+
+    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference")
+    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
+    toes_first = Field(1, dtype="bool", text="whether it lands on some of the points")
+    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
+    parts = Field(dtype="int64", text="parts that have come")
+    whole = Field(dtype="bool", text="whether all have come")
+
+
+class FollowedPlan(Signal):
+    """The plan that is followed."""
+
+    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan began")
+    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference")
+    sums = Field((PLAN_ROWS, "plan_width"), text="their integrals")
+    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
+    touchdowns = Field(1, unit="s", text="when landing begins")
+    toes_first = Field(1, dtype="bool", text="whether it lands on some of the points")
+    began = Field(unit="s", text="time of the run at which it began")
+
+
+class SteeringState(Signal):
+    """What ``SteeredPlan`` remembers besides its plans."""
+
+    started = Field(dtype="bool", text="whether the first tick is over")
+    start = Field(2, unit="m", frame="world", text="middle of the feet when it first stood")
+    start_heading = Field(unit="rad", frame="world", text="their heading then")
+    origin = Field(3, unit="m", frame="world", text="origin of the jump's frame")
+    heading = Field(unit="rad", frame="world", text="heading of that frame")
+    goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
+    goal_heading = Field(unit="rad", frame="world", text="their heading there")
+    taken = Field(dtype="int64", text="number of the last command that was taken")
+    requests = Field(dtype="int64", text="requests so far")
+    asked = Field(3, text="the last request: ahead, aside [m] and turn [rad]")
+    jumps = Field(dtype="int64", text="plans begun so far")
+    waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan is followed")
+
+
+class SteeredPlan(Block):
+    """Asks for the next jump where a command has come, and follows its plan.
+
+    The robot stands, jumps, lands and stands. While it stands, and from ``ask_time`` after a touchdown, a
+    command with a greater number than the last one is taken: the place and heading where the feet should
+    be move on by it. The ``request`` is the way from where the feet *are* to that goal, so a
+    landing that missed its place is corrected by the next jump. ``OnlinePlanner``, which works in the
+    background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
+    ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
+    that cannot be done goes to the nearest place that can; from then on the goal is there.
+
+    Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
+    feet before the jump, with x ahead. It moves when a plan begins. The reference's time is that of the run. Until the first plan begins the robot
+    stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
+    told at ``JumpPlan``: by the speed and height that the thrust has reached.
+
+    The places are those of the estimator, which drifts by a few millimetres a jump; ``goal`` tells where the feet should
+    be by all commands, relative to where they stood when the run began.
+    """
+
+    class Params(ProgressParameters):
+        lead: float | None = parameter(
+            None, unit="s", ge=0.0, le=0.02,
+            text="delay from sensing to torque that is compensated; none: the one at `delay`",
+        )  # fmt: skip
+        settle_time: float = parameter(
+            0.4, unit="s", gt=0.0, text="standing at the start, before a command is taken"
+        )
+        ask_time: float = parameter(
+            0.15, unit="s", ge=0.0, text="how long after touchdown a command is taken"
+        )
+        rest_time: float = parameter(
+            0.65, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
+        )
+
+    class Scratch(Signal):
+        """Room for a step."""
+
+        values = Field("plan_width", text="columns of an instant")
+        middle = Field(3, unit="m", frame="world", text="of the feet, in the estimator's world")
+        vector = Field(3, unit="m", text="the same in the jump's frame")
+
+    Constants = ProgressConstants
+    needs = ("floating base", "feet")
+    params: Params
+    constants: ProgressConstants
+    command = Input(JumpCommand, text="the next jump")
+    part = Input(PlanPart, text="the planner's answer")
+    phase = Input(PhaseState, text="the phase; wire it with a delay of 1")
+    terms = Input(DynamicsTerms, text="the measured motion")
+    delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
+    reference = Output(JumpReference, text="the plan at the present instant")
+    request = Output(PlanRequest, text="the jump that should be planned")
+    frame = Output(JumpFrame, text="where the jump begins in the estimator's world")
+    goal = Output(CourseGoal, text="where the feet should be by all commands so far")
+    received = State(ReceivedPlan, text="the next plan")
+    followed = State(FollowedPlan, text="the plan that is followed")
+    memory = State(SteeringState, text="the goal, and what was asked for")
+    progress = State(PlanProgress, text="how late the plan is")
+
+    @classmethod
+    def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
+        """The width of a plan's rows."""
+        return (
+            {} if robot is None else {"plan_width": plan_width(len(robot.feet), len(robot.joints))}
+        )
+
+    @classmethod
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a robot whose feet have no direction, or that has no stored plans."""
+        robot = context.robot
+        assert robot is not None
+        kinds = [foot_shape(robot, foot)[0] for foot in range(len(robot.feet))]
+        if FootKind.POINT in kinds:
+            yield UnmetRequirement(
+                f"{robot.feet[kinds.index(FootKind.POINT)].name} of {robot.name} is a point, which has no "
+                "direction; commands are relative to the direction of the feet",
+                expected="a robot whose feet have two contact points or more each",
+                found=f"{robot.name} with point feet",
+                fix="robot: bruce, as a key of the graph",
+            )
+            return
+        yield from missing_plans(robot)
+
+    def setup(self) -> None:
+        followed, feet = self.followed, len(self.robot.feet)
+        self.table = TableRows(
+            followed.time, followed.rows, followed.sums, fed_forward(feet, len(self.robot.joints)),
+            followed.marks, followed.jumps, followed.touchdowns, followed.toes_first,
+            followed.contact, self.scratch.values,
+        )  # fmt: skip
+        self.rotation = FlightRotation(*(np.zeros(size) for size in (1, 1, 1, 4)))
+        self.counted = np.ones(feet, dtype=np.bool_)
+        self.constants.lead = -1.0 if self.params.lead is None else self.params.lead
+        self.constants.follows_motion = self.params.by == "progress"
+        self.constants.period = self.period
+
+    def start(self) -> None:
+        """The robot stands until the first plan begins."""
+        followed = self.followed
+        followed.rows[:] = standing_row(self.robot)
+        followed.time[:] = BEHIND * np.arange(PLAN_ROWS)
+        followed.contact[:] = True
+        followed.marks[:] = followed.jumps[:] = followed.touchdowns[:] = NEVER
+
+    @kernel
+    @staticmethod
+    def step(
+        command: JumpCommand,
+        part: PlanPart,
+        phase: PhaseState,
+        terms: DynamicsTerms,
+        delay: DelayEstimate,
+        reference: JumpReference,
+        request: PlanRequest,
+        frame: JumpFrame,
+        goal: CourseGoal,
+        received: ReceivedPlan,
+        followed: FollowedPlan,
+        memory: SteeringState,
+        progress: PlanProgress,
+        table: TableRows,
+        rotation: FlightRotation,
+        counted: Flags1D,
+        params: Params,
+        constants: ProgressConstants,
+        scratch: Scratch,
+        clock: Clock,
+    ) -> None:
+        now = clock.base_period * clock.tick
+        middle_of(terms.foot_position, scratch.vector)
+        turn_about_vertical(scratch.vector, memory.heading, scratch.middle)
+        scratch.middle[:] = scratch.middle + memory.origin
+        heading = memory.heading + mean_heading(terms.foot_rotation, counted)
+        stands = phase.phase == Phase.STAND and now >= params.settle_time
+        if stands and not memory.started:
+            begin(scratch.middle, heading, memory)
+        if memory.waits:
+            receive(part, memory.requests, received)
+        landed = phase.phase == Phase.LANDING and phase.time_since_touchdown >= params.ask_time
+        rests = phase.phase == Phase.RECOVER
+        if (stands or landed or rests) and not memory.waits and command.number > memory.taken:
+            ask(command, scratch.middle, heading, memory)
+            received.parts = 0
+            received.whole = False
+        rested = stands or (rests and phase.time_in_phase >= params.rest_time)
+        if memory.waits and received.whole and rested:
+            follow(received, followed, memory)
+            followed.began = now
+            memory.origin[:] = scratch.middle
+            memory.heading = heading
+            integrate_rows(table)
+            if memory.outcome != PlanOutcome.PLANNED:
+                memory.goal[:] = scratch.middle[:2]
+                memory.goal_heading = heading
+                move(memory, received.done[0], received.done[1], received.done[2])
+            progress.late = 0.0
+        follow_plan(
+            now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
+        )  # fmt: skip
+        if memory.jumps > 0:
+            reference.time += followed.began
+            reference.lift_off_time += followed.began
+            reference.touchdown_time += followed.began
+        frame.origin[:] = memory.origin
+        frame.heading = memory.heading
+        tell_request(memory, request)
+        tell_goal(memory, goal)
+
+
+@kernel
+def middle_of(points: Array2D, out: Array1D) -> None:
+    """The mean of points (n, 3)."""
+    out[:] = 0.0
+    for i in range(points.shape[0]):
+        out[:] += points[i] / points.shape[0]
+
+
+@kernel
+def begin(middle: Array1D, heading: float, memory: SteeringState) -> None:
+    """Note where the robot stands: there is the first goal."""
+    memory.start[:] = middle[:2]
+    memory.goal[:] = middle[:2]
+    memory.start_heading = heading
+    memory.goal_heading = heading
+    memory.started = True
+
+
+@kernel
+def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringState) -> None:
+    """Move the goal on by a command, and ask for the jump from the feet's place to it."""
+    move(memory, command.ahead, command.aside, command.turn)
+    memory.taken = command.number
+    memory.requests += 1
+    memory.waits = True
+    x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
+    cosine, sine = math.cos(heading), math.sin(heading)
+    turn = memory.goal_heading - heading
+    memory.asked[0] = cosine * x + sine * y
+    memory.asked[1] = cosine * y - sine * x
+    memory.asked[2] = math.atan2(math.sin(turn), math.cos(turn))
+
+
+@kernel
+def tell_request(memory: SteeringState, request: PlanRequest) -> None:
+    """Write the last request."""
+    request.ahead, request.aside = memory.asked[0], memory.asked[1]
+    request.turn = memory.asked[2]
+    request.command = memory.taken
+    request.number = memory.requests
+
+
+@kernel
+def move(memory: SteeringState, ahead: float, aside: float, turn: float) -> None:
+    """Move the goal by a jump."""
+    cosine, sine = math.cos(memory.goal_heading), math.sin(memory.goal_heading)
+    memory.goal[0] += cosine * ahead - sine * aside
+    memory.goal[1] += sine * ahead + cosine * aside
+    memory.goal_heading += turn
+
+
+@kernel
+def receive(part: PlanPart, number: int, received: ReceivedPlan) -> None:
+    """Copy the part of the plan that comes next, if it is there."""
+    if received.whole or part.number != number or part.part != received.parts:
+        return
+    first = part.part * PART_ROWS
+    for row in range(PART_ROWS):
+        received.time[first + row] = part.time[row]
+        received.rows[first + row, :] = part.rows[row]
+        for point in range(part.contact.shape[1]):
+            received.contact[first + row, point] = part.contact[row, point]
+    received.parts += 1
+    if received.parts < part.parts:
+        return
+    last = received.parts * PART_ROWS - 1
+    for row in range(last + 1, received.time.shape[0]):
+        received.time[row] = received.time[row - 1] + BEHIND
+        received.rows[row, :] = received.rows[last]
+        for point in range(part.contact.shape[1]):
+            received.contact[row, point] = received.contact[last, point]
+    received.marks[:] = part.marks
+    received.jumps[0, :] = part.jump
+    received.toes_first[0] = part.toes_first
+    received.outcome = part.outcome
+    received.done[0], received.done[1], received.done[2] = part.ahead, part.aside, part.turn
+    received.whole = True
+
+
+@kernel
+def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState) -> None:
+    """Make the plan that has come the one that is followed."""
+    followed.time[:] = received.time
+    for row in range(received.time.shape[0]):
+        followed.rows[row, :] = received.rows[row]
+        for point in range(received.contact.shape[1]):
+            followed.contact[row, point] = received.contact[row, point]
+    followed.marks[:] = received.marks
+    followed.jumps[0, :] = received.jumps[0]
+    followed.touchdowns[0] = received.jumps[0, 2]
+    followed.toes_first[0] = received.toes_first[0]
+    memory.outcome = received.outcome
+    memory.waits = False
+    memory.jumps += 1
+
+
+@kernel
+def tell_goal(memory: SteeringState, goal: CourseGoal) -> None:
+    """The goal from where the robot stood at the start."""
+    x, y = memory.goal[0] - memory.start[0], memory.goal[1] - memory.start[1]
+    cosine, sine = math.cos(memory.start_heading), math.sin(memory.start_heading)
+    goal.position[0] = cosine * x + sine * y
+    goal.position[1] = cosine * y - sine * x
+    goal.heading = memory.goal_heading - memory.start_heading
+    goal.number = memory.jumps
+    goal.outcome = memory.outcome

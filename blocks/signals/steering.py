@@ -1,0 +1,93 @@
+"""Signals of jumps that are commanded while the robot moves.
+
+Units, frames and orders are those of the package ``signals``. Commands and requests are relative to the
+feet: ahead and to the left of their middle, in the direction in which they point.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from ...runtime.language.signals import Field, Signal
+
+PART_ROWS = 20
+"""Rows of a plan that are handed over at a time."""
+PLAN_ROWS = 240
+"""Rows of a plan at most."""
+
+
+class PlanOutcome(IntEnum):
+    """Which plan answers a request."""
+
+    NONE = 0
+    """None was asked for."""
+    PLANNED = 1
+    """A plan of what was asked."""
+    NEAREST = 2
+    """What was asked is out of reach; the plan is of the nearest that is within."""
+    UNSOLVED = 3
+    """The solver found no motion; the plan is the nearest of the stored ones."""
+    INVALID = 4
+    """The plan failed its check; the nearest of the stored ones is followed."""
+
+
+class JumpCommand(Signal):
+    """Where the next jump should land."""
+
+    number = Field(
+        dtype="int64", text="counts the commands; a jump follows a number that is greater"
+    )
+    ahead = Field(unit="m", text="how far ahead of the feet")
+    aside = Field(unit="m", text="how far to their left")
+    turn = Field(unit="rad", text="change of heading, to the left")
+
+
+class PlanRequest(Signal):
+    """The jump that should be planned, from where the feet stand."""
+
+    number = Field(dtype="int64", text="counts the requests, from 1; zero: none yet")
+    command = Field(dtype="int64", text="number of the command that it answers")
+    ahead = Field(unit="m", text="how far ahead of the feet")
+    aside = Field(unit="m", text="how far to their left")
+    turn = Field(unit="rad", text="change of heading, to the left")
+
+
+class PlanPart(Signal):
+    """A few rows of a plan, which is handed over part by part; see ``JumpTable``."""
+
+    number = Field(dtype="int64", text="of the request; zero: no plan yet")
+    part = Field(dtype="int64", text="number of this part, from 0")
+    parts = Field(dtype="int64", text="how many parts the plan has")
+    time = Field(PART_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((PART_ROWS, "plan_width"), text="columns of the reference, side by side")
+    contact = Field((PART_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jump = Field(3, unit="s", text="when thrust, flight and landing begin")
+    toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
+    ahead = Field(unit="m", text="how far ahead of the feet it lands")
+    aside = Field(unit="m", text="how far to their left")
+    turn = Field(unit="rad", text="its change of heading")
+
+
+class JumpFrame(Signal):
+    """The frame of the jump that is made: the middle of the feet before it, and their heading."""
+
+    origin = Field(3, unit="m", frame="world", text="in the estimator's world")
+    heading = Field(unit="rad", frame="world", text="about its vertical")
+
+
+class CourseGoal(Signal):
+    """Where the feet should be after the last command that was taken, by all commands so far."""
+
+    number = Field(dtype="int64", text="jumps that were begun")
+    position = Field(
+        2, unit="m", text="middle of the feet, from where they stood when the run began"
+    )
+    heading = Field(unit="rad", text="their heading since then, to the left")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan the last jump follows")
+
+
+def plan_width(n_feet: int, n_joints: int) -> int:
+    """The number of columns of a plan's row."""
+    return 22 + 8 * n_feet + 4 * n_joints

@@ -1,0 +1,85 @@
+"""``aloft render``: pictures and films of recordings, drawn without a screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..runtime.language.errors import AloftError
+from .shared.options import AsJson
+from .shared.output import console, errors_reported, print_json, progress_bar, say
+
+Start = Annotated[float | None, typer.Option("--from", help="The first time [s].")]
+
+
+def render(
+    recordings: Annotated[
+        list[Path], typer.Argument(help="One recording, or several to stand side by side.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="A .gif, .mp4 or .png; by default NAME.gif here."),
+    ] = None,
+    start: Start = None,
+    end: Annotated[float | None, typer.Option("--to", help="The last time [s].")] = None,
+    at: Annotated[
+        float | None, typer.Option(help="For a .png: the time that is shown [s].")
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.001, help="0.25 is slow motion.")] = 0.5,
+    rate: Annotated[float, typer.Option(min=1, max=120, help="Pictures a second.")] = 20.0,
+    width: Annotated[int, typer.Option(min=64, max=3840, help="Of one run's picture.")] = 480,
+    height: Annotated[int, typer.Option(min=64, max=2160, help="Of one run's picture.")] = 400,
+    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 112.0,
+    elevation: Annotated[float, typer.Option(help="Its angle to the ground [deg].")] = -9.0,
+    distance: Annotated[
+        float, typer.Option(min=0, help="Its distance [m]; 0: all of the motion is seen.")
+    ] = 0.0,
+    follow: Annotated[bool, typer.Option("--follow", help="The camera goes along.")] = False,
+    no_forces: Annotated[bool, typer.Option("--no-forces", help="Draw no forces.")] = False,
+    caption: Annotated[
+        list[str] | None,
+        typer.Option(help="Below each run, in their order; by default the recording's name."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Draw a recording as a film or a picture: the robot, the forces, the phase."""
+    from ..logs.file.reader import read
+    from ..studies.figures.film import ENDINGS, Camera, Take, instants, pictures, write_film
+
+    with errors_reported(as_json):
+        path = output or Path(f"{recordings[0].stem}.{'gif' if at is None else 'png'}")
+        if path.suffix not in ENDINGS:
+            raise AloftError(
+                f"{path} ends with none of {', '.join(ENDINGS)}, which say what to write"
+            )
+        if (at is not None) != (path.suffix == ".png"):
+            raise AloftError(
+                "a .png shows the run at one time: give both a .png and --at TIME, or neither"
+            )
+        names = list(caption or [file.stem for file in recordings])
+        if len(names) != len(recordings):
+            raise AloftError(f"{len(recordings)} recordings, but {len(names)} captions")
+        camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces)
+        takes = [
+            Take(read(file), name, camera) for file, name in zip(recordings, names, strict=True)
+        ]
+        step = speed / rate
+        times = instants(
+            takes, at if at is not None else start, at if at is not None else end, step
+        )
+        out = console()
+        with progress_bar(out, "drawing", len(times) * len(takes)) as (progress, task):
+            frames = pictures(takes, times, camera, lambda: progress.advance(task))
+            try:
+                count = write_film(path, frames, rate)
+            except OSError as error:
+                raise AloftError(f"{path} cannot be written: {error.strerror or error}") from error
+    if as_json:
+        print_json({"success": True, "file": str(path), "pictures": count})
+    else:
+        say(
+            out,
+            f"{count} picture{'s' if count != 1 else ''} in {path}, {path.stat().st_size / 1e6:.1f} MB",
+        )

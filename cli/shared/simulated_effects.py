@@ -1,0 +1,124 @@
+"""The effects that a simulated robot can have, for ``aloft robot show --effects``.
+
+Parameters, units and defaults are those of the simulator's own models; what the trial ``real`` sets, and
+the source behind it, are values and comments of ``graphs/trials/real.yaml`` and of the trials it includes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, get_args
+
+from pydantic.fields import FieldInfo
+
+from ...files.document import read_file
+from ...files.nodes import MapNode, plain
+from ...files.problems import Problems
+from ...files.validation import unit_of
+from ...hal.simulated import effects
+from ...hal.simulated.simulated_robot import SimulatorParameters
+from ...planner.library.library import shipped_folder
+from ...runtime.language.parameters import Parameters
+
+ROBOT = "robot."
+"""What the trials' keys for the simulated robot begin with."""
+
+
+class Setting(NamedTuple):
+    """What a trial sets, as it is written, and the comment behind it."""
+
+    value: Any
+    source: str
+
+
+def simulated_effects(trial: str = "real") -> list[dict[str, Any]]:
+    """Every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``, ``default``, what the trial
+    sets (``trial``, ``None`` if nothing) and ``source``.
+
+    Groups are those of the simulator's parameters that ``hal/simulated/effects.py`` declares. Of its other
+    parameters those count as effects that the trial sets.
+    """
+    settings = trial_settings(trial)
+    rows, alone = [], []
+    for name, info in SimulatorParameters.model_fields.items():
+        group = _group(info)
+        if group is None and name in settings:
+            alone.append(_row("", name, info, settings))
+        elif group is not None:
+            off = info.default is None
+            rows += [
+                _row(name, each, inner, settings, off) for each, inner in group.model_fields.items()
+            ]
+    return alone + rows
+
+
+def trial_settings(trial: str) -> dict[str, Setting]:
+    """What a shipped trial sets of the simulated robot, by the parameter's path below ``robot``."""
+    file = shipped_folder() / "trials" / f"{trial}.yaml"
+    return {
+        key.removeprefix(ROBOT): setting
+        for key, setting in _read(file).items()
+        if key.startswith(ROBOT)
+    }
+
+
+def _read(file: Path) -> dict[str, Setting]:
+    problems = Problems()
+    node = read_file(file, file.name, problems)
+    assert node is not None and not len(problems), f"{file} is a shipped trial"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    found: dict[str, Setting] = {}
+    included = node.get("include")
+    for name in plain(included.value) if included is not None else []:
+        found |= _read(file.parent / name)
+    entry = node.get("set")
+    if entry is not None and isinstance(entry.value, MapNode):
+        for setting in entry.value:
+            comment = lines[setting.key_where.line - 1].partition(" # ")[2].strip()
+            found[setting.key] = Setting(plain(setting.value), comment)
+    return found
+
+
+def _group(info: FieldInfo) -> type[Parameters] | None:
+    """The model of a parameter that is a group of effects; ``None`` for all others."""
+    for kind in (info.annotation, *get_args(info.annotation)):
+        if not isinstance(kind, type) or kind.__module__ != effects.__name__:
+            continue
+        if issubclass(kind, Parameters):
+            return kind
+    return None
+
+
+def _row(
+    group: str, name: str, info: FieldInfo, settings: dict[str, Setting], off: bool = False
+) -> dict[str, Any]:
+    default = info.get_default(call_default_factory=True)
+    required = info.is_required()
+    set_here = settings.get(f"{group}.{name}" if group else name)
+    return {
+        "group": group,
+        "parameter": name,
+        "text": info.description or "",
+        "unit": unit_of(info),
+        "default": None if required else default,
+        "required": required,
+        "group_is_off": off,
+        "trial": None if set_here is None else set_here.value,
+        "source": "" if set_here is None else set_here.source,
+    }
+
+
+def effect_rows(found: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """The rows of a table: parameter, unit, default, what the trial draws, source."""
+    for row in found:
+        path = f"{row['group']}.{row['parameter']}" if row["group"] else row["parameter"]
+        default = "no default" if row["required"] else _text(row["default"])
+        set_here = "" if row["trial"] is None else _text(row["trial"])
+        yield path, row["unit"], default, set_here, row["source"]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(each) for each in value)
+    return "none" if value is None else str(value)

@@ -1,0 +1,93 @@
+"""Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples``.
+
+Hops are spread evenly over all requests by a Halton sequence. They are solved from the shortest to the
+longest, each from the nearest of those before it or from nothing; those without a valid plan are left
+out. It takes a minute or two of one core.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...robots.description import RobotDescription, find_robot
+from ..checking.validity import check_plan
+from ..solving.solve import solve_jump
+from ..task.files import PlanError
+from ..task.plan import PlannedJump
+from .hop_plans import samples_path
+from .hop_request import REACH, HopRequest, coarse, task_of
+from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
+
+COUNT = 48
+"""Requests that are tried."""
+BASES = (2, 3, 5)
+STILL = HopRequest(0.0, 0.0, 0.0)
+
+
+def halton(index: int, base: int) -> float:
+    """The number ``index`` of the van der Corput sequence, in [0, 1)."""
+    value, share = 0.0, 1.0
+    while index > 0:
+        share /= base
+        value += share * (index % base)
+        index //= base
+    return value
+
+
+def request(index: int) -> HopRequest:
+    """A request of the sequence."""
+    distance, direction, turn = (halton(index + 1, base) for base in BASES)
+    radius, angle = math.sqrt(distance), 2.0 * math.pi * direction
+    return HopRequest(
+        round(REACH["ahead"] * radius * math.cos(angle), 4),
+        round(REACH["aside"] * radius * math.sin(angle), 4),
+        round(REACH["turn"] * (2.0 * turn - 1.0), 4),
+    )
+
+
+def find_samples(robot: RobotDescription, count: int = COUNT) -> PlanSamples:
+    """Plan them all."""
+    asked: list[HopRequest] = []
+    plans: list[PlannedJump] = []
+    for wanted in sorted((STILL, *map(request, range(count))), key=lambda one: apart(one, STILL)):
+        found = _plan(wanted, robot, _nearest(wanted, asked, plans))
+        if found is not None:
+            asked.append(wanted)
+            plans.append(found)
+    return samples_of(robot.name, plans, asked)
+
+
+def apart(one: HopRequest, other: HopRequest) -> float:
+    """The distance between two requests, in units of ``SCALES``."""
+    return math.hypot(*((np.array(one) - np.array(other)) / SCALES).tolist())
+
+
+def _nearest(
+    wanted: HopRequest, asked: list[HopRequest], plans: list[PlannedJump]
+) -> PlannedJump | None:
+    if not plans:
+        return None
+    return plans[min(range(len(asked)), key=lambda row: apart(wanted, asked[row]))]
+
+
+def _plan(
+    wanted: HopRequest, robot: RobotDescription, near: PlannedJump | None
+) -> PlannedJump | None:
+    """A valid plan on the knots of all samples, with all coordinates."""
+    task = coarse(task_of(wanted, robot.name).resolved(robot))
+    for start in (near, None) if near is not None else (None,):
+        try:
+            plan = solve_jump(task, robot, warm_start=start, knots=task.knots, quick=True)
+        except PlanError:
+            continue
+        report = check_plan(plan, robot)
+        print(wanted, plan.statistics["iterations"], [t.name for t in report.failed], flush=True)
+        if report.valid:
+            return plan
+    return None
+
+
+if __name__ == "__main__":
+    print(write_samples(samples_path("bruce"), find_samples(find_robot("bruce"))))

@@ -1,0 +1,157 @@
+"""A file of plans of many hops, from which the plan of any hop between them is interpolated.
+
+All of them have the same knots, so that of any two plans the same rows belong together. The weights of
+the plans are those of a moving least squares fit: they sum to one, and give every linear function
+of the request exactly.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
+from ...mathematics.linear_algebra import product, solve_positive
+from ..task.files import write_whole
+from ..task.plan import ARRAYS, PlanFileError, PlannedJump
+from .hop_request import HopRequest, task_of, within_reach
+
+FILE_FORMAT = "aloft hop plans 1"
+SCALES = np.array([0.1, 0.1, 0.4])
+"""What difference of each part of a request counts as a distance of 1."""
+NEAR = 0.3
+"""Within this distance plans count alike."""
+KEPT_EXACTLY = ("contact", "phase")
+
+
+@dataclass(frozen=True)
+class PlanSamples:
+    """Valid plans of one robot.
+
+    Attributes:
+        robot: its name.
+        requests: (n, 3), one row a plan in the order of ``HopRequest``.
+        arrays: those of ``PlannedJump``, each with a first axis of n.
+        flights: lift-off and touchdown [s], (n, 2).
+    """
+
+    robot: str
+    requests: Array
+    arrays: dict[str, NDArray[np.generic]]
+    flights: Array
+
+    def weights(self, wanted: HopRequest) -> Array:
+        """The share of each plan in that of the request, (n,)."""
+        apart = (self.requests - np.array(wanted)) / SCALES
+        square = (apart * apart).sum(axis=1)
+        trust = 1.0 / (square + NEAR * NEAR) ** 3
+        # w = trust (a + b . apart) with sum w = 1 and sum w apart = 0.
+        basis = np.concatenate([np.ones((len(apart), 1)), apart], axis=1)
+        goal = np.array([1.0, 0.0, 0.0, 0.0])
+        solve_positive(product((basis * trust[:, None]).T, basis), goal)
+        return np.asarray(trust * (basis * goal).sum(axis=1))
+
+    def nearest(self, wanted: HopRequest) -> int:
+        """The plan whose request is the nearest, of those within reach."""
+        apart = (self.requests - np.array(wanted)) / SCALES
+        square = (apart * apart).sum(axis=1)
+        for row, request in enumerate(self.requests.tolist()):
+            if within_reach(HopRequest(*request)) != HopRequest(*request):
+                square[row] = np.inf
+        return int(square.argmin())
+
+    def plan(self, row: int) -> PlannedJump:
+        """One of the plans. Its flight begins and ends at knots, whose times are in single precision."""
+        weights = np.eye(len(self.requests))[row]
+        plan = self._make(HopRequest(*self.requests[row].tolist()), weights)
+        flying = np.flatnonzero(plan.phase == Phase.FLIGHT)
+        lift_off, touchdown = plan.time[[flying[0], flying[-1] + 1]].tolist()
+        return replace(plan, lift_off_time=lift_off, touchdown_time=touchdown)
+
+    def interpolated(self, wanted: HopRequest) -> PlannedJump:
+        """A motion near the plan of a request. It obeys no law of motion exactly."""
+        return self._make(wanted, self.weights(wanted))
+
+    def _make(self, wanted: HopRequest, weights: Array) -> PlannedJump:
+        values: dict[str, Any] = {
+            name: array[0] if name in KEPT_EXACTLY else _mean(weights, array)
+            for name, array in self.arrays.items()
+        }
+        turn = values["position"][:, 3:7]
+        turn /= np.linalg.norm(turn, axis=1)[:, None]
+        lift_off, touchdown = _mean(weights, self.flights).tolist()
+        return PlannedJump(
+            task=task_of(wanted, self.robot),
+            lift_off_time=lift_off,
+            touchdown_time=touchdown,
+            statistics={"coordinates": "full"},
+            **values,
+        )
+
+
+def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:
+    """The weighted sum over the first axis."""
+    flat = rows.reshape(len(rows), -1).astype(np.float64)
+    return np.asarray((weights[:, None] * flat).sum(axis=0).reshape(rows.shape[1:]))
+
+
+def samples_of(
+    robot: str, plans: Sequence[PlannedJump], asked: Sequence[HopRequest]
+) -> PlanSamples:
+    """The plans of these requests together. Quaternions take the sign with w >= 0."""
+    arrays = {name: np.stack([getattr(plan, name) for plan in plans]) for name in ARRAYS}
+    turn = arrays["position"][:, :, 3:7]
+    turn *= np.where(turn[:, :, 3:] < 0.0, -1.0, 1.0)
+    flights = np.array([[plan.lift_off_time, plan.touchdown_time] for plan in plans])
+    return PlanSamples(robot, np.array(asked, dtype=np.float64), arrays, flights)
+
+
+def write_samples(path: Path, samples: PlanSamples) -> Path:
+    """Write the file, in single precision: plans made from it are solved and checked anew."""
+    memory = io.BytesIO()
+    header = json.dumps({"format": FILE_FORMAT, "robot": samples.robot, "units": ARRAYS})
+    stored: dict[str, Any] = {
+        name: array if name in KEPT_EXACTLY else array.astype(np.float32)
+        for name, array in samples.arrays.items()
+    }
+    np.savez_compressed(
+        memory,
+        header=np.array(header),
+        requests=samples.requests,
+        flights=samples.flights,
+        **stored,
+    )
+    return write_whole(path, memory.getvalue())
+
+
+def read_samples(path: Path) -> PlanSamples:
+    """The plans in a file.
+
+    Raises:
+        PlanFileError: there is no file, it is broken, or it is of another format.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            header = json.loads(str(file["header"]))
+            if header.get("format") != FILE_FORMAT:
+                raise PlanFileError(
+                    f"{path} is of format {header.get('format')!r}, expected {FILE_FORMAT!r}"
+                )
+            arrays = {name: file[name] for name in ARRAYS}
+            return PlanSamples(header["robot"], file["requests"], arrays, file["flights"])
+    except OSError as error:
+        raise PlanFileError(f"cannot read {path}: {error.strerror or error}") from error
+    except PlanFileError:
+        raise
+    except Exception as error:  # a damaged archive raises nearly anything
+        raise PlanFileError(
+            f"{path} has no plans of hops: {error or type(error).__name__}"
+        ) from error

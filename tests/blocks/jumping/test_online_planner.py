@@ -1,0 +1,61 @@
+"""``OnlinePlanner`` hands a valid plan over part by part, and says which plan it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aloft.blocks.jumping.online_planner import OnlinePlanner
+from aloft.blocks.signals import PlanOutcome
+from aloft.blocks.signals.steering import PART_ROWS, plan_width
+from aloft.planner.library.jump_table import COLUMNS
+from aloft.runtime.language.errors import BlockError
+from aloft.runtime.testing import BlockBench
+
+
+def parts_of(bench: BlockBench[OnlinePlanner], number: int, **request: float):
+    bench.set("request", number=number, **request)
+    found = []
+    while not found or found[-1]["part"] + 1 < found[-1]["parts"]:
+        bench.step()
+        found.append({name: view.copy() for name, view in bench.get("part")})
+        assert len(found) < 20
+    return found
+
+
+@pytest.mark.long
+def test_a_plan_comes_in_parts_and_repeats_to_the_byte() -> None:
+    bench = BlockBench(OnlinePlanner, robot="bruce", rate=100.0)
+    bench.step()
+    assert bench.get("part").number == 0
+    first = parts_of(bench, 1, ahead=0.12, aside=0.03, turn=0.2)
+    assert [int(part["part"]) for part in first] == list(range(len(first)))
+    assert all(int(part["outcome"]) == PlanOutcome.PLANNED for part in first)
+    time = np.concatenate([part["time"] for part in first])
+    assert (np.diff(time) >= 0.0).all() and len(time) == len(first) * PART_ROWS
+    rows = np.concatenate([part["rows"] for part in first])
+    assert rows.shape[1] == plan_width(2, 10)
+    # where the feet are in the end: their columns stand behind six columns of three and one of four
+    begin = 3 * 3 + 4 + 3 + 3 + 3
+    assert COLUMNS[7] == "foot_position"
+    middle = rows[-1, begin : begin + 6].reshape(2, 3).mean(axis=0)
+    assert middle == pytest.approx([0.12, 0.03, 0.0], abs=2e-3)
+    again = parts_of(
+        BlockBench(OnlinePlanner, robot="bruce", rate=100.0), 1, ahead=0.12, aside=0.03, turn=0.2
+    )
+    for one, other in zip(first, again, strict=True):
+        assert all(one[name].tobytes() == other[name].tobytes() for name in one)
+
+
+@pytest.mark.long
+def test_a_jump_out_of_reach_is_replaced_by_the_nearest() -> None:
+    bench = BlockBench(OnlinePlanner, robot="bruce", rate=100.0)
+    part = parts_of(bench, 1, ahead=0.8, aside=0.0, turn=0.0)[-1]
+    assert int(part["outcome"]) == PlanOutcome.NEAREST
+    assert float(part["ahead"]) == pytest.approx(0.32)
+    assert bench.block.metrics()["plans_nearest"] == 1
+
+
+def test_a_robot_without_stored_plans_is_refused() -> None:
+    with pytest.raises(BlockError, match="there are no stored plans of hops for go2"):
+        BlockBench(OnlinePlanner, robot="go2", rate=100.0)

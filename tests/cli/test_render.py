@@ -1,0 +1,121 @@
+"""``aloft render``: films and pictures of recordings; skipped where there is no OpenGL without a screen."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from aloft import load
+from aloft.logs.file.reader import read
+from aloft.logs.recording.recorder import Recorder
+from aloft.runtime.language.errors import AloftError
+from aloft.studies.figures.film import Camera, Take, instants
+from aloft.studies.figures.offscreen import NoRendererError, Offscreen
+
+from .conftest import run_for_json, run_here
+
+ROOT = Path(__file__).parents[2]
+SMALL = ("--width", "120", "--height", "100")
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first 0.5 s of the push, in which the robot stands."""
+    path = tmp_path_factory.mktemp("render") / "pushed.rrd"
+    graph = load(ROOT / "graphs" / "push.yaml", ["duration=0.5 s"])
+    graph.run(sinks=[Recorder(path)], log=False)
+    return path
+
+
+@pytest.fixture
+def renderer(pushed: Path) -> None:
+    robot = read(pushed).header.robot
+    assert robot is not None
+    try:
+        with Offscreen(robot, Take(read(pushed), "", Camera()).terrain, 16, 16):
+            pass
+    except NoRendererError as error:
+        pytest.skip(str(error))
+
+
+def test_a_film_has_a_picture_for_each_step_of_time(
+    pushed: Path, renderer: None, tmp_path: Path
+) -> None:
+    film = tmp_path / "film.gif"
+    words = ("--from", "0.1", "--to", "0.4", "--speed", "0.5", "--rate", "20", *SMALL)
+    found = run_for_json("render", str(pushed), "-o", str(film), *words)
+    assert found == {"success": True, "file": str(film), "pictures": 13}
+    with Image.open(film) as image:
+        assert (image.size, image.info["duration"]) == ((120, 122), 50)
+        assert 1 < image.n_frames <= 13, "equal pictures are one that stays longer"
+    again = tmp_path / "again.gif"
+    run_for_json("render", str(pushed), "-o", str(again), *words)
+    assert film.read_bytes() == again.read_bytes()
+
+
+def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path: Path) -> None:
+    one, two = tmp_path / "one.png", tmp_path / "two.png"
+    run_here("render", str(pushed), "-o", str(one), "--at", "0.3", *SMALL, "--caption", "a")
+    run_here("render", *[str(pushed)] * 2, "-o", str(two), "--at", "0.3", *SMALL,
+             "--caption", "a", "--caption", "a")  # fmt: skip
+    alone, both = (np.asarray(Image.open(path)) for path in (one, two))
+    assert np.array_equal(both, np.concatenate([alone, alone], axis=1))
+    bare = tmp_path / "bare.png"
+    run_here("render", str(pushed), "-o", str(bare), "--at", "0.3", *SMALL, "--caption", "a",
+             "--no-forces")  # fmt: skip
+    red = [
+        int(((p[..., 0] > 120) & (p[..., 1] < 60) & (p[..., 2] < 80)).sum())
+        for p in (alone, np.asarray(Image.open(bare)))
+    ]
+    assert red[0] > 5 and red[1] == 0, "the forces on the feet"
+
+
+def test_mp4(pushed: Path, renderer: None, tmp_path: Path) -> None:
+    av = pytest.importorskip("av")
+    path = tmp_path / "film.mp4"
+    run_here(
+        "render", str(pushed), "-o", str(path), "--to", "0.2", "--speed", "1", *SMALL, "--follow"
+    )
+    with av.open(str(path)) as film:
+        (stream,) = film.streams.video
+        assert (stream.width, stream.height, stream.average_rate) == (120, 122, 20)
+        assert sum(1 for _ in film.decode(stream)) == 5
+
+
+def test_what_is_shown_at_a_time(pushed: Path) -> None:
+    take = Take(read(pushed), "p", Camera())
+    assert take.row(0.0) == 0 and take.row(0.1011) == 50 and take.row(9.0) == len(take.time) - 1
+    assert take.text(50) == "p  0.10 s  stand"
+    weight = sum(force[2] for _, force in ((a, (b - a)) for a, b in take.arrows(200)))
+    assert weight == pytest.approx(0.5 * float(take.base[0, 2]), rel=0.1), (
+        "the arrows of a robot that stands"
+    )
+    np.testing.assert_allclose(instants([take], 0.1, 0.2, 0.05), [0.1, 0.15, 0.2])
+    with pytest.raises(
+        AloftError, match=r"no pictures from 0\.4 s to 7 s: .* is from 0 s to 0\.498 s"
+    ):
+        instants([take], 0.4, 7.0, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (
+            ["-o", "film.avi"],
+            "film.avi ends with none of .gif, .mp4, .png, which say what to write",
+        ),
+        (["-o", "film.png"], "a .png shows the run at one time: give both a .png and --at TIME"),
+        (["-o", "film.gif", "--at", "0.1"], "a .png shows the run at one time"),
+        (["--caption", "a", "--caption", "b"], "1 recordings, but 2 captions"),
+        (["--from", "3"], "no pictures from 3 s to 0.498 s"),
+    ],
+)
+def test_what_cannot_be_is_refused(pushed: Path, words: list[str], reason: str) -> None:
+    assert reason in run_for_json("render", str(pushed), *words, code=2)["reason"]
+
+
+def test_a_recording_without_a_robot(counted: bytes, tmp_path: Path) -> None:
+    (tmp_path / "count.rrd").write_bytes(counted)
+    reason = run_for_json("render", str(tmp_path / "count.rrd"), code=2)["reason"]
+    assert reason.endswith("count.rrd has no robot: nothing in it says where one is")

@@ -1,0 +1,39 @@
+"""BRUCE hops where commands tell it, in closed loop; the run repeats and replays to the byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import aloft
+from aloft.logs.replay.opened_run import OpenedRun
+from aloft.logs.replay.replay import replay
+
+GRAPH = Path(aloft.__file__).parent / "graphs" / "steer.yaml"
+
+
+@pytest.mark.long
+def test_it_lands_where_it_is_told_and_repeats_to_the_byte() -> None:
+    runs = [aloft.load(GRAPH, {"robot.seed": 3}).run(log=False) for _ in range(2)]
+    assert runs[0].success, runs[0].reason
+    assert runs[0].metrics["jumps"] == 3
+    assert runs[0].metrics["plans_planned"] == 3
+    assert runs[0].metrics["worst_place_error_m"] < 0.03
+    assert runs[0].run_hash == runs[1].run_hash
+
+
+@pytest.mark.long
+def test_a_recording_replays_exactly(tmp_path: Path) -> None:
+    file = tmp_path / "steer.rrd"
+    graph = aloft.load(GRAPH, {"commands.commands": [{"ahead": 0.1, "turn": 0.3}]})
+    done = graph.run()
+    assert done.metrics["jumps"] == 1, done.reason
+    aloft.write_recording(file, done)
+    again = replay(OpenedRun.of(file))
+    assert again.identical, again
+
+
+def test_the_keyboards_graph_has_no_problems() -> None:
+    checked = aloft.load(GRAPH.parent / "steer_by_keys.yaml").checked
+    assert checked.clock.kind == "paced"

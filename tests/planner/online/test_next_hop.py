@@ -1,0 +1,51 @@
+"""Plans of hops are valid, are what was asked for, and follow from the request alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from aloft.blocks.signals import PlanOutcome
+from aloft.planner.checking.validity import require_valid
+from aloft.planner.online import next_hop
+from aloft.planner.online.hop_plans import shipped_samples
+from aloft.planner.online.hop_request import HopRequest
+from aloft.planner.online.next_hop import HopPlanner
+from aloft.planner.task.plan import plan_bytes
+from aloft.robots.description import find_robot
+
+ROBOT = find_robot("bruce")
+PLANNER = HopPlanner(ROBOT, shipped_samples("bruce"))
+
+
+@pytest.mark.long
+def test_a_plan_is_valid_and_does_not_depend_on_those_before() -> None:
+    wanted = HopRequest(0.17, -0.06, math.radians(-20.0))
+    first = PLANNER.plan(wanted)
+    assert (first.outcome, first.done) == (PlanOutcome.PLANNED, wanted)
+    require_valid(first.plan, ROBOT)
+    assert first.plan.com[-1, :2] == pytest.approx([0.17, -0.06], abs=0.02)
+    PLANNER.plan(HopRequest(-0.05, 0.1, 0.3))
+    again = PLANNER.plan(wanted)
+    assert plan_bytes(first.plan) == plan_bytes(again.plan)
+
+
+@pytest.mark.long
+def test_where_the_solver_does_not_end_a_stored_plan_is_followed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(next_hop, "ITERATIONS", 2)
+    found = PLANNER.plan(HopRequest(0.17, -0.06, -0.3))
+    assert found.outcome == PlanOutcome.UNSOLVED
+    assert np.abs(np.array(found.done) - [0.17, -0.06, -0.3]).max() < 0.3
+    require_valid_but_for_rounding(found.plan)
+
+
+def require_valid_but_for_rounding(plan) -> None:
+    """The stored plans are in single precision, and were checked before that."""
+    from aloft.planner.checking.validity import check_plan
+
+    report = check_plan(plan, ROBOT)
+    assert all(test.value <= 1.1 * test.limit + 1e-4 for test in report.failed), report.explain()

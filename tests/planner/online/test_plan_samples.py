@@ -1,0 +1,67 @@
+"""Plans of hops: reach, weights of the interpolation, and the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aloft.planner.online.hop_plans import samples_path, shipped_samples
+from aloft.planner.online.hop_request import REACH, HopRequest, within_reach
+from aloft.planner.online.plan_samples import read_samples, write_samples
+from aloft.planner.task.plan import ARRAYS, PlanFileError
+
+SAMPLES = shipped_samples("bruce")
+
+
+def test_a_request_within_reach_is_left_and_another_comes_to_the_edge() -> None:
+    near = HopRequest(0.2, 0.1, -0.3)
+    assert within_reach(near) == near
+    far = within_reach(HopRequest(3.0, 0.0, 2.0))
+    assert far == pytest.approx((REACH["ahead"], 0.0, REACH["turn"]))
+    back = within_reach(HopRequest(-1.0, 1.0, 0.0))
+    assert (back.ahead / REACH["back"]) ** 2 + (back.aside / REACH["aside"]) ** 2 == pytest.approx(
+        1.0
+    )
+    assert back.ahead == pytest.approx(-back.aside)
+
+
+def test_weights_reproduce_every_linear_function() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        wanted = HopRequest(*(rng.uniform(-1.0, 1.0, 3) * [0.2, 0.2, 0.7]).tolist())
+        weights = SAMPLES.weights(wanted)
+        assert weights.sum() == pytest.approx(1.0)
+        assert weights @ SAMPLES.requests == pytest.approx(np.array(wanted), abs=1e-9)
+
+
+def test_an_interpolated_motion_lands_about_where_it_should() -> None:
+    plan = SAMPLES.interpolated(HopRequest(0.15, -0.05, 0.2))
+    assert np.linalg.norm(plan.position[:, 3:7], axis=1) == pytest.approx(1.0)
+    assert plan.com[-1, :2] == pytest.approx([0.15, -0.05], abs=0.02)
+
+
+def test_the_nearest_plan_is_one_within_reach() -> None:
+    row = SAMPLES.nearest(HopRequest(-0.3, 0.0, 0.0))
+    found = HopRequest(*SAMPLES.requests[row].tolist())
+    assert within_reach(found) == found
+
+
+def test_the_file_gives_what_was_written(tmp_path: Path) -> None:
+    path = write_samples(tmp_path / "hops.npz", SAMPLES)
+    again = read_samples(path)
+    assert path.read_bytes() == samples_path("bruce").read_bytes()
+    for name in ARRAYS:
+        np.testing.assert_array_equal(again.arrays[name], SAMPLES.arrays[name])
+
+
+def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(PlanFileError, match="cannot read"):
+        read_samples(tmp_path / "none.npz")
+    (tmp_path / "text.npz").write_text("no plans")
+    with pytest.raises(PlanFileError, match="has no plans of hops"):
+        read_samples(tmp_path / "text.npz")
+    np.savez(tmp_path / "other.npz", header=np.array('{"format": "another"}'))
+    with pytest.raises(PlanFileError, match="is of format 'another', expected 'aloft hop plans 1'"):
+        read_samples(tmp_path / "other.npz")
