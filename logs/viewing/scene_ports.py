@@ -39,8 +39,9 @@ PUSH = Role("ExternalForce", ("force", "point"))
 IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
-    "ContactState", "ContactSwitches", "DelayEstimate", "EstimatorHealth", "JointCommand",
-    "JointTarget", "JointTorque", "MassEstimate", "PhaseState", "PointTarget", "RobotHealth", "SwitchHealth",
+    "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
+    "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate",
+    "PhaseState", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SwitchHealth",
     "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""

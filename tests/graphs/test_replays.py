@@ -15,8 +15,11 @@ from aloft.logs.replay.replay import KeptRun, Keyframes, replay
 from aloft.runtime.running.executor import Executor
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
-NEED_DRIVES = ("jump_robot",)
-EXAMPLES = sorted(path for path in GRAPHS.glob("*.yaml") if path.stem not in NEED_DRIVES)
+NEED_DRIVES = ("jump_robot", "bring_up_stand", "bring_up_hop")
+NEED_A_TERMINAL = ("steer_by_keys",)
+EXAMPLES = sorted(
+    path for path in GRAPHS.glob("*.yaml") if path.stem not in NEED_DRIVES + NEED_A_TERMINAL
+)
 SHORT = 0.1
 """Seconds of each graph: the replay takes another process, and bytes differ early or never."""
 
