@@ -140,6 +140,36 @@ def tottering(
     return inputs
 
 
+def hanging(tick: int) -> Inputs:
+    """One foot has landed, and the other still hangs and moves."""
+    moving = 0.1 * np.sin(0.1 * tick + np.arange(12)).reshape(4, 3)
+    return {
+        "before": {"phase": Phase.LANDING, "stance": np.array([True, True, False, False])},
+        "terms": {"contact_velocity": moving},
+    }
+
+
+def loaded(n_velocities: int) -> Callable[[int], Inputs]:
+    """The legs bear a load that comes and goes, on soles that turn about their toes."""
+    jacobian = np.random.default_rng(3).normal(size=(4, 3, n_velocities))
+    bias = jacobian[:, 2].sum(axis=0)
+
+    def inputs(tick: int) -> Inputs:
+        heels = 0.01 * (1.0 + np.sin(0.2 * tick))
+        return {
+            "phase": {"phase": Phase.LANDING},
+            "joints": {"torque": 0.0},
+            "switches": {"active": np.array([True, False, True, False])},
+            "terms": {
+                "contact_jacobian": jacobian,
+                "nonlinear_effects": 30.0 * (1.0 + np.sin(0.05 * tick)) * bias,
+                "contact_position": np.outer([0.0, heels, 0.0, heels], [0, 0, 1]),
+            },
+        }  # fmt: skip
+
+    return inputs
+
+
 def recovering(tick: int) -> Inputs:
     """Rising from the landing."""
     return {"phase": {"phase": Phase.RECOVER, "time_in_phase": 0.002 * tick}}
@@ -236,6 +266,7 @@ SCENES: Mapping[str, list[Scene]] = {
     ],
     "blocks.CaptureStep": [
         Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
+        Scene({"seek_speed": 0.1}, hanging),
         Scene({"steps": 1, "after": 0.01, "reach": 0.02}, tottering(-0.8, 0.1)),
         Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, 0.8)),
         Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, -0.8)),
@@ -250,6 +281,7 @@ SCENES: Mapping[str, list[Scene]] = {
             for heels in (0.0003, 0.00045, 0.00055, 0.0008)
         ),
     ],
+    "blocks.FootLoadEstimator": [Scene({}, loaded(16))],
     "blocks.LegInverseKinematics": [
         Scene({"speed_limit": 0.5}),
         Scene({"level": 0.9}),
