@@ -68,7 +68,6 @@ NOT_HOT = {
     "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
     "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
     "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
-    "blocks.signals.steering.plan_width": "sizes of signals, when a graph is loaded",
     "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
     "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",

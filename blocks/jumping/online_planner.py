@@ -7,31 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...planner.library.jump_table import row_dimensions, table_rows
 from ...planner.online.hop_request import HopRequest
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Field
 from ..signals import PlanOutcome, PlanPart, PlanRequest
-from ..signals.steering import PART_ROWS, PLAN_ROWS, plan_width
+from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
 
 if TYPE_CHECKING:
     from ...planner.online.next_hop import HopPlan
 
 
-class PlanAnswer(Signal):
+class PlanAnswer(PlanRows):
     """The state of ``OnlinePlanner``: the last plan, and how much of it has been handed over."""
 
     number = Field(dtype="int64", text="of the request that was planned last")
-    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
-    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference, side by side")
-    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
-    marks = Field(2, unit="s", text="when squat and recovery begin")
-    jump = Field(3, unit="s", text="when thrust, flight and landing begin")
-    toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
-    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
     parts = Field(dtype="int64", text="how many parts it has")
     given = Field(dtype="int64", text="how many of them have been given")
     outcomes = Field(
@@ -42,7 +35,7 @@ class PlanAnswer(Signal):
 class OnlinePlanner(Block):
     """Plans the jump that was asked for, and hands the plan over, a part in every run.
 
-    It belongs in the background (``background: {latency: 500 ms}``): a plan takes 0.2 to 0.5 s of processor time.
+    It belongs in the background (``background: {latency: 500 ms}``): a plan takes some tenths of a second.
     The motion to begin with is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``).
     From it the solver takes a fixed number of iterations on the whole-body problem of ``aloft plan``, on 44 knots with
     all coordinates. The plan must pass the check with exact dynamics that every plan passes. A jump out of
@@ -65,9 +58,7 @@ class OnlinePlanner(Block):
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """The width of a plan's rows."""
-        return (
-            {} if robot is None else {"plan_width": plan_width(len(robot.feet), len(robot.joints))}
-        )
+        return row_dimensions(robot)
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -85,7 +76,7 @@ class OnlinePlanner(Block):
         return {"request": {"number": 0}}
 
     def setup(self) -> None:
-        from ...planner.online.hop_plans import hop_table, shipped_samples, side_by_side
+        from ...planner.online.hop_plans import hop_table, shipped_samples
         from ...planner.online.next_hop import HopPlanner
         from ...planner.task.plan import PlanFileError
 
@@ -97,7 +88,7 @@ class OnlinePlanner(Block):
         self._planner.plan(
             HopRequest(0.0, 0.0, 0.0)
         )  # loads compiled functions and makes the solver
-        self._table, self._columns = hop_table, side_by_side
+        self._table = hop_table
         self._times: list[float] = []
 
     def step(self) -> None:
@@ -109,36 +100,32 @@ class OnlinePlanner(Block):
             )
             self._keep(found, number)
         answer.given[()] = min(int(answer.given) + 1, int(answer.parts))
-        number = max(int(answer.given) - 1, 0)
-        rows = slice(number * PART_ROWS, (number + 1) * PART_ROWS)
-        part.number[()], part.part[()], part.parts[()] = answer.number, number, answer.parts
+        given = max(int(answer.given) - 1, 0)
+        rows = slice(given * PART_ROWS, (given + 1) * PART_ROWS)
+        part.number[()], part.part[()], part.parts[()] = answer.number, given, answer.parts
         part.time[:] = answer.time[rows]
         part.rows[:] = answer.rows[rows]
         part.contact[:] = answer.contact[rows]
-        part.marks[:], part.jump[:] = answer.marks, answer.jump
-        part.toes_first[()], part.outcome[()] = answer.toes_first, answer.outcome
+        part.marks[:], part.jump[:] = answer.marks, answer.jumps[0]
+        part.toes_first[()], part.outcome[()] = answer.toes_first[0], answer.outcome
         part.ahead[()], part.aside[()], part.turn[()] = answer.done
 
     def _keep(self, found: HopPlan, number: int) -> None:
         """Write a plan's table into the state."""
         answer = self.answer
-        table = self._table(found.plan, self.robot)
+        table = table_rows(self._table(found.plan, self.robot))
         n = len(table.time)
         if n > PLAN_ROWS:
             raise BlockError(f"the plan has {n} rows, which is more than {PLAN_ROWS}")
-        answer.time[:n], answer.rows[:n] = table.time, self._columns(table)
-        contact = np.ones((n, 1), np.bool_) if table.contact is None else table.contact
-        answer.contact[:n] = contact
+        answer.time[:n], answer.rows[:n] = table.time, table.rows
+        answer.contact[:n] = table.contact if len(table.contact) else True
         for array in (answer.time, answer.rows, answer.contact):
             array[n:] = array[n - 1]
+        answer.marks[:], answer.jumps[:] = table.marks, table.jumps
+        answer.toes_first[:] = table.toes_first
         answer.number[()], answer.given[()] = number, 0
         answer.parts[()] = -(-n // PART_ROWS)
         answer.outcomes[found.outcome] += 1
-        answer.marks[:] = table.squat_time, table.recover_time
-        answer.jump[:] = table.thrust_time, table.lift_off_time, table.touchdown_time
-        after = min(int(np.searchsorted(table.time, table.touchdown_time, side="right")), n - 1)
-        loaded = answer.contact[after]
-        answer.toes_first[()] = bool(loaded.any() and not loaded.all())
         answer.outcome[()] = int(found.outcome)
         answer.done[:] = found.done
         self._times.append(found.solve_s + found.check_s)

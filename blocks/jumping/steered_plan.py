@@ -15,6 +15,7 @@ from ...planner.library.jump_table import (
     TableRows,
     fed_forward,
     integrate_rows,
+    row_dimensions,
 )
 from ...planner.online.hop_plans import missing_plans, standing_row
 from ...robots.description import RobotDescription
@@ -36,7 +37,7 @@ from ..signals import (
     PlanPart,
     PlanRequest,
 )
-from ..signals.steering import PART_ROWS, PLAN_ROWS, plan_width
+from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
 from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, follow_plan
 
 NEVER = 1e6
@@ -45,32 +46,18 @@ BEHIND = 10.0
 """Rows behind the last one of a plan repeat it, so far apart [s]."""
 
 
-class ReceivedPlan(Signal):
+class ReceivedPlan(PlanRows):
     """The plan that is handed over, row by row."""
 
-    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
-    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference")
-    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
-    marks = Field(2, unit="s", text="when squat and recovery begin")
-    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
-    toes_first = Field(1, dtype="bool", text="whether it lands on some of the points")
-    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
     parts = Field(dtype="int64", text="parts that have come")
     whole = Field(dtype="bool", text="whether all have come")
 
 
-class FollowedPlan(Signal):
+class FollowedPlan(PlanRows):
     """The plan that is followed."""
 
-    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan began")
-    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference")
-    sums = Field((PLAN_ROWS, "plan_width"), text="their integrals")
-    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
-    marks = Field(2, unit="s", text="when squat and recovery begin")
-    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
+    sums = Field((PLAN_ROWS, "plan_width"), text="integrals of the columns")
     touchdowns = Field(1, unit="s", text="when landing begins")
-    toes_first = Field(1, dtype="bool", text="whether it lands on some of the points")
     began = Field(unit="s", text="time of the run at which it began")
 
 
@@ -89,7 +76,6 @@ class SteeringState(Signal):
     asked = Field(3, text="the last request: ahead, aside [m] and turn [rad]")
     jumps = Field(dtype="int64", text="plans begun so far")
     waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan is followed")
 
 
 class SteeredPlan(Block):
@@ -155,9 +141,7 @@ class SteeredPlan(Block):
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
         """The width of a plan's rows."""
-        return (
-            {} if robot is None else {"plan_width": plan_width(len(robot.feet), len(robot.joints))}
-        )
+        return row_dimensions(robot)
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -244,10 +228,10 @@ class SteeredPlan(Block):
             memory.origin[:] = scratch.middle
             memory.heading = heading
             integrate_rows(table)
-            if memory.outcome != PlanOutcome.PLANNED:
+            if followed.outcome != PlanOutcome.PLANNED:
                 memory.goal[:] = scratch.middle[:2]
                 memory.goal_heading = heading
-                move(memory, received.done[0], received.done[1], received.done[2])
+                move(memory, followed.done[0], followed.done[1], followed.done[2])
             progress.late = 0.0
         follow_plan(
             now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
@@ -259,7 +243,7 @@ class SteeredPlan(Block):
         frame.origin[:] = memory.origin
         frame.heading = memory.heading
         tell_request(memory, request)
-        tell_goal(memory, goal)
+        tell_goal(memory, followed.outcome, goal)
 
 
 @kernel
@@ -353,13 +337,14 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
     followed.jumps[0, :] = received.jumps[0]
     followed.touchdowns[0] = received.jumps[0, 2]
     followed.toes_first[0] = received.toes_first[0]
-    memory.outcome = received.outcome
+    followed.outcome = received.outcome
+    followed.done[:] = received.done
     memory.waits = False
     memory.jumps += 1
 
 
 @kernel
-def tell_goal(memory: SteeringState, goal: CourseGoal) -> None:
+def tell_goal(memory: SteeringState, outcome: int, goal: CourseGoal) -> None:
     """The goal from where the robot stood at the start."""
     x, y = memory.goal[0] - memory.start[0], memory.goal[1] - memory.start[1]
     cosine, sine = math.cos(memory.start_heading), math.sin(memory.start_heading)
@@ -367,4 +352,4 @@ def tell_goal(memory: SteeringState, goal: CourseGoal) -> None:
     goal.position[1] = cosine * y - sine * x
     goal.heading = memory.goal_heading - memory.start_heading
     goal.number = memory.jumps
-    goal.outcome = memory.outcome
+    goal.outcome = outcome

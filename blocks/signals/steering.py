@@ -70,6 +70,19 @@ class PlanPart(Signal):
     turn = Field(unit="rad", text="its change of heading")
 
 
+class PlanRows(Signal):
+    """A whole plan of one jump as state, as ``TableRows`` has it: rows behind the last one repeat it."""
+
+    time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference, side by side")
+    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    marks = Field(2, unit="s", text="when squat and recovery begin")
+    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
+    toes_first = Field(1, dtype="bool", text="whether the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
+    done = Field(3, text="where it lands: ahead, aside [m] and turn [rad]")
+
+
 class JumpFrame(Signal):
     """The frame of the jump that is made: the middle of the feet before it, and their heading."""
 
@@ -86,8 +99,3 @@ class CourseGoal(Signal):
     )
     heading = Field(unit="rad", text="their heading since then, to the left")
     outcome = Field(dtype="int64", values=PlanOutcome, text="which plan the last jump follows")
-
-
-def plan_width(n_feet: int, n_joints: int) -> int:
-    """The number of columns of a plan's row."""
-    return 22 + 8 * n_feet + 4 * n_joints

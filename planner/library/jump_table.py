@@ -134,9 +134,18 @@ def fed_forward(n_feet: int, n_joints: int) -> NDArray[np.bool_]:
     return _fed((3, 3, 3, 4, 3, 3, 3, *feet, *(n_joints,) * 4))
 
 
+def row_dimensions(robot: RobotDescription | None) -> dict[str, int]:
+    """The dimension ``plan_width`` of blocks that have the rows of a table in their signals."""
+    return (
+        {}
+        if robot is None
+        else {"plan_width": len(fed_forward(len(robot.feet), len(robot.joints)))}
+    )
+
+
 @kernel
 def integrate_rows(table: TableRows) -> None:
-    """Write the sums of a table whose rows have changed."""
+    """Write the sums of a table whose rows have changed in a tick, as ``integral`` does before a run."""
     for k in range(table.rows.shape[1]):
         table.sums[0, k] = 0.0
     for row in range(1, table.rows.shape[0]):

@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
-
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.block import UnmetRequirement
-from ..library.jump_table import COLUMNS, JumpTable
+from ..library.jump_table import JumpTable, table_rows
 from ..library.library import SHIPPED
 from ..library.reference_table import COARSE_STEPS, reference_table
 from ..task.plan import PlannedJump
@@ -52,13 +50,7 @@ def hop_table(plan: PlannedJump, robot: RobotDescription) -> JumpTable:
     return reference_table(plan, robot, 0.0, COARSE_STEPS)
 
 
-def side_by_side(table: JumpTable) -> Array:
-    """The columns of a table in the order of ``COLUMNS``, (n, width)."""
-    n = len(table.time)
-    return np.concatenate([table.columns[name].reshape(n, -1) for name in COLUMNS], axis=1)
-
-
 def standing_row(robot: RobotDescription) -> Array:
     """The row of a table in which the robot stands as every hop begins, (width,)."""
-    table = hop_table(shipped_samples(robot.name).plan(0), robot)
-    return np.asarray(side_by_side(table)[0])
+    first: Array = table_rows(hop_table(shipped_samples(robot.name).plan(0), robot)).rows[0]
+    return first

@@ -18,7 +18,7 @@ from ..task.files import PlanError
 from ..task.plan import PlannedJump
 from .hop_plans import samples_path
 from .hop_request import REACH, HopRequest, coarse, task_of
-from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
+from .plan_samples import PlanSamples, differences, samples_of, write_samples
 
 COUNT = 48
 """Requests that are tried."""
@@ -61,7 +61,7 @@ def find_samples(robot: RobotDescription, count: int = COUNT) -> PlanSamples:
 
 def apart(one: HopRequest, other: HopRequest) -> float:
     """The distance between two requests, in units of ``SCALES``."""
-    return math.hypot(*((np.array(one) - np.array(other)) / SCALES).tolist())
+    return math.hypot(*differences(np.array(one), other).tolist())
 
 
 def _nearest(

@@ -50,7 +50,7 @@ class PlanSamples:
 
     def weights(self, wanted: HopRequest) -> Array:
         """The share of each plan in that of the request, (n,)."""
-        apart = (self.requests - np.array(wanted)) / SCALES
+        apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
         trust = 1.0 / (square + NEAR * NEAR) ** 3
         # w = trust (a + b . apart) with sum w = 1 and sum w apart = 0.
@@ -61,7 +61,7 @@ class PlanSamples:
 
     def nearest(self, wanted: HopRequest) -> int:
         """The plan whose request is the nearest, of those within reach."""
-        apart = (self.requests - np.array(wanted)) / SCALES
+        apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
         for row, request in enumerate(self.requests.tolist()):
             if within_reach(HopRequest(*request)) != HopRequest(*request):
@@ -95,6 +95,11 @@ class PlanSamples:
             statistics={"coordinates": "full"},
             **values,
         )
+
+
+def differences(requests: Array, wanted: HopRequest) -> Array:
+    """What requests (..., 3) differ from the wanted one by, in units of ``SCALES``."""
+    return np.asarray((requests - np.array(wanted)) / SCALES)
 
 
 def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:

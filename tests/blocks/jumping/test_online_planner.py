@@ -7,7 +7,7 @@ import pytest
 
 from aloft.blocks.jumping.online_planner import OnlinePlanner
 from aloft.blocks.signals import PlanOutcome
-from aloft.blocks.signals.steering import PART_ROWS, plan_width
+from aloft.blocks.signals.steering import PART_ROWS
 from aloft.planner.library.jump_table import COLUMNS
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -34,7 +34,7 @@ def test_a_plan_comes_in_parts_and_repeats_to_the_byte() -> None:
     time = np.concatenate([part["time"] for part in first])
     assert (np.diff(time) >= 0.0).all() and len(time) == len(first) * PART_ROWS
     rows = np.concatenate([part["rows"] for part in first])
-    assert rows.shape[1] == plan_width(2, 10)
+    assert rows.shape[1] == 22 + 8 * 2 + 4 * 10
     # where the feet are in the end: their columns stand behind six columns of three and one of four
     begin = 3 * 3 + 4 + 3 + 3 + 3
     assert COLUMNS[7] == "foot_position"

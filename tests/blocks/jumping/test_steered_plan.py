@@ -10,7 +10,8 @@ import pytest
 from aloft.blocks.jumping.steered_plan import SteeredPlan
 from aloft.blocks.signals import Phase, PlanOutcome
 from aloft.blocks.signals.steering import PART_ROWS
-from aloft.planner.online.hop_plans import hop_table, shipped_samples, side_by_side
+from aloft.planner.library.jump_table import table_rows
+from aloft.planner.online.hop_plans import hop_table, shipped_samples
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -35,7 +36,7 @@ def hand_over(
     """Give all parts of a stored plan."""
     samples = shipped_samples("bruce")
     table = hop_table(samples.plan(row), ROBOT)
-    rows, n = side_by_side(table), len(table.time)
+    rows, n = table_rows(table).rows, len(table.time)
     parts = -(-n // PART_ROWS)
     ahead, aside, turn = samples.requests[row]
     for part in range(parts):
