@@ -11,8 +11,6 @@ from ..runtime.language.errors import AloftError
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
 
-Start = Annotated[float | None, typer.Option("--from", help="The first time [s].")]
-
 
 def render(
     recordings: Annotated[
@@ -22,7 +20,7 @@ def render(
         Path | None,
         typer.Option("--output", "-o", help="A .gif, .mp4 or .png; by default NAME.gif here."),
     ] = None,
-    start: Start = None,
+    start: Annotated[float | None, typer.Option("--from", help="The first time [s].")] = None,
     end: Annotated[float | None, typer.Option("--to", help="The last time [s].")] = None,
     at: Annotated[
         float | None, typer.Option(help="For a .png: the time that is shown [s].")
@@ -65,10 +63,8 @@ def render(
         takes = [
             Take(read(file), name, camera) for file, name in zip(recordings, names, strict=True)
         ]
-        step = speed / rate
-        times = instants(
-            takes, at if at is not None else start, at if at is not None else end, step
-        )
+        first, last = (start, end) if at is None else (at, at)
+        times = instants(takes, first, last, speed / rate)
         out = console()
         with progress_bar(out, "drawing", len(times) * len(takes)) as (progress, task):
             frames = pictures(takes, times, camera, lambda: progress.advance(task))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
@@ -184,7 +186,7 @@ def _beyond(
     parameter: str, unit: str, share: float, robot: RobotDescription, found: dict[str, Value], known: Array,
 ) -> list[str]:  # fmt: skip
     """A share of what is found beyond the description's; for compensation, which must not push, never less."""
-    least = 0.0 if share < 1.0 else -1e9
+    least = 0.0 if share < 1.0 else -math.inf
     values = {
         joint.name: share * max(least, found[joint.name].value - float(nominal))
         for joint, nominal in zip(robot.joints, known, strict=True)

@@ -20,7 +20,6 @@ TWIN = "twin"
 """The name of both ports of a robot that exists as a twin only."""
 HOLDING_TIME = 30.0
 """How long somebody has to take the dead man's switch [s]."""
-_GRAPHS = Path(__file__).parents[2] / "graphs"
 
 
 def twin_session(file: Path, robot: RobotDescription, hand: RobotByHand) -> Session:
@@ -86,6 +85,7 @@ def run_on_robot(
         AloftError: the graph and the file do not fit.
     """
     from ...logs.recording.recorder import Recorder
+    from ...planner.library.library import shipped_folder
     from ...runtime.graph import load
     from ...runtime.language.stages import ClockSpec
 
@@ -94,7 +94,7 @@ def run_on_robot(
         "robot.armed": True,
         "robot.time": "virtual" if virtual else "real",
     }
-    loaded = load(_GRAPHS / graph, {**on_robot, **settings})
+    loaded = load(shipped_folder() / graph, {**on_robot, **settings})
     clock = ClockSpec("free" if virtual else "robot")
     return loaded.run(clock=clock, sinks=[Recorder(recording, keep=20)], log=False)
 

@@ -39,7 +39,7 @@ def simulated_effects(trial: str = "real") -> list[dict[str, Any]]:
     Groups are those of the simulator's parameters that ``hal/simulated/effects.py`` declares. Of its other
     parameters those count as effects that the trial sets.
     """
-    settings = trial_settings(trial)
+    settings = commented_settings(trial)
     rows, alone = [], []
     for name, info in SimulatorParameters.model_fields.items():
         group = _group(info)
@@ -53,7 +53,7 @@ def simulated_effects(trial: str = "real") -> list[dict[str, Any]]:
     return alone + rows
 
 
-def trial_settings(trial: str) -> dict[str, Setting]:
+def commented_settings(trial: str) -> dict[str, Setting]:
     """What a shipped trial sets of the simulated robot, by the parameter's path below ``robot``."""
     file = shipped_folder() / "trials" / f"{trial}.yaml"
     return {

@@ -204,6 +204,7 @@ class PoweredDrives:
         all_settings = [_motor(hardware, name) for name in self.watched]
         self._sign = np.array([float(motor.sign) for motor in all_settings])
         self._zero = np.array([motor.zero for motor in all_settings])
+        self._low, self._high = np.array([motor.range for motor in self._settings]).T
         self._registers = {
             "mode": Mode.DIRECT_FORCE,
             "limit_i_max": current,
@@ -255,8 +256,8 @@ class PoweredDrives:
         sign = self._sign[rows]
         goals[rows, 0] = 0.0 if current is None else sign * current
         if position is not None:
-            low, high = np.array([motor.range for motor in self._settings]).T
-            goals[rows, 1] = sign * (np.clip(position, low, high) + self._zero[rows])
+            within = np.clip(position, self._low, self._high)
+            goals[rows, 1] = sign * (within + self._zero[rows])
         goals[rows, 2] = 0.0 if velocity is None else sign * velocity
         self._bulk.exchange()
         self._take()

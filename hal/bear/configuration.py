@@ -16,7 +16,7 @@ import yaml
 from ...files.problems import Code, LoadError, Problems, listing, nearest
 from ...files.validation import place_of, read_model
 from ...mathematics.arrays import Array
-from ...mathematics.rotations import exponential, to_matrix
+from ...mathematics.rotations import exponential, from_matrix, logarithm, to_matrix
 from ...robots.robot_description import RobotDescription
 from ...runtime.language.block import UnmetRequirement
 from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
@@ -61,6 +61,14 @@ class BusSettings(Parameters):
     def is_virtual(self) -> bool:
         """Whether the port is that of a twin in virtual time: the file says so, and it is a pseudo-terminal."""
         return self.time == "virtual" and os.path.realpath(self.port).startswith("/dev/pts/")
+
+
+def imu_rotation_of(to_base: Array) -> tuple[float, ...]:
+    """The ``imu_rotation`` of a board by the rotation from its IMU's axes to the base's, (3, 3)."""
+    quaternion, turn = np.zeros(4), np.zeros(3)
+    from_matrix(np.ascontiguousarray(to_base), quaternion)
+    logarithm(quaternion, turn)
+    return tuple(turn.tolist())
 
 
 class BoardSettings(Parameters):
@@ -309,8 +317,11 @@ class Hardware(Parameters):
 
     def torque_constants(self, robot: RobotDescription) -> Array:
         """The torque at the output of every motor for a current [N m/A], (n_motors,)."""
-        given = [self.motors[name].torque_constant for name in robot.transmission.motors]
-        return np.array([each or self.drives.torque_constant for each in given])
+        return np.array([self.torque_constant_of(name) for name in robot.transmission.motors])
+
+    def torque_constant_of(self, motor: str) -> float:
+        """The torque constant of one motor [N m/A]: its own, or that of all drives."""
+        return self.motors[motor].torque_constant or self.drives.torque_constant
 
     def at_ports(self, bus: str, board: str, *, virtual: bool) -> str:
         """The text of a file that is as this one, of a twin behind these ports."""

@@ -123,7 +123,7 @@ def configure(
     drives = hardware.drives
     current = dict(zip("pid", drives.iq_gains, strict=True))
     for name, motor in hardware.motors.items():
-        constant = motor.torque_constant or drives.torque_constant
+        constant = hardware.torque_constant_of(name)
         bus.verify(
             motor.id,
             {

@@ -14,10 +14,7 @@ from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
 
 
 class ImuEffects(Parameters):
-    """What is not ideal in a simulated IMU, besides noise, bias and range; by default nothing.
-
-    A *spread* is half the width of a uniform distribution around the nominal value, drawn by the seed.
-    """
+    """What is not ideal in a simulated IMU, besides noise, bias and range; by default nothing."""
 
     gyro_delay: float = parameter(
         0.0,

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.rotations import from_matrix, logarithm
 from ...robots.robot_description import RobotDescription
-from ..bear.configuration import Hardware
+from ..bear.configuration import Hardware, imu_rotation_of
 from ..simulated.simulated_robot import SimulatorParameters
 from .twin import Twin, standing_twin
 
@@ -87,15 +86,11 @@ class Wiring:
         told = Hardware.for_twin(robot)
         names = robot.transmission.motors
         nominal = told.drives.torque_constant
-        turn = np.zeros(3)
-        quaternion = np.zeros(4)
-        from_matrix(np.ascontiguousarray(self.imu.T), quaternion)
-        logarithm(quaternion, turn)
         board = told.board.model_copy(
             update={
                 "switches": list(self.bits),
                 "normally_closed": [name for name in self.bits if name in self.inverted],
-                "imu_rotation": tuple(turn.tolist()),
+                "imu_rotation": imu_rotation_of(self.imu.T),
                 "imu_position": self.imu_position,
             }
         )

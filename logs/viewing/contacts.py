@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
 from .drawing import ChangedRows, Moments, ScenePart, ThinnedRows
 from .robot_shapes import reach_of
 
-GRAVITY = 9.81
 WEIGHT_ARROW = 0.6
 """The length of the arrow of a robot's weight, as a share of the robot's reach. A robot that stands
 on four points has arrows a quarter as long, which are still easy to see."""

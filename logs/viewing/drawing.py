@@ -207,10 +207,8 @@ class Moments:
         return self.batch.signal(name)[self.due]
 
     def poses(self, robot: RobotDescription, source: PoseSource) -> LinkPoses:
-        """Where the links are at these instants. A fixed base is at the origin."""
-        base, turn = np.zeros((len(self), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(self), 1))
-        if source.base_position is not None and source.base_orientation is not None:
-            base, turn = self[source.base_position], self[source.base_orientation]
+        """Where the links are at these instants."""
+        base, turn = source.base(self.__getitem__, len(self))
         return link_poses(robot, base, turn, self[source.joint_position])
 
 

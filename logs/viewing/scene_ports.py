@@ -7,9 +7,12 @@ from one of these types, or if it has the same fields.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from ...mathematics.arrays import Array
 from ..file.format import Header, RecordedField
 
 
@@ -57,6 +60,13 @@ class PoseSource:
     base_position: str | None
     base_orientation: str | None
     joint_position: str
+
+    def base(self, values: Callable[[str], Array], count: int) -> tuple[Array, Array]:
+        """Positions (count, 3) and quaternions (count, 4) of the base by a signal's ``values``; a fixed one is at
+        the origin."""
+        if self.base_position is None or self.base_orientation is None:
+            return np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+        return values(self.base_position), values(self.base_orientation)
 
     @property
     def block(self) -> str:

@@ -63,14 +63,19 @@ def open_endpoints(machines: Sequence[MachineSpec]) -> list[str]:
         f"machine {spec.name!r} listens at {spec.endpoint}: whoever reaches it can read and command this "
         "graph; `aloft keys` makes certificates for tls/ endpoints"
         for spec in machines
-        if not spec.endpoint.startswith("tls/") and not _is_loopback(spec.endpoint)
+        if _parts(spec.endpoint)[0] != "tls" and not _is_loopback(spec.endpoint)
     ]
 
 
-def _is_loopback(endpoint: str) -> bool:
+def _parts(endpoint: str) -> tuple[str, str, int]:
+    """Scheme, host and port of an endpoint that was checked when the graph was loaded."""
     match = _ENDPOINT.match(endpoint)
-    assert match is not None, "it was checked when the graph was loaded"
-    host = match["host"].strip("[]")
+    assert match is not None, endpoint
+    return match["scheme"], match["host"].strip("[]"), int(match["port"])
+
+
+def _is_loopback(endpoint: str) -> bool:
+    host = _parts(endpoint)[1]
     try:
         return ip_address(host).is_loopback
     except ValueError:
@@ -80,12 +85,11 @@ def _is_loopback(endpoint: str) -> bool:
 def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
     """What one can find out about a machine that was not heard: whether anybody listens at its
     endpoint. Opens a connection and sends nothing."""
-    scheme, _, address = endpoint.partition("/")
+    scheme, host, port = _parts(endpoint)
     if scheme not in ("tcp", "tls"):
         return "nothing was heard"
-    host, _, port = address.rpartition(":")
     try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout).close()
+        socket.create_connection((host, port), timeout).close()
     except OSError as error:
         return f"no connection to {endpoint}: {error.strerror or error}"
     keys = "are the keys of this graph's authority? Or does it" if scheme == "tls" else "does it"

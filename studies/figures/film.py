@@ -15,6 +15,7 @@ from ...hal.simulated.scenes import flat
 from ...logs.file.reader import RecordedRun
 from ...logs.viewing.scene_ports import scene_ports
 from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
 from ...robots.kinematics import link_poses
 from ...runtime.language.errors import AloftError
 from .offscreen import Offscreen, Pixels, View
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".mp4", ".png")
-GRAVITY = 9.81
 WEIGHT_ARROW = 0.5
 """The arrow of a force as large as the robot's weight, as a share of the distance at which the robot stands."""
 FRAMING = 3.0
@@ -78,10 +78,7 @@ class Take:
         count = len(self.time)
         pose = ports.pose
         self.joints = run[pose.joint_position]
-        self.base = np.zeros((count, 3))
-        self.turn = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-        if pose.base_position is not None and pose.base_orientation is not None:
-            self.base, self.turn = run[pose.base_position], run[pose.base_orientation]
+        self.base, self.turn = pose.base(run.__getitem__, count)
         self._points = self._forces = np.zeros((count, 0, 3))
         if camera.forces and ports.contact_position and ports.contact_force:
             self._points, self._forces = run[ports.contact_position], run[ports.contact_force]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ....mathematics.arrays import Array
-from ....mathematics.rotations import from_matrix, logarithm
+from ....mathematics.constants import GRAVITY
+from ..configuration import imu_rotation_of
 from .session import PACKET_TIME, Request, Session, StepReport
 
-GRAVITY = 9.81
 GRAVITY_ERROR = 0.1
 """The share of gravity by which the accelerometer may differ at rest."""
 QUARTER = 0.5 * np.pi
@@ -85,7 +85,7 @@ def _mounting(force: Array, turned: Array, report: StepReport) -> Array | None:
     robot's axes in the board's frame. ``None`` if there is none, which is noted."""
     axes, spins = _nearest_rotation(force), _nearest_rotation(turned)
     straight = min(_straightness(axes, force), _straightness(spins, turned))
-    between = np.arccos(np.clip(0.5 * (np.trace(axes.T @ spins) - 1.0), -1.0, 1.0))
+    between = _angle_between(axes, spins)
     left_handed = np.linalg.det(force) < 0.0 and np.linalg.det(turned) < 0.0
     place = "IMU"
     if left_handed:
@@ -117,6 +117,11 @@ def _nearest_rotation(measured: Array, known: Array | None = None) -> Array:
     return rotation
 
 
+def _angle_between(one: Array, other: Array) -> float:
+    """By how much two rotations (3, 3) differ [rad]."""
+    return float(np.arccos(np.clip(0.5 * (np.trace(one.T @ other) - 1.0), -1.0, 1.0)))
+
+
 def _straightness(rotation: Array, measured: Array) -> float:
     """The least cosine between a measured column and that of the rotation."""
     sizes = np.linalg.norm(measured, axis=0)
@@ -129,12 +134,9 @@ def _note_mounting(session: Session, rotation: Array, report: StepReport) -> Non
     is_square = np.array_equal(np.abs(square).sum(axis=0), np.ones(3))
     if is_square and _straightness(square, rotation) > np.cos(SQUARE_ERROR):
         rotation = square
-    quaternion, turn = np.zeros(4), np.zeros(3)
-    from_matrix(np.ascontiguousarray(rotation.T), quaternion)
-    logarithm(quaternion, turn)
-    written = [round(float(angle), 4) for angle in turn]
+    written = [round(angle, 4) for angle in imu_rotation_of(rotation.T)]
     told = session.hardware.board.imu_to_base
-    apart = np.arccos(np.clip(0.5 * (np.trace(told @ rotation) - 1.0), -1.0, 1.0))
+    apart = _angle_between(told.T, rotation)
     report.values["imu_rotation"] = written
     if apart > SQUARE_ERROR:
         report.add(
