@@ -36,6 +36,8 @@ SETTLING = 0.15
 class CourseRecord(StandRecord):
     """What the judgement of a course needs. Places are those of the middle of the feet."""
 
+    middle = Field(2, unit="m", text="middle of the feet, when it was last found")
+    heading = Field(unit="rad", text="their heading then")
     start = Field(2, unit="m", text="where it stood before the first jump")
     start_heading = Field(unit="rad", text="its heading then")
     unloaded = Field(unit="s", text="for how long all points have been off the ground")
@@ -143,7 +145,9 @@ class CourseScore(Block):
         if record_fall(truth, record, params, constants):
             scratch.ending = CourseEnding.FELL
         if goal.number == 0:
-            note_start(record)
+            find_place(record)
+            record.start[:] = record.middle
+            record.start_heading = record.heading
         record_landings(truth, goal, record, params, constants)
         over = params.jumps > 0 and record.jumps >= params.jumps
         rested = now - record.landed_time >= params.rest_time - 1e-9
@@ -202,16 +206,16 @@ class CourseScore(Block):
 
 
 @kernel
-def note_start(record: CourseRecord) -> None:
-    """Note where the feet stand, and their heading."""
-    record.start[:] = 0.0
+def find_place(record: CourseRecord) -> None:
+    """Find the middle of the feet and their heading."""
+    record.middle[:] = 0.0
     x = y = 0.0
     feet = record.foot.shape[0]
     for foot in range(feet):
-        record.start[:] += record.foot[foot] / feet
+        record.middle[:] += record.foot[foot] / feet
         x += record.direction[foot, 0]
         y += record.direction[foot, 1]
-    record.start_heading = atan2(y, x)
+    record.heading = atan2(y, x)
 
 
 @kernel
@@ -245,17 +249,12 @@ def record_landings(
 @kernel
 def measure_place(record: CourseRecord) -> None:
     """Compare the place of the feet with the target."""
-    x = y = ahead = aside = 0.0
-    feet = record.foot.shape[0]
-    for foot in range(feet):
-        x += (record.foot[foot, 0] - record.start[0]) / feet
-        y += (record.foot[foot, 1] - record.start[1]) / feet
-        ahead += record.direction[foot, 0]
-        aside += record.direction[foot, 1]
+    find_place(record)
+    x, y = record.middle[0] - record.start[0], record.middle[1] - record.start[1]
     cosine, sine = cos(record.start_heading), sin(record.start_heading)
     dx = cosine * x + sine * y - record.target[0]
     dy = cosine * y - sine * x - record.target[1]
-    turn = atan2(aside, ahead) - record.start_heading - record.target_heading
+    turn = record.heading - record.start_heading - record.target_heading
     record.place_error = sqrt(dx * dx + dy * dy)
     record.place_errors += record.place_error
     record.worst_place_error = max(record.worst_place_error, record.place_error)
