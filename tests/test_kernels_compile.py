@@ -66,6 +66,8 @@ NOT_HOT = {
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
     "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
+    "hal.bear.bring_up.imu_step._angle_between": "of a bring-up, with nothing under power",
+    "hal.bear.configuration.imu_rotation_of": "when a file of the hardware is written",
     "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
     "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
     "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
