@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from ..cli.shared.check_up import check_up, obstacles_to_jumping
 from ..planner.library.library import shipped_folder
 from ..robots.description import ReadRobot, RobotError, read
 from ..robots.importing.urdf_text import find_file
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
+from ..studies.check_up import check_up, obstacles_to_jumping
 from .rows import Row
 
 ONE = "package://example-robot-data/robots/go2_description/urdf/go2.urdf"

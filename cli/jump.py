@@ -175,7 +175,7 @@ def about_robot(name: str, out: Console) -> dict[str, Any]:
         AloftError: the robot cannot jump whatever is asked for; the message says why.
     """
     from ..robots.description import path_of, read
-    from .shared.check_up import obstacles_to_jumping
+    from ..studies.check_up import obstacles_to_jumping
 
     found = read(path_of(name))
     for note in found.notes:
@@ -188,7 +188,7 @@ def about_robot(name: str, out: Console) -> dict[str, Any]:
 
 def stronger_motors(task: JumpTask, graph: Graph, out: Console) -> dict[str, Any]:
     """Say by which factor stronger motors would do, where they are what is in the way of a task."""
-    from .shared.check_up import torque_factor
+    from ..studies.check_up import torque_factor
 
     assert graph.checked.robot is not None
     factor = torque_factor(task, graph.checked.robot)

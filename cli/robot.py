@@ -72,7 +72,7 @@ def show(
 @robot.command("check-up")
 def check_up(name: Name, as_json: AsJson = False) -> None:
     """Look for what seems wrong: masses, inertias, axes, limits, sides, standing torque, bandwidth."""
-    from .shared import check_up as looking
+    from ..studies import check_up as looking
 
     with _faults_reported(as_json):
         found = looking.check_up(_read(name).description)
@@ -93,7 +93,12 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
     out.print(table(f"{found['name']}, {found['mass_kg']:.4g} kg", columns, rows))
     for remark in found["remarks"]:
         say(out, f"{remark['part']}: {remark['found']}; usual: {remark['usual']}")
-    say(out, f"{len(found['remarks'])} things look unusual" if found["remarks"] else "nothing looks wrong")
+    say(
+        out,
+        f"{len(found['remarks'])} things look unusual"
+        if found["remarks"]
+        else "nothing looks wrong",
+    )
 
 
 def _show_effects(name: str, as_json: bool) -> None:

@@ -123,7 +123,9 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
         frames[body.name] = frame
         carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
         carrier.capsules += [each.moved(frame.rotation, frame.position) for each in body.capsules]
-    moving_links = {n: link for n, link in links.items() if n != start.name or found_joint != "fixed"}
+    moving_links = {
+        n: link for n, link in links.items() if n != start.name or found_joint != "fixed"
+    }
     bare, notes = _complete_links(moving_links, joints)
     if bare:
         tree = build(model, [*welded, *bare.values()], base_joint)
@@ -163,7 +165,9 @@ def _complete_links(
         link, whole = links[name], joined(links[name].bodies)
         if abs(whole.mass) < NO_MASS:
             behind = [j["child"] for j in joints if j["parent"] == name and j["child"] not in bare]
-            heavy = next((links[child] for child in behind if joined(links[child].bodies).mass > 0.0), None)
+            heavy = next(
+                (links[child] for child in behind if joined(links[child].bodies).mass > 0.0), None
+            )
             if heavy is None:
                 if name in carrier:
                     bare[name] = carrier[name]
@@ -176,7 +180,9 @@ def _complete_links(
             radius = (3.0 * whole.mass / (4.0 * np.pi * WATER)) ** (1.0 / 3.0)
             ball = 0.4 * whole.mass * radius**2 * np.eye(3)
             link.bodies[:] = [Inertial(whole.mass, whole.com, ball)]
-            notes.append(f"link {name} has no inertia: it is a ball of its mass and of water's density here")
+            notes.append(
+                f"link {name} has no inertia: it is a ball of its mass and of water's density here"
+            )
     return bare, notes[::-1]
 
 

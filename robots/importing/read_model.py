@@ -66,7 +66,9 @@ def read_model(path: Path) -> RawModel:
         notes.append(f"joint {name} has a range of 0 to 0 in the URDF and is fixed here")
     for name, joint in limits.items():
         if joint.range == "free":
-            notes.append(f"joint {name} has no lower and upper limit in the URDF and turns freely here")
+            notes.append(
+                f"joint {name} has no lower and upper limit in the URDF and turns freely here"
+            )
     names = [model.body(k).name for k in range(model.nbody)]
     bodies = {}
     for k in range(1, model.nbody):

@@ -30,8 +30,13 @@ def _leg(side: str, y: float) -> str:
 STICKS = f"""<mujoco model="sticks"><compiler angle="degree"/><worldbody>
 <body name="torso" pos="0 0 1"><freejoint/><geom type="box" size=".05 .1 .05" mass="5"/>
 {_leg("left", 0.1)}{_leg("right", -0.1)}</body></worldbody><actuator>
-{"".join(f'<motor joint="{side}_{joint}" gear="50" ctrlrange="-1 1"/>'
-         for side in ("left", "right") for joint in ("hip", "knee"))}
+{
+    "".join(
+        f'<motor joint="{side}_{joint}" gear="50" ctrlrange="-1 1"/>'
+        for side in ("left", "right")
+        for joint in ("hip", "knee")
+    )
+}
 </actuator></mujoco>"""
 """A robot on two legs that bend ahead and back."""
 
@@ -114,7 +119,9 @@ def test_every_robot_with_a_shipped_jump_can_be_named() -> None:
     assert (path.name, settings) == ("go2_jump.yaml", [])
     path, settings = graph_of("hyq")
     assert (path.name, settings[0]) == ("jump.yaml", "robot=hyq")
-    with pytest.raises(AloftError, match=r"--robot atlas: no robot called 'atlas'; there is bruce, "):
+    with pytest.raises(
+        AloftError, match=r"--robot atlas: no robot called 'atlas'; there is bruce, "
+    ):
         graph_of("atlas")
     with pytest.raises(AloftError, match=r"--robot a\.urdf: no robot description at a\.urdf"):
         graph_of("a.urdf")
@@ -134,7 +141,11 @@ def test_a_file_of_a_robot_is_enough(folder: Path) -> None:
     ("old", "new", "error"),
     [
         ("<freejoint/>", "", "sticks cannot jump: its base is fixed: write base_joint: floating"),
-        (' gear="50"', ' gear="1"', "sticks cannot jump: motor left_knee has 1 N m, and standing alone"),
+        (
+            ' gear="50"',
+            ' gear="1"',
+            "sticks cannot jump: motor left_knee has 1 N m, and standing alone",
+        ),
     ],
 )
 def test_what_keeps_a_robot_from_jumping_is_said(

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from tests.robots.limbed_robots import quadruped
 
 from aloft.planner.library.library import solve_and_check

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...mathematics.arrays import Array
+from ..mathematics.arrays import Array
 
 if TYPE_CHECKING:
-    from ...robots.description import RobotDescription
-    from ...robots.robot_description import Link
+    from ..robots.description import RobotDescription
+    from ..robots.robot_description import Link
 
 
 HEAVY = 0.5
 """A link that is no base and has a larger share of the robot's mass is named."""
-SLENDER, WIDE = 0.1, 1.2
+SLENDER, WIDE = 0.1, 1.5
 """Radii of gyration, as shares of the farthest that a link's shapes reach from its centre of mass."""
 AWAY = 1.5
 """A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
@@ -102,7 +102,9 @@ def _limits(robot: RobotDescription) -> Iterator[Remark]:
     """Limits, and how the standing robot keeps off them."""
     for k, joint in enumerate(robot.joints):
         if joint.limits is None:
-            yield Remark(f"joint {joint.name}", "no limits", "a range, for the planner and the stops")
+            yield Remark(
+                f"joint {joint.name}", "no limits", "a range, for the planner and the stops"
+            )
             continue
         low, high = joint.limits
         if joint.kind == "hinge" and high - low > 2.0 * math.pi + 1e-6:
@@ -117,8 +119,8 @@ def _limits(robot: RobotDescription) -> Iterator[Remark]:
 
 def _sides(robot: RobotDescription) -> Iterator[Remark]:
     """Legs of which left and right differ, and signs of joints that do."""
-    from ...planner.models.symmetry import mirrored_pairs
-    from ...robots.welding import welded
+    from ..planner.models.symmetry import mirrored_pairs
+    from ..robots.welding import welded
 
     if not robot.feet:
         return
@@ -139,7 +141,9 @@ def _sides(robot: RobotDescription) -> Iterator[Remark]:
         ]
         if signs:
             yield Remark(
-                "signs", f"{', '.join(signs)} turn opposite ways about y", "the same way, left and right"
+                "signs",
+                f"{', '.join(signs)} turn opposite ways about y",
+                "the same way, left and right",
             )
 
 
@@ -153,20 +157,30 @@ def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Rem
                          "less than half")  # fmt: skip
         elif share is not None and share > 0.5:
             yield Remark(
-                f"motor {row['motor']}", f"standing takes {share:.0%} of its peak torque", "less than half"
+                f"motor {row['motor']}",
+                f"standing takes {share:.0%} of its peak torque",
+                "less than half",
             )
-        if row["bandwidth_hz"] is not None and row["bandwidth_hz"] < SLOW and row["motor"] not in held:
+        if (
+            row["bandwidth_hz"] is not None
+            and row["bandwidth_hz"] < SLOW
+            and row["motor"] not in held
+        ):
             yield Remark(f"motor {row['motor']}", f"a bandwidth of {row['bandwidth_hz']:.2g} Hz",
                          f"{SLOW:g} Hz or more")  # fmt: skip
     if not any(robot.motors.rotor_inertia):
-        yield Remark("the motors", "rotor inertia zero", "more: it is most of a joint's inertia where gears are high")
+        yield Remark(
+            "the motors",
+            "rotor inertia zero",
+            "more: it is most of a joint's inertia where gears are high",
+        )
 
 
 def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
     """Of every motor its peak torque, what standing takes of it (none without feet), and the bandwidth:
     how often a second it could turn its joint by ``STEP`` and back, everything behind it at rest."""
-    from ...hal.simulated.mujoco_model import build_mujoco_model
-    from ...hal.simulated.stance import joint_inertias, standing_torques
+    from ..hal.simulated.mujoco_model import build_mujoco_model
+    from ..hal.simulated.stance import joint_inertias, standing_torques
 
     model = build_mujoco_model(robot)
     needed = standing_torques(robot, model) if robot.contacts else None
@@ -189,7 +203,9 @@ def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
 def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
     """What keeps a robot from jumping whatever the jump, in its own terms; empty where nothing does."""
     if robot.base_joint != "floating":
-        return [f"its base is {robot.base_joint}: write base_joint: floating, if it can leave the ground"]
+        return [
+            f"its base is {robot.base_joint}: write base_joint: floating, if it can leave the ground"
+        ]
     if not robot.contacts:
         return ["it has no feet: write them under feet: [{name: NAME, at: LINK, radius: METRES}]"]
     weak = [
@@ -204,8 +220,8 @@ def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
 def torque_factor(task: Any, robot: RobotDescription) -> float | None:
     """How many times as strong and fast the motors must be for a task to have a plan; none where they are
     not what is in the way."""
-    from ...planner.library.library import solve_and_check
-    from ...planner.task.files import JumpTaskError, PlanError
+    from ..planner.library.library import solve_and_check
+    from ..planner.task.files import JumpTaskError, PlanError
 
     for factor in FACTORS:
         try:
@@ -233,4 +249,3 @@ def with_stronger_motors(robot: RobotDescription, factor: float) -> RobotDescrip
         scaled = {key: factor * getattr(profile, key) for key in SCALED}
         profiles[name] = profile.model_copy(update={**scaled, "motors": motors})
     return robot.changed(profiles=profiles)
-
