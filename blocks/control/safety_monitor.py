@@ -519,10 +519,11 @@ def measured_value(health: RobotHealth, fault: int, place: int) -> float:
 @kernel
 def first_bad_switch(switches: SwitchHealth) -> int:
     """The first foot switch that is at fault; the last one if none is."""
-    place = 0
-    while place < switches.fault.shape[0] - 1 and switches.fault[place] == SwitchFault.NONE:
-        place += 1
-    return place
+    last = switches.fault.shape[0] - 1
+    for place in range(last):
+        if switches.fault[place] != SwitchFault.NONE and switches.fault[place] != SwitchFault.HEAVY:
+            return place
+    return last
 
 
 # What the drives get
