@@ -519,11 +519,10 @@ def measured_value(health: RobotHealth, fault: int, place: int) -> float:
 @kernel
 def first_bad_switch(switches: SwitchHealth) -> int:
     """The first foot switch that is at fault; the last one if none is."""
-    last = switches.fault.shape[0] - 1
-    for place in range(last):
-        if switches.fault[place] != SwitchFault.NONE and switches.fault[place] != SwitchFault.HEAVY:
-            return place
-    return last
+    place, fault = 0, switches.fault
+    while place < fault.shape[0] - 1 and (fault[place] == 0 or fault[place] == SwitchFault.HEAVY):
+        place += 1
+    return place
 
 
 # What the drives get
