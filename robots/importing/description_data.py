@@ -330,6 +330,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     welded = [*overlay.welded(joints), *model.mimics]
     base_joint = added.get("base_joint", "")
     built = build(model, welded, base_joint if isinstance(base_joint, str) else "")
+    notes += built.notes
     overlay.change("links", built.links, Link)
     overlay.change("joints", built.joints, Joint)
     feet, contacts = overlay.feet(built)

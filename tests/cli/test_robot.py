@@ -96,6 +96,9 @@ def test_what_is_missing_is_said_with_what_to_write(
 ) -> None:
     (tmp_path / "leg.xml").write_text(ONE_LEG)
     monkeypatch.chdir(tmp_path)
+    guessed = run_here("robot", "show", "leg.xml").stdout
+    assert "note: the feet are guessed: foot" in guessed and "standing is not given" in guessed
+    (tmp_path / "leg.yaml").write_text("feet: []\n")
     notes = [n for n in run_here("robot", "show", "leg.xml").stdout.splitlines() if "note:" in n]
     assert notes == [
         "note: no speed limit of hip, knee: 20 rad/s is assumed",
