@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +39,6 @@ from .sensor_identification import (
     standing_span,
 )
 from .transmission import SLIDING_SPEED
-
-if TYPE_CHECKING:
-    from .calibration import Calibration
 
 EVERY = 8
 """Of the filtered ticks every eighth is used."""
@@ -318,14 +315,14 @@ def _equations(
     return np.array(all_rows), np.array(all_right), np.array(all_free)
 
 
-def _seated(motion: MeasuredRun, sensors: IdentifiedSensors | Calibration, span: slice) -> Array:
+def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Array:
     """The joints' angles without the play of their gears."""
     width = np.array([each.value for each in sensors.play.values()])
     return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
 
 
 def filtered_motion(
-    motion: MeasuredRun, sensors: IdentifiedSensors | Calibration, span: slice,
+    motion: MeasuredRun, sensors: IdentifiedSensors, span: slice,
     cutoff: float = CUTOFF,
 ) -> tuple[Array, ...]:  # fmt: skip
     """The filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's

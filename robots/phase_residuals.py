@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
-from .calibration import Calibration
-from .identification import MeasuredRun
+from .calibration import Calibration, Value
+from .identification import Estimate, MeasuredRun
 from .motor_identification import SOFT_SPEED, filtered_motion
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
-from .sensor_identification import EDGE
+from .sensor_identification import EDGE, IdentifiedSensors
 from .transmission import SLIDING_SPEED
 
 CUTOFF = 25.0
@@ -83,7 +83,7 @@ def _errors(
     data = model.createData()
     whole = slice(0, len(motion.position))
     angles, speeds, bends, turning, turns, force, torque = filtered_motion(
-        motion, found, whole, CUTOFF
+        motion, _sensors(found), whole, CUTOFF
     )
     window = 2 * round(BOUNCE / motion.period) + 1
     loaded = np.array([
@@ -113,6 +113,19 @@ def _errors(
             error -= used.T @ (used @ error)
         errors.append(error)
     return np.array(errors)
+
+
+def _sensors(found: Calibration) -> IdentifiedSensors:
+    """What was found of the sensors."""
+
+    def one(value: Value) -> Estimate:
+        return Estimate(value.value, value.std)
+
+    return IdentifiedSensors(
+        tuple(map(one, found.imu_position)), tuple(map(one, found.imu_rotation)),
+        one(found.gyro_age), one(found.accelerometer_age), one(found.velocity_age),
+        {name: one(value) for name, value in found.play.items()}, one(found.gear_compliance), {},
+    )  # fmt: skip
 
 
 def _given(robot: RobotDescription, found: Calibration, speeds: Array, torque: Array) -> Array:
