@@ -121,6 +121,9 @@ class WholeBodyTarget(Signal):
     com_acceleration = Field(3, unit="m/s^2", frame="world", text="its feedforward acceleration")
     orientation = Field(4, unit="", text="base quaternion x, y, z, w")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
+    angular_acceleration = Field(
+        3, unit="rad/s^2", frame="body", text="its feedforward acceleration"
+    )
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its feedforward rate")
     joint_position = Field("n_joints", unit="rad", text="planned angles, for feet that roll")
