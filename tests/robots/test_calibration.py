@@ -56,14 +56,14 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
         np.ones(result.ticks, dtype=np.bool_),
     )  # fmt: skip
     params = next(block.params for block in graph.checked.blocks if block.path == "robot")
-    drawn = draw_variation(params, ROBOT)
+    drawn, pack = draw_variation(params, ROBOT), params.battery.of(ROBOT)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
     return found, {
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
         "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
         "constants": list(told_values(graph)["robot.motor_model.torque_constant"].values()),
-        "resistance": params.battery.resistance, "voltage": params.battery.open_voltage,
+        "resistance": pack.resistance, "voltage": pack.open_voltage,
     }  # fmt: skip
 
 
