@@ -264,14 +264,17 @@ def _sort_ports(layers: Layers, diagram: Diagram) -> None:
         found.setdefault((*wire.source[:1], True, wire.source[1]), []).append(far)
         found.setdefault((*wire.target[:1], False, wire.target[1]), []).append(far)
 
-    def mean(path: str, is_output: bool, port: str) -> float:
-        places = found.get((path, is_output, port), [far])
-        return sum(places) / len(places)
+    def wired_to(path: str, is_output: bool) -> Callable[[str], float]:
+        def mean(port: str) -> float:
+            places = found.get((path, is_output, port), [far])
+            return sum(places) / len(places)
+
+        return mean
 
     for path, node in diagram.nodes.items():
         if node.inside is None and path not in (INTO, OUT):
-            node.inputs.sort(key=lambda port, path=path: mean(path, False, port))
-            node.outputs.sort(key=lambda port, path=path: mean(path, True, port))
+            node.inputs.sort(key=wired_to(path, False))
+            node.outputs.sort(key=wired_to(path, True))
 
 
 def _shares(ports: Sequence[str]) -> dict[str, float]:
