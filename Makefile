@@ -23,7 +23,7 @@ SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # tests/conftest.py makes one worker more than there are cores, as some tests wait.
 WORKERS := --numprocesses auto --dist worksteal
 
-.PHONY: setup jump test test-all lint format bench plans docs clean help
+.PHONY: setup jump test test-all lint format bench plans docs site clean help
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##/\1:/p' $(MAKEFILE_LIST)
@@ -77,7 +77,11 @@ docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/python docs/refresh.py
 	@$(BIN)/python docs/make_pictures.py
 
+site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves
+	@$(BIN)/python -m sphinx -q --fail-on-warning --keep-going -c docs -d build/doctrees . site
+	@echo "site/index.html"
+
 clean:  ## remove all that these targets made
-	rm -rf $(VENV) build dist *.egg-info recordings
+	rm -rf $(VENV) build dist site *.egg-info recordings
 	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

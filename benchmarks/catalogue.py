@@ -17,6 +17,7 @@ from .agreement import agreement
 from .background import background
 from .courses import courses
 from .driver import driver
+from .every_robot import every_robot
 from .frontier.frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.jumps import jumps
@@ -48,9 +49,10 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "real_robot": real_robot,
     "frontier": frontier,
     "courses": courses,
+    "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays", "courses")
+LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays", "courses", "every_robot")
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),

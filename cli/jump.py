@@ -61,7 +61,9 @@ class JumpOptions:
 class TrialOptions:
     """Which graph runs, in which trial."""
 
-    robot: Annotated[str, typer.Option(help="Which robot jumps.")] = "bruce"
+    robot: Annotated[
+        str, typer.Option(help="Which robot jumps: its name, or a URDF, MJCF or YAML file.")
+    ] = "bruce"
     graph: Annotated[
         Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
     ] = None
@@ -121,10 +123,12 @@ def jump(
             raise AloftError(
                 "--seeds runs many seeds and records nothing: leave out --seed, --record"
             )
-        path = running.graph or graph_of(running.robot)
+        path, own = (running.graph, []) if running.graph else graph_of(running.robot)
         lengths = {name: getattr(asked, name) for name in FIELDS}
-        changes = task_changes(lengths, asked.rise, asked.turn, path)
-        settings = [*settings_for(changes, running.trial), *(running.overrides or [])]
+        about = about_robot(running.robot, out) if own else {}
+        changes = task_changes(lengths, asked.rise, asked.turn, path, own)
+        chosen = [*settings_for(changes, running.trial), *(running.overrides or [])]
+        settings = [*own, *chosen]
         many = parse_seeds(seeds) if seeds else []
         if learning.learn is not None:
             if seeds or recording.no_record or planning.rehearse:
@@ -134,8 +138,8 @@ def jump(
                 )
             corrected_parameters(flatten(path, settings))  # refuses a graph without them
             record = recording.record or Path("recordings") / "jump.rrd"
-            rise = changes.get("rise") or usual_rise(path) or 0.0
-            prepare = planner_of(path, running, planning.nearest, console(quiet=True))
+            rise = changes.get("rise") or usual_rise(path, own) or 0.0
+            prepare = planner_of(path, own, running, planning.nearest, console(quiet=True))
             raise typer.Exit(
                 learn_jumps(prepare, changes, rise, learning, seed, record, out, as_json)
             )
@@ -144,9 +148,11 @@ def jump(
         say(out, f"{task.robot} jumps: {task.name}")
         planned = plan_of(task, loaded, planning.nearest, out)
         if not planned["success"]:
+            if own:
+                planned |= stronger_motors(task, loaded, out)
             if as_json:
                 why = {"success": False, "reason": planned["reason"], "recording": None}
-                print_json({"asked": changes, "plan": planned, **why})
+                print_json({"asked": changes, "plan": planned, **about, **why})
             raise typer.Exit(ExitCode.NOT_SUCCESSFUL)
         library = library_of(loaded)
         planned |= rehearsal(path, settings, task, library, planning.rehearse, out)
@@ -158,15 +164,47 @@ def jump(
             default = Path("recordings") / "jump.rrd"
             place = None if recording.no_record else recording.record or default
             options = OneRunOptions(record=place, as_json=as_json, times=False)
-            code = run_once(loaded, options, out, also={"asked": changes, "plan": planned})
+            code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 
 
-def planner_of(path: Path, running: TrialOptions, nearest: bool, out: Console) -> Prepare:
+def about_robot(name: str, out: Console) -> dict[str, Any]:
+    """Say what was guessed of a robot whose file says little, and return it for the JSON object.
+
+    Raises:
+        AloftError: the robot cannot jump whatever is asked for; the message says why.
+    """
+    from ..robots.description import path_of, read
+    from ..studies.check_up import obstacles_to_jumping
+
+    found = read(path_of(name))
+    for note in found.notes:
+        say(out, f"  - {note}")
+    wrong = obstacles_to_jumping(found.description)
+    if wrong:
+        raise AloftError(f"{found.description.name} cannot jump: {'; '.join(wrong)}")
+    return {"guessed": list(found.notes)}
+
+
+def stronger_motors(task: JumpTask, graph: Graph, out: Console) -> dict[str, Any]:
+    """Say by which factor stronger motors would do, where they are what is in the way of a task."""
+    from ..studies.check_up import torque_factor
+
+    assert graph.checked.robot is not None
+    factor = torque_factor(task, graph.checked.robot)
+    if factor is not None:
+        say(out, f"with motors {factor:g} times as strong and fast there is a plan")
+    return {"motors_needed": factor}
+
+
+def planner_of(
+    path: Path, own: Sequence[str], running: TrialOptions, nearest: bool, out: Console
+) -> Prepare:
     """What plans a task and loads its graph, with the trial and settings of the command line."""
 
     def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
-        settings = [*settings_for(changes, running.trial), *(running.overrides or []), *further]
+        chosen = [*settings_for(changes, running.trial), *(running.overrides or [])]
+        settings = [*own, *chosen, *further]
         loaded = load_jump(path, settings, None)
         task = task_of(loaded)
         planned = plan_of(task, loaded, nearest, out)
@@ -178,8 +216,11 @@ def planner_of(path: Path, running: TrialOptions, nearest: bool, out: Console) -
     return prepare
 
 
-def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> dict[str, float]:
-    """What the command line says of the task, in SI units, by the task's parameters.
+def task_changes(
+    lengths: dict[str, str], rise: str, turn: str, path: Path, own: Sequence[str] = ()
+) -> dict[str, float]:
+    """What the command line says of the task, in SI units, by the task's parameters; ``own`` are settings
+    that name the graph's robot.
 
     Raises:
         AloftError: a quantity has no unit or a wrong one, is beyond what a task may ask for, or two
@@ -203,7 +244,7 @@ def task_changes(lengths: dict[str, str], rise: str, turn: str, path: Path) -> d
         found["rise"] = quantity("rise", rise, "m", "12cm")
         check_limits("rise", rise, "rise", found["rise"], "m")
     elif found.get("landing_height", 0.0) > 0.0:
-        usual = usual_rise(path)
+        usual = usual_rise(path, own)
         needed = round(found["landing_height"] + ABOVE_A_STEP, 6)
         if usual is None or needed > usual:
             found["rise"] = needed
@@ -244,9 +285,9 @@ def check_limits(name: str, text: str, field: str, value: float, unit: str) -> N
             raise AloftError(f"--{name} {text}: it must be more than {limit.gt:g} {unit}")
 
 
-def usual_rise(path: Path) -> float | None:
+def usual_rise(path: Path, own: Sequence[str]) -> float | None:
     """The rise that the graph's own task asks for [m]."""
-    return task_of(load_jump(path, [], None)).rise
+    return task_of(load_jump(path, [*own], None)).rise
 
 
 def settings_for(asked: Mapping[str, float], trial: str) -> list[str]:

@@ -69,6 +69,38 @@ def show(
             say(console(), f"drawn to {picture}")
 
 
+@robot.command("check-up")
+def check_up(name: Name, as_json: AsJson = False) -> None:
+    """Look for what seems wrong: masses, inertias, axes, limits, sides, standing torque, bandwidth."""
+    from ..studies import check_up as looking
+
+    with _faults_reported(as_json):
+        found = looking.check_up(_read(name).description)
+    if as_json:
+        print_json({"success": True, **found})
+        return
+    rows = [
+        (
+            row["motor"],
+            f"{row['peak_torque']:.4g} {row['unit']}",
+            "" if row["standing_share"] is None else f"{row['standing_share']:.0%}",
+            "" if row["bandwidth_hz"] is None else f"{row['bandwidth_hz']:.3g}",
+        )
+        for row in found["motors"]
+    ]
+    columns = ("motor", ">peak", ">of it for standing", ">bandwidth Hz")
+    out = console()
+    out.print(table(f"{found['name']}, {found['mass_kg']:.4g} kg", columns, rows))
+    for remark in found["remarks"]:
+        say(out, f"{remark['part']}: {remark['found']}; usual: {remark['usual']}")
+    say(
+        out,
+        f"{len(found['remarks'])} things look unusual"
+        if found["remarks"]
+        else "nothing looks wrong",
+    )
+
+
 def _show_effects(name: str, as_json: bool) -> None:
     """Print the effects that a simulated robot can have."""
     from .shared.simulated_effects import effect_rows, simulated_effects
@@ -174,9 +206,11 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
     """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
     and ``AloftError`` for one that must not be written."""
-    from ..robots.description import MODEL_FILES
+    from ..robots.description import MODEL_FILES, OTHER_FORMATS, read
     from ..robots.importing.new_yaml import new_yaml
 
+    if file.suffix in OTHER_FORMATS:
+        read(file)  # says what to do instead
     if file.suffix not in MODEL_FILES:
         kinds = ", ".join(MODEL_FILES)
         raise AloftError(f"{file} is no URDF or MJCF file: its name ends in none of {kinds}")

@@ -1,7 +1,8 @@
 """Makes the pictures of the README: ``python docs/make_pictures.py`` from the root.
 
 That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card; that of
-the page of a running graph, which ``python docs/make_pictures.py live`` makes alone, needs Chromium.
+the page of a running graph needs Chromium. ``python docs/make_pictures.py live`` makes that alone, ``gallery``
+those of docs/gallery.md.
 """
 
 from __future__ import annotations
@@ -43,6 +44,21 @@ FILMED = {
     "Go2": ("graphs/robots/go2_forward.yaml", []),
 }
 """The runs of the film: caption, graph and settings."""
+GALLERY = (
+    ("mass", "gallery/mass.yaml", "plot", "RECORDING", "place.y", "pid.u"),
+    ("cart_pole", "projects/cart_pole/balance.yaml", "render", "RECORDING", "--at", "4.3", "--distance", "3.5"),
+    ("swing_up", "projects/cart_pole/swing_up.yaml", "plot", "RECORDING", "robot.joints.position"),
+    ("arm", "projects/arm/reach.yaml", "render", "RECORDING", "--at", "1.5"),
+    ("hop", "gallery/hop.yaml", "plot", "RECORDING", "robot.joints.position", "phase.state.index"),
+    ("ball", "gallery/ball.yaml", "plot", "RECORDING", "ball_height.y", "ball_place.y", "cup_place.y"),
+    ("mass_two", "gallery/mass_two.yaml", "graph", "GRAPH"),
+    ("push", "gallery/push.yaml", "graph", "GRAPH"),
+    ("ros2", "gallery/ros2.yaml", "graph", "GRAPH"),
+    ("fmu", "gallery/fmu.yaml", "graph", "GRAPH"),
+    ("urdf", "projects/arm/urdf.yaml", "render", "RECORDING", "--at", "3", "--distance", "2.2"),
+    ("jump", "../graphs/jump.yaml", "render", "RECORDING", "--at", "1.1"),
+)  # fmt: skip
+"""Pictures of the gallery: name, graph, and the verb that draws it with what it is given."""
 THRUST = 0.98
 """An instant [s] late in the thrust, when the forces are large."""
 PATIENCE = 300.0
@@ -99,8 +115,24 @@ def save_film(path: Path) -> None:
         write_film(path, pictures(takes, times, camera), 20.0)
 
 
+def save_gallery(folder: Path) -> None:
+    """The pictures of docs/gallery.md, each by the program: what it runs, then how it shows that."""
+    with tempfile.TemporaryDirectory() as made:
+        for name, graph, *shown in GALLERY:
+            file, recording = FOLDER / graph, Path(made) / f"{name}.rrd"
+            if "RECORDING" in shown:
+                load(file).run(sinks=[Recorder(recording)])
+            words = [str(file) if word == "GRAPH" else word for word in shown]
+            words = [str(recording) if word == "RECORDING" else word for word in words]
+            suffix = {"render": ("-o", "png")}.get(shown[0], ("--svg", "svg"))
+            target = folder / f"{name}.{suffix[1]}"
+            command = [sys.executable, "-m", "aloft", *words, suffix[0], str(target)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
 def main() -> None:
     """Make all pictures."""
+    save_gallery(FOLDER / "gallery")
     save_film(FOLDER / "jumps.gif")
     graph = load(JUMP)
     with tempfile.TemporaryDirectory() as folder:
@@ -169,7 +201,9 @@ def _live(name: str) -> LiveRun:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["live"]:
+    if sys.argv[1:] == ["gallery"]:
+        save_gallery(FOLDER / "gallery")
+    elif sys.argv[1:] == ["live"]:
         save_live_page(FOLDER / "live.png")
     else:
         main()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -116,14 +117,23 @@ def read_mapping(
 
 def read_value(text: str, shown: str, problems: Problems) -> Node | None:
     """The one value in a YAML text; ``None`` for an empty text and after a problem."""
+    node, found = _read(text, shown)
+    problems.extend(found)
+    return node
+
+
+@lru_cache(maxsize=64)  # studies and tests load graphs that share most of their files many times
+def _read(text: str, shown: str) -> tuple[Node | None, Problems]:
+    """The value in a YAML text, and what is wrong with it."""
+    node, problems = None, Problems()
     try:
         loader = _Loader(_hide_brackets(text))
         try:
-            return _Composer(loader, shown, problems).compose()
+            node = _Composer(loader, shown, problems).compose()
         finally:
             loader.dispose()
     except _Rejected:
-        return None
+        pass
     except yaml.MarkedYAMLError as error:
         _report_syntax(error, text, shown, problems)
     except yaml.reader.ReaderError as error:
@@ -133,7 +143,7 @@ def read_value(text: str, shown: str, problems: Problems) -> Node | None:
     except (yaml.YAMLError, ValueError) as error:
         message = str(error).splitlines()[0] if str(error) else type(error).__name__
         problems.add(Code.YAML, message, Position(shown, 1, 1))
-    return None
+    return node, problems
 
 
 def _report_syntax(error: yaml.MarkedYAMLError, text: str, shown: str, problems: Problems) -> None:

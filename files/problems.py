@@ -232,6 +232,11 @@ class Problems:
         """Note a problem; ``details`` are the other fields of ``Problem``."""
         self._found.setdefault(Problem(code, message, where, **details))
 
+    def extend(self, others: Problems) -> None:
+        """Note all problems of another collection."""
+        for problem in others._found:
+            self._found.setdefault(problem)
+
     def __len__(self) -> int:
         return len(self._found)
 

@@ -38,6 +38,11 @@ if TYPE_CHECKING:
 SHIPPED = Path(__file__).parent
 MODEL_FILES = (".urdf", ".xml", ".mjcf")
 YAML_FILES = (".yaml", ".yml")
+OTHER_FORMATS = {
+    ".sdf": "gz sdf has no way back to a URDF: export one from where this file came from",
+    ".xacro": "xacro {name} > {stem}.urdf  (pip install xacro), then read that",
+}
+"""Formats of robots that are not read, and what to do instead."""
 DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
 """What to install for a package of files, where it is not called as the package."""
 _KIND = ("a robot's description", "name, base, links, joints")
@@ -115,7 +120,7 @@ def path_of(name: str, folder: Path | None = None) -> Path:
     Raises:
         LookupError: there is none; the message names the robots that there are.
     """
-    if name.endswith((*YAML_FILES, *MODEL_FILES)):
+    if name.endswith((*YAML_FILES, *MODEL_FILES, *OTHER_FORMATS)):
         path = (folder or Path()) / name
         if not path.is_file():
             raise LookupError(f"no robot description at {path}")
@@ -141,11 +146,17 @@ def read(path: Path) -> ReadRobot:
     """The robot that a YAML, URDF or MJCF file describes.
 
     A YAML of the same name beside a URDF or MJCF file adds what that lacks; a YAML with a key
-    ``file`` adds to the file that it names.
+    ``file`` adds to the file that it names. A URDF or MJCF file without a YAML gets what
+    ``aloft robot import`` would guess, and ``notes`` say so.
 
     Raises:
         RobotError: the file cannot be read, or describes no robot; it carries every fault.
     """
+    if path.suffix in OTHER_FORMATS:
+        fix = OTHER_FORMATS[path.suffix].format(name=path.name, stem=path.name.partition(".")[0])
+        what = f"files in {path.suffix.removeprefix('.').upper()} are not read"
+        fault = RobotFault((), what, "a URDF, MJCF or YAML file", path.suffix, fix)
+        raise RobotError(str(path), [fault])
     if path.suffix in MODEL_FILES:
         beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
         return _read_model(path, beside, PlacedYaml.read(beside) if beside else None)
@@ -188,6 +199,14 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
 
     content = text.data if text is not None and text.data is not None else {}
     imported = import_robot(path, content)
+    guessed: list[str] = []
+    if text is None:
+        from .importing.new_yaml import guess_feet
+
+        content = {"feet": guess_feet(imported.model, imported.built)}
+        imported = import_robot(path, content)
+        names = ", ".join(foot["name"] for foot in content["feet"])
+        guessed = [f"the feet are guessed: {names}"] if names else []
     faults = [*(text.faults if text else ()), *imported.faults]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.
     own = {fault.path[:2] for fault in faults}
@@ -199,7 +218,7 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
     robot = RobotDescription.model_validate(imported.data)
     robot = _with_places(robot, (added or path).parent)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
-    return ReadRobot(robot, added or path, path, (*imported.notes, *more))
+    return ReadRobot(robot, added or path, path, (*guessed, *imported.notes, *more))
 
 
 def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:

@@ -213,7 +213,7 @@ def calls():
                     patch.setattr(module, key, called)
                 elif id(value) in name_of:
                     patch.setattr(module, key, recorder(name_of[id(value)], value))
-        run_jump({"step.seek_speed": 1.0})
+        run_jump({})
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         run_jump({**other, "wbc.solver": "daqp"}, duration=0.1)
         other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}

@@ -273,6 +273,7 @@ def follow_reference(
     target.angular_momentum[:] = target.angular_momentum * heavier
     target.angular_momentum_rate[:] = target.angular_momentum_rate * heavier
     target.angular_velocity[:] = reference.angular_velocity
+    target.angular_acceleration[:] = reference.angular_acceleration
     set_heading(turn, scratch.turn)
     multiply(scratch.turn, reference.orientation, target.orientation)
 
@@ -351,7 +352,7 @@ def balance(
         target.com[k] = scratch.middle[k]
         target.com_velocity[k], target.com_acceleration[k] = 0.0, 0.0
         target.angular_velocity[k], target.angular_momentum[k] = 0.0, 0.0
-        target.angular_momentum_rate[k] = 0.0
+        target.angular_momentum_rate[k], target.angular_acceleration[k] = 0.0, 0.0
     low = memory.standing_height - depth
     target.com[2] = target.com[2] + (low + share * depth)
     target.com_velocity[2] = rate * depth / duration

@@ -111,9 +111,9 @@ class InvariantKalmanFilter(Block):
     removed from the state and added again at its present position, so that nothing is learnt from
     it. While all points are rejected, process noise is added to the velocity until one is accepted.
 
-    **Ground.** With ``level`` all points that stand are at one height, with ``flat`` at the height
-    zero of the start; ``unknown`` assumes nothing. Errors of the height are correlated in time, so
-    the heights count as one measurement per ``ground_time``, not per tick.
+    **Ground.** At the start all points are at height zero. Until the first flight all points that stand
+    are at one height, with ``level_ground`` also after it; without it nothing is assumed there. Errors of
+    the height are correlated in time, so the heights count as one measurement per ``ground_time``, not per tick.
 
     **Saturation.** A sample at the end of the given range is a bound, not a value. Its axis has the
     standard deviation ``saturated_rate`` or ``saturated_force``, so the covariance grows as it
@@ -202,7 +202,7 @@ class InvariantKalmanFilter(Block):
         if not estimate.started:
             start(estimate, legs.motion, params, constants, scratch)
         use_contacts(contacts, estimate, params, constants, scratch, health, period)
-        if params.ground != "unknown":
+        if params.level_ground or not estimate.flown:
             use_ground(estimate, params, constants, scratch, health, period)
         publish(estimate, scratch, health, base)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from ...mathematics.arrays import Array2D, Matrix3
 from ...mathematics.extended_pose import retract
 from ...mathematics.invariant_filter import (
@@ -44,6 +42,8 @@ class InvariantEstimate(Signal):
     covariance = Field(("n_errors", "n_errors"), text="of the error")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="at the last tick, without bias")
     started = Field(dtype="bool", text="whether the first sample has been seen")
+    stood = Field(dtype="bool", text="whether a point has been accepted since the start")
+    flown = Field(dtype="bool", text="whether all points have left the ground since then")
     saturated_ticks = Field(dtype="int64", text="ticks with a saturated sample")
     saturated_run = Field(
         6,
@@ -104,8 +104,8 @@ class InvariantFilterParameters(Parameters):
     support: float = parameter(
         4.0, unit="m/s^2", text="upward specific force below which no contact is accepted"
     )
-    ground: Literal["level", "flat", "unknown"] = parameter(
-        "level", text="whether contacts are at equal heights, at height zero, or at any height"
+    level_ground: bool = parameter(
+        False, text="also after the first flight all points that stand are at one height"
     )
     ground_noise: float = parameter(2e-4, unit="m", gt=0, text="noise of a contact point's height")
     ground_time: float = parameter(
@@ -210,6 +210,11 @@ def use_contacts(
         for k in range(3, 6):
             estimate.covariance[k, k] += _OPENING * _OPENING * period
     add_contacts(estimate, constants, scratch)
+    standing = False
+    for point in range(constants.foot.shape[0]):
+        standing = standing or estimate.present[point]
+    estimate.flown = estimate.flown or (estimate.stood and not standing)
+    estimate.stood = estimate.stood or agreed
 
 
 @kernel
@@ -276,12 +281,12 @@ def use_ground(
     health: EstimatorHealth,
     period: float,
 ) -> None:
-    """Correct by the heights of the points that stand: they are equal, or zero."""
+    """Correct by the heights of the points that stand: they are equal."""
     count, reference = 0, -1
     for point in range(constants.foot.shape[0]):
         if not health.trusted[point]:
             continue
-        if params.ground == "level" and reference < 0:
+        if reference < 0:
             reference = point
             continue
         scratch.standing[count] = point

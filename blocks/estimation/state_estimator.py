@@ -59,7 +59,7 @@ class StateEstimatorParameters(InertialParameters):
         4.0, unit="m/s^2", gt=0.0, text="upward specific force at which contacts count in full"
     )
     level_ground: bool = parameter(
-        True, text="all points are at one height whenever all are in contact"
+        False, text="also after the first flight all points that stand are at one height"
     )
     slow_rate: float = live_parameter(
         1.5, unit="rad/s", gt=0.0, text="rate of base and joints below which feet are flat"
@@ -88,14 +88,14 @@ class StateEstimator(InertialEstimator):
       lift and contacts that a latch still holds after lift-off do not disturb the velocity at
       lift-off. ``gate`` grows while all points are rejected or in the air, so that the estimate
       recovers from a wrong prediction.
-    * While all points are in contact and the robot moves slowly, the feet are flat on level ground.
+    * While all points are in contact and the robot moves slowly, before the first flight, the feet are flat on level ground.
       Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
       3 mrad, where a biased accelerometer has 10 mrad), and the feet give the heading while they
       stand. The drift of both, by a least-squares line over up to 250 ticks, gives the gyroscope's
       bias. While the robot stands still before the first flight, the accelerometer's reading minus
-      gravity gives its bias, which would cause a drift in flight. If the feet may come to stand at
-      different heights set ``level_ground`` to false: then after a flight only the accelerometer
-      corrects the tilt.
+      gravity gives its bias, which would cause a drift in flight. After a flight the feet may stand at
+      different heights, so only the accelerometer corrects the tilt, unless ``level_ground`` says that
+      all ground is level.
 
     **Flight.** While no point is trusted there is only the prediction. ``flight: imu`` integrates
     the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms; from

@@ -37,7 +37,7 @@ class PID(Bounded, Block):
     * D[n] = (tau D[n-1] + kd (d[n] - d[n-1])) / (tau + T) with d = c r - y (backward differences);
     * v = P + I[n] + D[n] + f, and the output is u = min(max(v, lower), upper);
     * I[n+1] = I[n] + T ki (r - y) + share (u - v), the back-calculation that undoes windup, with
-      share = min(T / tracking_time, 1).
+      share = min(T / tracking_time, 1), and no share where ki is 0 and there is nothing to wind up.
 
     I[0] = 0 and D = 0 in the first run and where ``reset`` holds. (Astrom and Hagglund, Advanced PID
     Control, chapter 3.)
@@ -121,8 +121,9 @@ class PID(Bounded, Block):
             p = params.kp[i] * (params.b[i] * r - y)
             v = p + x.integral[i] + x.derivative[i] + feedforward.value[i]
             u.value[i] = min(max(v, constants.lower[i]), constants.upper[i])
-            x.integral[i] = (
-                x.integral[i]
-                + period * params.ki[i] * (r - y)
-                + constants.tracking * (u.value[i] - v)
-            )
+            if params.ki[i] != 0.0:
+                x.integral[i] = (
+                    x.integral[i]
+                    + period * params.ki[i] * (r - y)
+                    + constants.tracking * (u.value[i] - v)
+                )

@@ -261,7 +261,7 @@ class MotionRecorder:
         values = {
             "com": motion.com, "com_velocity": motion.com_velocity,
             "com_acceleration": motion.com_acceleration, "orientation": q[3:7],
-            "angular_velocity": v[3:6], "angular_momentum": momentum,
+            "angular_velocity": v[3:6], "angular_acceleration": np.zeros(3), "angular_momentum": momentum,
             "angular_momentum_rate": rate, "foot_position": body.feet(q),
             "foot_velocity": motion.foot_velocity, "foot_yaw": np.zeros(len(body.soles)),
             "joint_position": q[7:], "joint_velocity": v[6:],

@@ -35,10 +35,12 @@ class SwitchFault(IntEnum):
     """It stayed open under a foot that stands."""
     BOUNCING = 3
     """It opened and closed too often."""
+    HEAVY = 4
+    """No fault: it needs more than its share of the weight, and its point stands although it is open."""
 
 
 class SwitchHealth(Signal):
-    """Which foot switches are not to be believed, and whether the robot should stop for that."""
+    """Which foot switches are not to be believed now, and whether the robot should stop for that."""
 
     fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="see SwitchFault")
     stop = Field(dtype="bool", text="one of them is at fault, and the robot is not in the air")
@@ -130,6 +132,9 @@ class WholeBodyTarget(Signal):
     com_acceleration = Field(3, unit="m/s^2", frame="world", text="its feedforward acceleration")
     orientation = Field(4, unit="", text="base quaternion x, y, z, w")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
+    angular_acceleration = Field(
+        3, unit="rad/s^2", frame="body", text="its feedforward acceleration"
+    )
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its feedforward rate")
     joint_position = Field("n_joints", unit="rad", text="planned angles, for feet that roll")

@@ -36,6 +36,9 @@ class JumpReference(Signal):
     com_acceleration = Field(3, unit="m/s^2", frame="world", text="its acceleration")
     orientation = Field(4, unit="", text="base quaternion x, y, z, w")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
+    angular_acceleration = Field(
+        3, unit="rad/s^2", frame="body", text="its rate; zero if not known"
+    )
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its rate")
     contact = Field("n_contacts", dtype="bool", text="which points are planned to carry load")

@@ -34,10 +34,11 @@ def rehearsal_of_file(
 
     if task.robot not in jump_graphs() and not wanted:
         return {}
-    settings = [f"plan.task={text_of(str(file.resolve()))}"]
+    path, settings = graph_of(task.robot)
+    settings.append(f"plan.task={text_of(str(file.resolve()))}")
     if keep is not None:
         settings.append(f"plan.library={text_of(str(keep.resolve()))}")
-    return rehearsal(graph_of(task.robot), settings, task, library, wanted, screen, landing)
+    return rehearsal(path, settings, task, library, wanted, screen, landing)
 
 
 def rehearsal(
@@ -115,19 +116,33 @@ def show(found: Rehearsed, task: JumpTask, screen: Console) -> dict[str, Any]:
     return {"rehearsal": {**asdict(found), "corrects": found.corrects}}
 
 
-def graph_of(robot: str) -> Path:
-    """The shipped graph in which a robot jumps.
+def graph_of(robot: str) -> tuple[Path, list[str]]:
+    """The shipped graph in which a robot jumps, and the settings that name robot and task there.
+
+    A robot without a graph of its own, also one in a URDF, MJCF or YAML file, jumps in that of all
+    robots.
 
     Raises:
-        AloftError: there is none; the message names the robots that have one.
+        AloftError: there is no such robot.
     """
+    from ...files.nodes import text_of
+    from ...robots.description import path_of
+    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
+
     known = jump_graphs()
-    if robot not in known:
-        raise AloftError(
-            f"--robot {robot}: no shipped graph lets it jump; there is one for "
-            f"{', '.join(sorted(known))}. For another robot give your own: --graph FILE"
-        )
-    return known[robot]
+    if robot in known:
+        return known[robot], []
+    try:
+        found = path_of(robot)
+    except LookupError as error:
+        raise AloftError(f"--robot {robot}: {error.args[0]}; or give a file: robot.urdf") from error
+    named = robot if found.stem == robot else str(found.resolve())
+    path = shipped_graphs()[f"{PREFIX}robots/jump"]
+    return path, [f"robot={text_of(named)}", f"plan.task={{rise: {FIRST_RISE}}}"]
+
+
+FIRST_RISE = 0.1
+"""How high a robot without a task of its own jumps, if it is not said [m]."""
 
 
 def jump_graphs() -> dict[str, Path]:

@@ -127,6 +127,35 @@ def holding_torque(
     return np.asarray(data.qfrc_bias[size:] - carried[size:])
 
 
+def standing_torques(robot: RobotDescription, model: MjModel) -> Array:
+    """The motor torques [N m] (n_motors,) that hold a robot with feet still as it stands.
+
+    Raises:
+        StartError: it cannot be put on the ground.
+    """
+    import mujoco
+
+    data = mujoco.MjData(model)
+    base = BASES[robot.base_joint](data)
+    place_standing(model, data, base, robot, np.zeros(3))
+    return product(robot.torque_to_motor, holding_torque(model, data, base, robot))
+
+
+def joint_inertias(robot: RobotDescription, model: MjModel) -> Array:
+    """The inertia [kg m^2, kg] (n_joints,) that every joint turns as the robot stands, rotors included,
+    while its base and all other joints are still."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    base = BASES[robot.base_joint](data)
+    data.qpos[base.positions :] = robot.standing_position
+    base.place()
+    mujoco.mj_forward(model, data)
+    matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    return np.asarray(np.diag(matrix)[base.velocities :])
+
+
 def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> None:
     """Shift the robot horizontally so that the middle between its soles is above the origin; a
     robot without feet stays where it is."""

@@ -18,15 +18,16 @@ from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics
 
 COLUMNS = (
-    "com", "com_velocity", "com_acceleration", "orientation", "angular_velocity", "angular_momentum",
-    "angular_momentum_rate", "foot_position", "foot_velocity", "foot_yaw", "foot_pitch",
+    "com", "com_velocity", "com_acceleration", "orientation", "angular_velocity", "angular_acceleration",
+    "angular_momentum", "angular_momentum_rate", "foot_position", "foot_velocity", "foot_yaw", "foot_pitch",
     "joint_position", "joint_velocity", "joint_acceleration", "joint_torque",
 )  # fmt: skip
 """The fields of ``JumpReference`` that a table has columns of, in the order of ``write_columns``."""
 _COLUMN = "column "
 _MARKS = ("squat_time", "thrust_time", "lift_off_time", "touchdown_time", "recover_time")
 _FED_FORWARD = (
-    "com_acceleration", "angular_momentum_rate", "joint_acceleration", "joint_torque",
+    "com_acceleration", "angular_acceleration", "angular_momentum_rate", "joint_acceleration",
+    "joint_torque",
 )  # fmt: skip
 
 
@@ -131,7 +132,7 @@ def _fed(widths: Sequence[int]) -> NDArray[np.bool_]:
 def fed_forward(n_feet: int, n_joints: int) -> NDArray[np.bool_]:
     """Which columns of a robot's table are fed forward, (width,)."""
     feet = (3 * n_feet, 3 * n_feet, n_feet, n_feet)
-    return _fed((3, 3, 3, 4, 3, 3, 3, *feet, *(n_joints,) * 4))
+    return _fed((3, 3, 3, 4, 3, 3, 3, 3, *feet, *(n_joints,) * 4))
 
 
 def row_dimensions(robot: RobotDescription | None) -> dict[str, int]:
@@ -164,7 +165,7 @@ def read_table(
     Lift-off and touchdown times are those of the next flight, and from its middle on those of
     the one behind it: whoever lands, early or late, knows by them that it goes on.
 
-    What a controller feeds forward, the acceleration, the rate of angular momentum and the
+    What a controller feeds forward, accelerations, the rate of angular momentum and the
     torques, is that of ``lead`` seconds later; with ``hold`` its mean over so many seconds
     from then on, because a command holds until the next one. So a thrust that ends between two
     commands ends with the right momentum.
@@ -240,6 +241,7 @@ def write_columns(values: Array1D, reference: JumpReference) -> None:
     first = take(values, first, reference.com_acceleration)
     first = take(values, first, reference.orientation)
     first = take(values, first, reference.angular_velocity)
+    first = take(values, first, reference.angular_acceleration)
     first = take(values, first, reference.angular_momentum)
     first = take(values, first, reference.angular_momentum_rate)
     first = take_rows(values, first, reference.foot_position)

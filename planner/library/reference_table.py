@@ -30,7 +30,7 @@ from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 
 State = tuple[float, int, Array, Array, Array]
-"""Time, interval, q, v and the joints' accelerations."""
+"""Time, interval, q, v and the accelerations of base (angular, in the body) and joints."""
 
 CENTROIDAL = ("com", "com_velocity", "angular_momentum")
 
@@ -60,7 +60,8 @@ def reference_table(
         times.append(time)
         intervals.append(k)
         row = _row(dynamics, q, v, forces.at(time, k))
-        row["joint_torque"], row["joint_acceleration"] = torques.at(time, k), bend
+        row["joint_torque"] = torques.at(time, k)
+        row["angular_acceleration"], row["joint_acceleration"] = bend[:3], bend[3:]
         for name, value in row.items():
             rows.setdefault(name, []).append(value)
     columns = {name: np.array(values) for name, values in rows.items()}
@@ -74,9 +75,13 @@ def reference_table(
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
     standing = {name: values[:1] for name, values in columns.items()}
-    standing["com_acceleration"] = np.zeros((1, 3))
-    standing["angular_momentum_rate"] = np.zeros((1, 3))
-    standing["joint_acceleration"] = np.zeros_like(standing["joint_acceleration"])
+    for name in (
+        "com_acceleration",
+        "angular_acceleration",
+        "angular_momentum_rate",
+        "joint_acceleration",
+    ):
+        standing[name] = np.zeros_like(standing[name])
     start = {
         phase: stand_time + float(plan.time[plan.phase == phase][0])
         for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
@@ -122,7 +127,7 @@ def _states(
     last = len(plan.time) - 1
     for k in range(last):
         start, h = float(plan.time[k]), float(plan.time[k + 1] - plan.time[k])
-        yield start, k, plan.position[k], plan.velocity[k], plan.acceleration[k, 6:]
+        yield start, k, plan.position[k], plan.velocity[k], plan.acceleration[k, 3:]
         if h <= 0.0:
             continue
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
@@ -131,7 +136,7 @@ def _states(
         count = math.ceil(h / step - 1e-9)
         for i in range(1, count):
             yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
-    still = np.zeros(plan.velocity.shape[1] - 6)
+    still = np.zeros(plan.velocity.shape[1] - 3)
     yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last], still
 
 
@@ -151,16 +156,16 @@ def _base_motion(
 def _between(
     base: JointMotion, joints: JointMotion, time: float, dynamics: ExactDynamics
 ) -> tuple[Array, Array, Array]:
-    """Pinocchio's q and v between two knots, and the joints' accelerations."""
+    """Pinocchio's q and v between two knots, and the accelerations of a ``State``."""
     place, rate, bend = base.at(time)
     position, velocity, acceleration = joints.at(time)
     turn = rotation(place[3:])
-    spin, _ = angular_motion(place[3:], rate[3:], bend[3:])
+    spin, bent = angular_motion(place[3:], rate[3:], bend[3:])
     quaternion = dynamics.pin.Quaternion(turn).coeffs()
     return (
         np.concatenate([place[:3], quaternion, position]),
         np.concatenate([product(turn.T, rate[:3]), spin, velocity]),
-        acceleration,
+        np.concatenate([bent, acceleration]),
     )
 
 

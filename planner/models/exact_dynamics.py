@@ -356,14 +356,17 @@ class ExactDynamics:
         self.pin.framesForwardKinematics(self.model, self.data, q)
         return self.sole_places(), self.foot_angles()[0]
 
-    def footholds(self) -> Array:
+    def footholds(self, heading: float = 0.0) -> Array:
         """What stays in place while the contact points stand on the ground, in the state that was
-        evaluated last, (n_contacts, 3); see ``SymbolicModel.footholds``."""
+        evaluated last, (n_contacts, 3), in a stance of that ``heading`` [rad]; see
+        ``SymbolicModel.footholds``."""
         places = self._contact_places()
+        cosine, sine = math.cos(heading), math.sin(heading)
         for ball in self.balls:
             turn = self.data.oMf[self.contact_frames[ball.point]].rotation
-            about_y, about_x = math.atan2(turn[0, 2], turn[2, 2]), math.asin(-turn[1, 2])
-            places[ball.point] -= ball.radius * np.array([about_y, -about_x, 0.0])
+            pitch, roll = math.atan2(-turn[2, 0], turn[2, 2]), math.asin(turn[2, 1])
+            way = (cosine * pitch + sine * roll, sine * pitch - cosine * roll, 0.0)
+            places[ball.point] -= ball.radius * np.array(way)
         return places
 
     def joint_places(self, q: Array) -> Array:

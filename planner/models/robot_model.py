@@ -114,7 +114,7 @@ class StanceFinder:
         q[:2] = at[:2] - self._body.sole_places().mean(axis=0)[:2]
         q[2] = at[2] - points[:, 2].mean()
         points = self._body.points(pose_of(q))
-        footholds = self._body.footholds()
+        footholds = self._body.footholds(heading)
         com = self._body.com(pose_of(q))
         heights = points[:, 2] - at[2]
         if np.abs(heights).max() > UNEVEN:

@@ -157,18 +157,22 @@ class SymbolicModel:
     def contact_points(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
         """World positions of the contact points on those limbs, in the description's order; of a
         ball the lowest point."""
-        return self._contacts(q, limbs, rolled=False)
+        return self._contacts(q, limbs, None)
 
-    def footholds(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
+    def footholds(
+        self, q: Expression, limbs: Sequence[int] | None = None, heading: Any = (1.0, 0.0)
+    ) -> list[Any]:
         """What stays in place while the contact points on those limbs stand on the ground.
 
         A ball rolls without slipping, so its lowest point moves by the radius times the turn. What
-        stays is the place where it would touch if its link were not turned about x and y. That is
-        exact for a link that turns in one plane.
+        stays is the place where it would touch if its link were turned by neither the pitch nor the
+        roll that it has (yaw first, then roll, then pitch, as a hip and a knee turn it). That is exact
+        for a link whose pitch and roll are about the axes of the stance's ``heading``, whose cosine
+        and sine are given.
         """
-        return self._contacts(q, limbs, rolled=True)
+        return self._contacts(q, limbs, heading)
 
-    def _contacts(self, q: Expression, limbs: Sequence[int] | None, *, rolled: bool) -> list[Any]:
+    def _contacts(self, q: Expression, limbs: Sequence[int] | None, heading: Any) -> list[Any]:
         import casadi as ca
 
         frames = self.frames(q, limbs)
@@ -184,9 +188,13 @@ class SymbolicModel:
             centre = [float(value) for value in ball.centre]
             lowest = self.point(frames, link, centre) - ca.DM([0.0, 0.0, ball.radius])
             turn = frames[link][0]
-            about_y, about_x = ca.atan2(turn[0, 2], turn[2, 2]), ca.asin(-turn[1, 2])
-            way = ball.radius * ca.vertcat(about_y, -about_x, 0.0)
-            found.append(lowest - way if rolled else lowest)
+            if heading is None:
+                found.append(lowest)
+                continue
+            pitch, roll = ca.atan2(-turn[2, 0], turn[2, 2]), ca.asin(turn[2, 1])
+            cosine, sine = heading[0], heading[1]
+            way = ca.vertcat(cosine * pitch + sine * roll, sine * pitch - cosine * roll, 0.0)
+            found.append(lowest - ball.radius * way)
         return found
 
     def com(self, q: Expression) -> Expression:

@@ -475,7 +475,7 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place:
     the foot stands with."""
     import casadi as ca
 
-    points = model.footholds(coordinates.expand(q), coordinates.limbs)
+    points = model.footholds(coordinates.expand(q), coordinates.limbs, heading)
     errors = []
     for i in range(len(coordinates.contacts)):
         off = points[i] - place[3 * i : 3 * i + 3]

@@ -31,6 +31,10 @@ from ..task.task import Knots
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
 """No flags of one machine's: its libraries may be kept where other machines find them, and plans
 are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
+OPTIMISED = ("stance", "free_stance", "contact")
+"""The pieces of most knots. Others are compiled without optimisation, which takes a fifth of the time:
+their functions are long and have no loops, so the compiler spends it on assigning registers. Results are
+the same."""
 
 SOURCES = (
     "models/symbolic_model.py",
@@ -84,7 +88,7 @@ def content_hash(
     kept = robot.model_dump(mode="json", exclude=UNUSED)
     kept["rotors"] = robot.rotor_matrix.tolist()
     digest.update(json.dumps(kept, sort_keys=True).encode())
-    digest.update(repr((name, more, ca.CasadiMeta.version(), FLAGS)).encode())
+    digest.update(repr((name, more, ca.CasadiMeta.version(), FLAGS, OPTIMISED)).encode())
     return digest.hexdigest()[:20]
 
 
@@ -205,7 +209,8 @@ def _compile(compiler: str, piece: StageFunction, library: Path) -> bool:
             for kind in KINDS:
                 generator.add(getattr(piece, kind))
             generator.generate(f"{made.parent}/")
-            run_compiler(compiler, made.with_suffix(".c"), made)
+            flags = () if library.stem in OPTIMISED else ("-O0",)
+            run_compiler(compiler, made.with_suffix(".c"), made, *flags)
     except (OSError, subprocess.CalledProcessError):
         return False
     return True

@@ -4,12 +4,14 @@ Bodies that no joint moves become part of the body they are fixed to, and every 
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
 point anywhere. A body with several joints becomes several links: each but the last is given a
 thousandth of the body, because a link has a mass; together they are the body at the zero pose.
+So is a link without mass given a thousandth of what it carries, if that has any. Else it becomes part of
+what carries it. A link with a mass and no inertia is a ball of it, of the density of water.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -51,7 +53,8 @@ class BuiltLink:
 @dataclass(frozen=True)
 class LinkTree:
     """The tree of a description: plain data for ``base``, ``base_joint``, ``links``, ``joints``,
-    the file's joints by name, and where every body of the file went."""
+    the file's joints by name, where every body of the file went, and what was done to links without mass
+    in ``notes``."""
 
     base: str
     base_joint: str
@@ -59,6 +62,7 @@ class LinkTree:
     joints: list[dict[str, Any]]
     raw_joints: Mapping[str, RawJoint]
     frames: Mapping[str, BodyFrame]
+    notes: tuple[str, ...] = ()
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
@@ -119,9 +123,67 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
         frames[body.name] = frame
         carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
         carrier.capsules += [each.moved(frame.rotation, frame.position) for each in body.capsules]
+    moving_links = {
+        n: link for n, link in links.items() if n != start.name or found_joint != "fixed"
+    }
+    bare, notes = _complete_links(moving_links, joints)
+    if bare:
+        tree = build(model, [*welded, *bare.values()], base_joint)
+        merged = [
+            f"link {link} has no mass and carries none: it is part of {_holder(tree, link)} here, and joint "
+            f"{joint} is fixed"
+            for link, joint in bare.items()
+        ]
+        return replace(tree, notes=(*merged, *tree.notes))
     return LinkTree(
-        start.name, found_joint, [_link_data(link) for link in links.values()], joints, raw, frames
-    )
+        start.name, found_joint, [_link_data(link) for link in links.values()], joints, raw, frames,
+        tuple(notes),
+    )  # fmt: skip
+
+
+def _holder(tree: LinkTree, name: str) -> str:
+    """The link that a body of the file became part of."""
+    return tree.frames[name].link if name in tree.frames else tree.base
+
+
+NO_MASS = 1e-9
+"""kg; a link of less has none."""
+NO_INERTIA = 1e-12
+"""m^2; a link whose inertia is less than its mass times this has none."""
+WATER = 1000.0
+"""kg/m^3"""
+
+
+def _complete_links(
+    links: Mapping[str, BuiltLink], joints: list[dict[str, Any]]
+) -> tuple[dict[str, str], list[str]]:
+    """Give mass and inertia to links that have none. Returns those that carry none either, with the
+    joint that carries each, and notes of what was given."""
+    bare, notes = dict[str, str](), list[str]()
+    carrier = {joint["child"]: joint["name"] for joint in joints}
+    for name in reversed([*links]):
+        link, whole = links[name], joined(links[name].bodies)
+        if abs(whole.mass) < NO_MASS:
+            behind = [j["child"] for j in joints if j["parent"] == name and j["child"] not in bare]
+            heavy = next(
+                (links[child] for child in behind if joined(links[child].bodies).mass > 0.0), None
+            )
+            if heavy is None:
+                if name in carrier:
+                    bare[name] = carrier[name]
+                continue
+            body = joined(heavy.bodies)
+            piece = body.scaled(SHARE).moved(np.eye(3), heavy.origin - link.origin)
+            link.bodies[:], heavy.bodies[:] = [piece], [body.scaled(1.0 - SHARE)]
+            notes.append(f"link {name} has no mass: it has a thousandth of {heavy.name} here")
+        elif np.abs(whole.inertia).max() < NO_INERTIA * whole.mass:
+            radius = (3.0 * whole.mass / (4.0 * np.pi * WATER)) ** (1.0 / 3.0)
+            ball = 0.4 * whole.mass * radius**2 * np.eye(3)
+            link.bodies[:] = [Inertial(whole.mass, whole.com, ball)]
+            notes.append(
+                f"link {name} has no inertia: it is a ball of its mass and of water's density here"
+            )
+    return bare, notes[::-1]
 
 
 def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:

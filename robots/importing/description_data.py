@@ -330,6 +330,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     welded = [*overlay.welded(joints), *model.mimics]
     base_joint = added.get("base_joint", "")
     built = build(model, welded, base_joint if isinstance(base_joint, str) else "")
+    notes += built.notes
     overlay.change("links", built.links, Link)
     overlay.change("joints", built.joints, Joint)
     feet, contacts = overlay.feet(built)
@@ -355,7 +356,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     known = {name: angle for name, angle in model.pose.items() if name in names}
     data["standing"] = known
     data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
-    for key in ("profile", "sensors", "standing", "held", "looks"):
+    for key in ("profile", "sensors", "standing", "held", "supply", "looks"):
         if key in added:
             data[key] = added[key]
     _stand_within_limits(data)

@@ -30,7 +30,7 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
         RobotError: the file describes no robot.
     """
     bare = import_robot(file, {})
-    feet = guess_feet(bare.model, bare.built) if bare.built.base_joint == "floating" else []
+    feet = guess_feet(bare.model, bare.built)
     content: dict[str, Any] = {"name": target.stem, "feet": feet}
     imported = import_robot(file, content)
     faults = find_faults(imported.data)
@@ -58,7 +58,10 @@ RADIUS = 0.02
 
 
 def guess_feet(model: RawModel, built: LinkTree) -> list[dict[str, Any]]:
-    """The feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``."""
+    """The feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``; none of
+    a robot that does not float."""
+    if built.base_joint != "floating":
+        return []
     heights = {link: _lowest(model, built, link) for link in _limb_ends(built)}
     lowest = min(heights.values(), default=0.0)
     if lowest >= 0.0:

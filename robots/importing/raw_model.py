@@ -106,7 +106,7 @@ class RawModel:
             on it.
         names_world: whether the file itself has a link for the world, as it must in MJCF.
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
-        mimics: joints that the file ties to another one.
+        mimics: joints that the file ties to another one, or leaves no range.
         notes: what could not be taken over, one sentence each.
     """
 

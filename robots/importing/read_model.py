@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
 from .looks import NOTHING_SEEN, RawLook, RawMesh, urdf_looks
@@ -40,6 +41,7 @@ def read_model(path: Path) -> RawModel:
         raise file.error(f"MuJoCo cannot read this: {_one_line(error)}") from error
     notes: list[str] = []
     _name_everything(spec)
+    _refuse_closed_loops(spec, file)
     inertials = _take_inertials(spec, file.is_urdf)
     meshes = _take_meshes(spec, path.parent, inertials, notes)
     try:
@@ -59,6 +61,14 @@ def read_model(path: Path) -> RawModel:
     mimics = tuple(name for name, joint in limits.items() if joint.mimics)
     for name in mimics:
         notes.append(f"joint {name} mimics {limits[name].mimics} in the URDF and is fixed here")
+    still = tuple(name for name, joint in limits.items() if joint.range == "none")
+    for name in still:
+        notes.append(f"joint {name} has a range of 0 to 0 in the URDF and is fixed here")
+    for name, joint in limits.items():
+        if joint.range == "free":
+            notes.append(
+                f"joint {name} has no lower and upper limit in the URDF and turns freely here"
+            )
     names = [model.body(k).name for k in range(model.nbody)]
     bodies = {}
     for k in range(1, model.nbody):
@@ -80,9 +90,28 @@ def read_model(path: Path) -> RawModel:
     pose = _key_frame(model)
     names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
-        name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics,
+        name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics + still,
         tuple(dict.fromkeys(notes)),
     )  # fmt: skip
+
+
+def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
+    """Raise ``RobotError`` for MJCF whose bodies are tied together beside the tree of joints."""
+    import mujoco
+
+    kinds = {mujoco.mjtEq.mjEQ_CONNECT: "connect", mujoco.mjtEq.mjEQ_WELD: "weld"}
+    loops = [
+        f"{eq.name or kinds[eq.type]} ({eq.name1} and {eq.name2})"
+        for eq in spec.equalities
+        if eq.type in kinds
+    ]
+    if loops:
+        raise file.error(
+            f"the file closes loops, which a tree of links has not: {listing(loops)}",
+            "no equality of the kinds connect and weld",
+            listing(loops),
+            "describe the mechanism by its transmission: transmission: {motors, joint_to_motor}",
+        )
 
 
 def _one_line(error: Exception) -> str:
@@ -190,15 +219,16 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     name, dof = model.joint(j).name, int(model.jnt_dofadr[j])
     lower, upper = (float(value) for value in model.jnt_range[j])
     effort = _motor_torque(model, j)
-    speed = math.nan
+    speed, free = math.nan, False
     if name in urdf:
         effort, speed = urdf[name].effort, urdf[name].speed
+        free = urdf[name].range in ("free", "none")
     return RawJoint(
         name,
         kinds[int(model.jnt_type[j])],
         _tidy(data.xaxis[j]),
         np.array(data.xanchor[j]),
-        (lower, upper) if model.jnt_limited[j] else None,
+        (lower, upper) if model.jnt_limited[j] and not free else None,
         effort,
         speed,
         float(model.dof_armature[dof]),

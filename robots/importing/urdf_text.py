@@ -24,11 +24,14 @@ KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint's ``effort`` and ``speed`` (NaN where not given) and the joint it mimics, if any."""
+    """A joint's ``effort`` and ``speed`` (NaN where not given), the joint it mimics, if any, and its
+    ``range``: ``free`` for a joint that has no limits though its type asks for them, ``none`` where they
+    leave it at zero, else empty."""
 
     effort: float
     speed: float
     mimics: str
+    range: str = ""
 
 
 class XmlFile:
@@ -39,6 +42,8 @@ class XmlFile:
         self.path = path
         try:
             text = path.read_text(encoding="utf-8")
+            if not text.strip():
+                raise self.error("the file is empty", "a URDF or MJCF file")
             self.root = ElementTree.fromstring(text)
             # Comments are blanked: nothing is found in them, and all other positions stay.
             self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
@@ -95,8 +100,19 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
             for key in ("effort", "velocity")
         )
         mimics = mimic.get("joint", "") if mimic is not None else ""
-        found[joint.get("name", "")] = UrdfJoint(effort, speed, mimics)
+        found[joint.get("name", "")] = UrdfJoint(effort, speed, mimics, _range(joint))
     return found
+
+
+def _range(joint: ElementTree.Element) -> str:
+    """The ``range`` of a ``UrdfJoint``."""
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+        return ""
+    given = [limit.get(key) for key in ("lower", "upper")]
+    if given == [None, None]:
+        return "free"
+    return "none" if [_value(text or "0") for text in given] == [0.0, 0.0] else ""
 
 
 def check_urdf(file: XmlFile) -> None:
@@ -153,7 +169,7 @@ def check_urdf(file: XmlFile) -> None:
         limit = joint.find("limit")
         if limit is not None and kind in ("revolute", "prismatic"):
             lower, upper = (_value(limit.get(key, "0")) for key in ("lower", "upper"))
-            if not lower < upper:
+            if not lower < upper and not _range(joint):
                 add("joint", name, f"the limits of joint {name} leave it no room or are reversed",
                     "lower < upper", f"lower {number(lower)}, upper {number(upper)}")  # fmt: skip
     roots = [name for name in dict.fromkeys(links) if name not in carried]

@@ -20,6 +20,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from traceback import extract_tb
 from types import CodeType, FunctionType
@@ -77,10 +78,11 @@ class Subject:
         )
 
     def feed(self, bench: BlockBench[Block], ticks: int, seed: int = 0) -> Iterator[int]:
-        """Set new inputs for each tick, equal ones for equal seeds; the caller steps the block."""
-        rng = np.random.default_rng([self.seed, seed])
-        for tick in range(ticks):
-            inputs = random_inputs(self.block_type, bench.block.context.dimensions, rng)
+        """Set new inputs for each of at most ``TICKS`` ticks, equal ones for equal seeds; the caller steps the
+        block."""
+        sizes = tuple(bench.block.context.dimensions.items())
+        drawn = _inputs_of(self.block_type, sizes, self.seed, seed)  # type: ignore[arg-type]  # mypy asks the class for __hash__
+        for tick, inputs in enumerate(drawn[:ticks]):
             for port, fields in inputs.items():
                 bench.set(port, **fields)
             yield tick
@@ -453,6 +455,15 @@ def random_inputs(
     for port, fields in block_type.example_inputs(rng, dimensions).items():
         values[port].update(fields)
     return values
+
+
+@lru_cache(maxsize=4)
+def _inputs_of(
+    block_type: type[Block], sizes: tuple[tuple[str, int], ...], *seeds: int
+) -> tuple[dict[str, dict[str, Any]], ...]:
+    """The inputs of ``TICKS`` ticks; kept, because many instances of a block get equal ones."""
+    rng, dimensions = np.random.default_rng(seeds), dict(sizes)
+    return tuple(random_inputs(block_type, dimensions, rng) for _ in range(TICKS))
 
 
 def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:

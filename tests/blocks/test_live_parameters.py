@@ -266,7 +266,7 @@ SCENES: Mapping[str, list[Scene]] = {
     ],
     "blocks.CaptureStep": [
         Scene({"steps": 1, "after": 0.01, "duration": 0.05, "settle": 0.02}, tottering(-0.8, 0.1)),
-        Scene({"seek_speed": 0.1}, hanging),
+        Scene({}, hanging),
         Scene({"steps": 1, "after": 0.01, "reach": 0.02}, tottering(-0.8, 0.1)),
         Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, 0.8)),
         Scene({"steps": 1, "after": 0.01, "apart": (0.9, 1.1)}, tottering(0.1, -0.8)),
@@ -307,7 +307,7 @@ SCENES: Mapping[str, list[Scene]] = {
         Scene({}, standing(0.07)),
         Scene({}, standing(1.3)),
         Scene({}, standing(0.01, 2.5)),
-        Scene({"level_ground": False}, landed),
+        Scene({}, landed),
     ],
     "hal.Push": [Scene({"trigger": "start", "delay": 0.02, "duration": 0.05})],
 }

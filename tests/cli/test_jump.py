@@ -15,7 +15,30 @@ from aloft.studies.rehearsal import trial_settings
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
-BRUCE = graph_of("bruce")
+BRUCE, _ = graph_of("bruce")
+
+
+def _leg(side: str, y: float) -> str:
+    return f"""<body name="{side}_thigh" pos="0 {y} -0.05">
+<joint name="{side}_hip" axis="0 1 0" range="-90 90"/>
+<geom type="capsule" fromto="0 0 -0.05 0 0 -0.15" size=".02" mass="0.5"/>
+<body name="{side}_foot" pos="0 0 -0.2"><joint name="{side}_knee" axis="0 1 0" range="-150 -5"/>
+<geom type="capsule" fromto="0 0 -0.05 0 0 -0.15" size=".015" mass="0.2"/>
+<geom type="sphere" pos="0 0 -0.2" size=".02" mass="0.05"/></body></body>"""
+
+
+STICKS = f"""<mujoco model="sticks"><compiler angle="degree"/><worldbody>
+<body name="torso" pos="0 0 1"><freejoint/><geom type="box" size=".05 .1 .05" mass="5"/>
+{_leg("left", 0.1)}{_leg("right", -0.1)}</body></worldbody><actuator>
+{
+    "".join(
+        f'<motor joint="{side}_{joint}" gear="50" ctrlrange="-1 1"/>'
+        for side in ("left", "right")
+        for joint in ("hip", "knee")
+    )
+}
+</actuator></mujoco>"""
+"""A robot on two legs that bend ahead and back."""
 
 
 def changes(rise: str = "", turn: str = "", **lengths: str) -> dict[str, float]:
@@ -83,7 +106,7 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
     assert nominal.model_dump()["gyro_noise"] == 0.0
     assert nominal.model_dump()["latency"] == 0.0
     assert nominal.model_dump()["timestep"] == 0.0005
-    go2 = graph_of("go2")
+    go2, _ = graph_of("go2")
     standard = load_jump(go2, settings_for({}, "standard"), 0).checked.block("robot").params
     assert standard.model_dump()["mass_spread"] == 0.0
     assert standard.model_dump()["gyro_noise"] == 0.02
@@ -92,9 +115,45 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
 
 
 def test_every_robot_with_a_shipped_jump_can_be_named() -> None:
-    assert graph_of("go2").name == "go2_jump.yaml"
-    with pytest.raises(AloftError, match=r"--robot atlas: no shipped graph lets it jump; .* bruce"):
+    path, settings = graph_of("go2")
+    assert (path.name, settings) == ("go2_jump.yaml", [])
+    path, settings = graph_of("hyq")
+    assert (path.name, settings[0]) == ("jump.yaml", "robot=hyq")
+    with pytest.raises(
+        AloftError, match=r"--robot atlas: no robot called 'atlas'; there is bruce, "
+    ):
         graph_of("atlas")
+    with pytest.raises(AloftError, match=r"--robot a\.urdf: no robot description at a\.urdf"):
+        graph_of("a.urdf")
+
+
+def test_a_file_of_a_robot_is_enough(folder: Path) -> None:
+    (folder / "stick.xml").write_text(STICKS)
+    path, own = graph_of(str(folder / "stick.xml"))
+    graph = load_jump(path, [*own, *settings_for({"distance_x": 0.1}, "")], 0)
+    assert graph.checked.robot is not None
+    assert [foot.name for foot in graph.checked.robot.feet] == ["left_foot", "right_foot"]
+    task = task_of(graph)
+    assert (task.name, task.robot) == ("10 cm high, 10 cm ahead", "sticks")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        ("<freejoint/>", "", "sticks cannot jump: its base is fixed: write base_joint: floating"),
+        (
+            ' gear="50"',
+            ' gear="1"',
+            "sticks cannot jump: motor left_knee has 1 N m, and standing alone",
+        ),
+    ],
+)
+def test_what_keeps_a_robot_from_jumping_is_said(
+    old: str, new: str, error: str, folder: Path, call_json: CallJson
+) -> None:
+    (folder / "stick.xml").write_text(STICKS.replace(old, new))
+    found = call_json("jump", "--robot", str(folder / "stick.xml"), code=2)
+    assert found["reason"].startswith(error)
 
 
 def test_wrong_words_leave_with_exit_code_2(folder: Path, call: Call, call_json: CallJson) -> None:

@@ -75,7 +75,7 @@ class Height(FeedbackTask):
 '''
 GRAPH = """
 robot: go2
-include: [GRAPHS/robots/stand.yaml, GRAPHS/controllers/go2.yaml]
+include: [GRAPHS/robots/stand.yaml]
 set:
   push.speed_change: 0
   wbc.tasks:

@@ -48,6 +48,7 @@ def test_before_lift_off_it_is_the_plan():
     values = {
         "com": [0.01, 0.0, 0.25], "com_velocity": [0.1, 0.2, 1.0],
         "com_acceleration": [1.0, 2.0, 20.0], "angular_velocity": [0.0, -9.0, 0.0],
+        "angular_acceleration": [0.0, 50.0, 1.0],
         "angular_momentum": [0.0, 0.02, 0.0], "angular_momentum_rate": [0.0, 0.3, 0.0],
         "joint_position": np.arange(10.0), "joint_velocity": -np.arange(10.0),
         "joint_acceleration": 3.0 * np.arange(10.0),
@@ -87,7 +88,9 @@ def test_after_touchdown_it_holds_low_over_the_middle_of_the_feet():
     assert target.com == pytest.approx([0.1, 0.02, 0.001 + STANDING - 0.06], abs=1e-12)
     assert (target.com_velocity == 0.0).all()
     assert target.orientation == pytest.approx(about(2, -0.3), abs=1e-12)
-    for name in ("angular_velocity", "angular_momentum", "angular_momentum_rate"):
+    for name in (
+        "angular_velocity", "angular_acceleration", "angular_momentum", "angular_momentum_rate",
+    ):  # fmt: skip
         assert (getattr(target, name) == 0.0).all()
 
 

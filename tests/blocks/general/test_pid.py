@@ -64,3 +64,8 @@ def test_it_leaves_its_bound_soon_after_the_error_turns(ki: float, error: float)
 def test_bounds_must_not_cross() -> None:
     with pytest.raises(BlockError, match="lower bound of element 0 is above the upper one"):
         BlockBench(PID, {"lower": 1.0, "upper": 0.0})
+
+
+def test_a_bound_leaves_nothing_behind_where_there_is_no_integral() -> None:
+    found = run([(3.0, 0.0)] * 5 + [(3.0, 2.5)], kp=2.0, upper=1.5)
+    assert found == pytest.approx([1.5] * 5 + [1.0])

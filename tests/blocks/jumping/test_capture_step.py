@@ -82,7 +82,7 @@ def test_no_step_right_after_touchdown_nor_before_another_jump():
 
 
 def test_a_robot_that_stands_on_one_foot_waits_for_the_other():
-    bench = make()
+    bench = make(seek_speed=0.0)
     assert not np.any(run(bench, 0.3, velocity=(-0.8, 0.0), stance=(True, True, False, False)))
 
 
@@ -139,7 +139,7 @@ def test_a_step_ends_at_contact_and_there_are_no_more_than_allowed():
 
 
 def test_a_foot_that_finds_no_ground_stops_stepping():
-    bench = make(steps=1, duration=0.1)
+    bench = make(steps=1, duration=0.1, seek_speed=0.0)
     run(bench, 0.12, velocity=(-0.6, 0.15))
     seen = run(bench, 0.4, velocity=(-0.6, 0.15), stance=(False, False, True, True))
     assert sum(np.any(tick) for tick in seen) == pytest.approx(0.15 / PERIOD - 18, abs=3)

@@ -66,11 +66,12 @@ def test_forces_change_the_momentum(table: JumpTable, plan: PlannedJump) -> None
         rows &= np.append(np.diff(table.time) > 1e-9, True)  # after an impact, not before it
         time = table.time[rows]
         for rate, total in (("com_acceleration", "com_velocity"),
+                            ("angular_acceleration", "angular_velocity"),
                             ("angular_momentum_rate", "angular_momentum")):  # fmt: skip
             values = table.columns[rate][rows]
             gained = np.trapezoid(values, time, axis=0)
             change = table.columns[total][rows][-1] - table.columns[total][rows][0]
-            np.testing.assert_allclose(gained, change, atol=0.06)
+            np.testing.assert_allclose(gained, change, rtol=0.015, atol=0.06)
 
 
 def test_heels_are_down_on_the_ground_and_up_where_they_rise(
@@ -96,7 +97,12 @@ def test_the_knots_are_in_it(table: JumpTable, plan: PlannedJump) -> None:
 
 def test_it_begins_and_ends_at_rest(table: JumpTable, plan: PlannedJump) -> None:
     for row in (0, 1, -1):
-        for name in ("com_velocity", "com_acceleration", "angular_momentum_rate"):
+        for name in (
+            "com_velocity",
+            "com_acceleration",
+            "angular_momentum_rate",
+            "angular_velocity",
+        ):
             np.testing.assert_allclose(table.columns[name][row], 0.0, atol=1e-2)
     assert table.squat_time == STAND
     assert STAND < table.thrust_time < table.lift_off_time < table.touchdown_time

@@ -94,6 +94,28 @@ def test_a_ball_that_turns_in_one_plane_rolls_without_slipping() -> None:
     assert np.abs(material).max() > 0.1
 
 
+@pytest.mark.parametrize("heading", [0.0, 0.5, -2.0])
+def test_a_ball_rolls_with_a_leg_that_is_rolled_and_pitched(heading: float) -> None:
+    """A hip that is turned by 0.2 rad, as in a jump aside, leaves an error of 2 %, and a robot that is
+    turned to another heading none beside it."""
+    robot, model = robot_and_model("quadruped")
+    q, v = np.zeros(model.size), np.zeros(model.size)
+    q[3], q[5], q[6:] = 0.1, heading, robot.standing_position
+    q[6::3], v[6::3], v[7::3], v[8::3] = 0.2, 0.6, 1.1, -0.7
+    symbols = [ca.SX.sym("q", model.size), ca.SX.sym("v", model.size)]
+    places = model.footholds(symbols[0], None, (np.cos(heading), np.sin(heading)))
+    rates = [ca.jtimes(foothold, *symbols) for foothold in places]
+    found = evaluate([ca.horzcat(*rates)], symbols, [q, v])[0].T
+    pq, pv, _ = to_pinocchio(q, v, np.zeros(model.size))
+    body = ExactDynamics(robot)
+    material = (body.contact_jacobians(pq)[1] @ pv).reshape(-1, 3)
+    ball = max(contact.radius for contact in robot.contacts)
+    assert np.abs(found - material).max() < 0.02 * ball * np.abs(v).max()
+    body.points(pq)
+    numbers = evaluate([ca.horzcat(*places)], symbols[:1], [q])[0].T
+    assert np.abs(body.footholds(heading) - numbers).max() < 1e-12
+
+
 def test_the_torque_of_a_held_joint_is_the_whole_robots() -> None:
     robot = humanoid()
     part = welded(robot)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.robots.limbed_robots import quadruped
 
 from aloft.planner.library.library import solve_and_check
 from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
@@ -84,6 +85,22 @@ def test_which_points_are_watched() -> None:
         squat, _, flight, _ = layout(task, ROBOT)
         assert len(rows.rows(hop, edge, flight, False)) == in_flight
         assert len(rows.rows(hop, edge, squat, True)) == on_ground
+
+
+def test_knees_above_ball_feet_keep_off_level_ground() -> None:
+    """While they stand: a leg with no ankle can fold until its knee touches."""
+    for robot, watched in ((quadruped(), True), (ROBOT, False)):
+        model = SymbolicModel(robot)
+        coordinates = full_coordinates(model)
+        task = make_task({"recipe": "paper", "name": "up", "robot": robot.name, "rise": 0.1})
+        rows = ObstacleRows(model, coordinates)
+        points = obstacle_points(model, coordinates)
+        for stretch in layout(task, robot):
+            found = rows.rows(task.hops()[0], None, stretch, False)
+            links = {points[row][1][0] for row in found}
+            thighs = {link.name for link in robot.links if "thigh" in link.name}
+            expected = thighs if watched and not stretch.flies else set()
+            assert links == expected, stretch.phase
 
 
 @pytest.mark.parametrize("ahead", [0.15, 0.2])

@@ -13,7 +13,7 @@ import yaml
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.robots.description import RobotDescription, find_robot, read
 
-from .model_files import ARM, CART_POLE, ONE_LEG, PLANAR, SPHERICAL_HIP
+from .model_files import ARM, CART_POLE, INERTIAL, ONE_LEG, PLANAR, SPHERICAL_HIP
 
 
 def robot_of(folder: Path, content: str, added: dict[str, Any] | None = None) -> RobotDescription:
@@ -76,7 +76,7 @@ def test_a_leg_with_motors_a_key_frame_and_a_reference(tmp_path: Path) -> None:
 
 
 def test_the_key_frame_is_the_pose_where_nobody_says_another(tmp_path: Path) -> None:
-    assert robot_of(tmp_path, ONE_LEG).standing == {"hip": 0.2, "knee": 0.3}
+    assert robot_of(tmp_path, ONE_LEG, {"feet": []}).standing == {"hip": 0.2, "knee": 0.3}
 
 
 def test_a_planar_base(tmp_path: Path) -> None:
@@ -144,3 +144,51 @@ def test_a_yaml_that_names_its_file(tmp_path: Path) -> None:
     (tmp_path / "models" / "arm.urdf").write_text(ARM)
     (tmp_path / "mine.yaml").write_text("file: models/arm.urdf\nname: mine\n")
     assert find_robot("mine.yaml", tmp_path).name == "mine"
+
+
+def notes_of(folder: Path, content: str) -> tuple[RobotDescription, list[str]]:
+    """The robot of a URDF, and what is said of joints and masses in it."""
+    (folder / "robot.urdf").write_text(content)
+    found = read(folder / "robot.urdf")
+    return found.description, [n for n in found.notes if "mesh" not in n and "assumed" not in n]
+
+
+def test_a_link_without_mass_at_the_end_is_part_of_what_carries_it(tmp_path: Path) -> None:
+    bare = ARM.replace(f'"lower">{INERTIAL}', '"lower">')
+    robot, notes = notes_of(tmp_path, bare)
+    assert [joint.name for joint in robot.joints] == ["shoulder"]
+    assert notes == [
+        "link lower has no mass and carries none: it is part of upper here, and joint elbow is fixed"
+    ]
+
+
+def test_a_link_without_mass_between_others_has_a_little_of_what_it_carries(tmp_path: Path) -> None:
+    whole, _ = notes_of(tmp_path, ARM)
+    bare = ARM.replace(f'"upper">{INERTIAL}', '"upper">')
+    robot, notes = notes_of(tmp_path, bare)
+    assert [joint.name for joint in robot.joints] == ["shoulder", "elbow"]
+    lower = whole.link("lower").mass
+    masses = [robot.link("upper").mass, robot.link("lower").mass]
+    assert masses == pytest.approx([1e-3 * lower, 0.999 * lower])
+    com = np.array(robot.joints[1].origin) + np.array(whole.link("lower").com)
+    np.testing.assert_allclose(robot.link("upper").com, com, atol=1e-9)
+    assert notes == ["link upper has no mass: it has a thousandth of lower here"]
+
+
+def test_a_link_without_inertia_is_a_ball(tmp_path: Path) -> None:
+    point = '<inertial><mass value="2"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
+    robot, notes = notes_of(tmp_path, ARM.replace(f'"lower">{INERTIAL}', f'"lower">{point}'))
+    radius = (3.0 * 2.0 / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
+    assert robot.link("lower").inertia[:3] == pytest.approx([0.8 * radius**2] * 3)
+    assert notes == [
+        "link lower has no inertia: it is a ball of its mass and of water's density here"
+    ]
+
+
+def test_joints_without_a_range_are_free_or_fixed(tmp_path: Path) -> None:
+    robot, notes = notes_of(tmp_path, ARM.replace('lower="-2" upper="2" ', ""))
+    assert [joint.limits for joint in robot.joints] == [None, None]
+    assert notes == ["joint elbow has no lower and upper limit in the URDF and turns freely here"]
+    robot, notes = notes_of(tmp_path, ARM.replace('lower="-2" upper="2" ', 'lower="0" upper="0" '))
+    assert [joint.name for joint in robot.joints] == ["shoulder"]
+    assert notes == ["joint elbow has a range of 0 to 0 in the URDF and is fixed here"]

@@ -15,6 +15,10 @@ TWO_FREE = """<mujoco><worldbody>
 <body name="b" pos="1 0 0"><freejoint/><geom size=".1" mass="1"/></body></worldbody></mujoco>"""
 BALL = """<mujoco><worldbody><body name="a"><joint name="b" type="ball"/>
 <geom size=".1" mass="1"/></body></worldbody></mujoco>"""
+CLOSED = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/><geom size=".1" mass="1"/>
+<body name="b" pos="0 0 .3"><joint name="k" axis="0 1 0"/><geom size=".1" mass="1"/></body></body>
+</worldbody><equality><connect name="rod" body1="a" body2="b" anchor="0 0 0"/>
+<connect body1="b" body2="a" anchor="0 0 0"/></equality></mujoco>"""
 UNKNOWN_LINK = """<robot name="x">
 <link name="a"/><link name="b"/>
 <joint name="j" type="hinge"><parent link="a"/><child link="c"/><axis xyz="0 0 0"/></joint></robot>"""
@@ -93,11 +97,25 @@ MODELS = [
         "    found      -1",
         "    fix        mass: 0.1",
     ]),
-    ("x.urdf", ARM.replace(INERTIAL + "\n    <collision><origin", "\n    <collision><origin"), [
-        "x.urdf:15:3: link lower has a mass of 0 kg",
-        "    expected   a positive number of kg",
-        "    found      0",
-        "    fix        mass: 0.1",
+    ("x.sdf", "<sdf/>", [
+        "x.sdf: files in SDF are not read",
+        "    expected   a URDF, MJCF or YAML file",
+        "    found      .sdf",
+        "    fix        gz sdf has no way back to a URDF: export one from where this file came from",
+    ]),
+    ("x.xacro", "<robot/>", [
+        "x.xacro: files in XACRO are not read",
+        "    expected   a URDF, MJCF or YAML file",
+        "    found      .xacro",
+        "    fix        xacro x.xacro > x.urdf  (pip install xacro), then read that",
+    ]),
+    ("x.urdf", "", ["x.urdf: the file is empty", "    expected   a URDF or MJCF file"]),
+    ("x.xml", CLOSED, [
+        ("x.xml: the file closes loops, which a tree of links has not: rod (a and b), connect (b and "
+        "a)"),
+        "    expected   no equality of the kinds connect and weld",
+        "    found      rod (a and b), connect (b and a)",
+        "    fix        describe the mechanism by its transmission: transmission: {motors, joint_to_motor}",
     ]),
 ]  # fmt: skip
 
@@ -105,7 +123,7 @@ YAMLS = [
     ("feets: []", [
         "x.yaml:1:8: the robot has no key 'feets'",
         ("    expected   file, weld, name, text, base, base_joint, links, joints, feet, contacts, "
-        "transmission, profiles, profile, sensors, standing, held, points, looks"),
+        "transmission, profiles, profile, sensors, standing, held, points, supply, looks"),
         "    found      'feets'",
         "    fix        feet: []",
     ]),

@@ -1,0 +1,67 @@
+"""Every URDF of the Python package ``example-robot-data``: is it read, what is guessed, does it stand."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from ..planner.library.library import shipped_folder
+from ..robots.description import ReadRobot, RobotError, read
+from ..robots.importing.urdf_text import find_file
+from ..runtime.graph import load
+from ..runtime.language.errors import AloftError
+from ..studies.check_up import check_up, obstacles_to_jumping
+from .rows import Row
+
+ONE = "package://example-robot-data/robots/go2_description/urdf/go2.urdf"
+SETTINGS = ("push.speed_change=0 m/s",)
+
+
+def every_robot() -> list[Row]:
+    """A row for every file: its joints, or none where it is refused, and what became of it.
+
+    A robot with feet that floats is put on the ground as a file without a YAML is read, and stands in the
+    robust trial for 3.5 s or until the score has judged it.
+    """
+    one = find_file(ONE, Path())
+    if one is None:
+        return [Row("every_robot", None, "", note="pip install example-robot-data")]
+    root = one.parents[2]
+    rows = [_row(path, str(path.relative_to(root))) for path in sorted(root.rglob("*.urdf"))]
+    found = Counter(row.note.partition(":")[0] for row in rows)
+    counts = ", ".join(f"{count} {kind}" for kind, count in found.items())
+    return [*rows, Row("all of them", float(len(rows)), "files", note=counts)]
+
+
+def _row(path: Path, name: str) -> Row:
+    try:
+        found = read(path)
+    except RobotError as error:
+        fault = error.faults[0]
+        more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
+        return Row(name, None, "joints", note=f"refused: {fault.message}{more}")
+    robot = found.description
+    said = f"{robot.total_mass:.3g} kg, {len(robot.feet)} feet"
+    return Row(name, float(len(robot.joints)), "joints", note=f"{_standing(found)}; {said}")
+
+
+def _standing(found: ReadRobot) -> str:
+    """How a robot stands, or why it does not."""
+    robot = found.description
+    if robot.base_joint != "floating":
+        return f"read: {robot.base_joint} base"
+    if not robot.contacts:
+        return "read: no feet"
+    if not robot.standing or any("no standing pose was found" in note for note in found.notes):
+        return "read: no standing pose was found"
+    try:
+        weak = obstacles_to_jumping(robot)
+        unusual = len(check_up(robot)["remarks"])
+        settings = [f"robot={str(found.path)!r}", *SETTINGS]
+        run = load(shipped_folder() / "robots" / "stand.yaml", settings).run()
+    except AloftError as error:
+        return f"does not stand: {str(error).splitlines()[-1]}"
+    if weak:
+        return f"does not stand: {weak[0]}"
+    verdict = "stands" if run.success else "does not stand"
+    return f"{verdict}: {run.reason}, {unusual} remarks of check-up"

@@ -1,0 +1,251 @@
+"""What looks wrong with a robot's description: ``aloft robot check-up``, and what keeps a robot from jumping.
+
+Nothing here is a fault that a description is refused for. Each rule compares numbers that nobody writes down on
+purpose with what bodies, legs and motors of that size are like.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..mathematics.arrays import Array
+
+if TYPE_CHECKING:
+    from ..robots.description import RobotDescription
+    from ..robots.robot_description import Link
+
+
+HEAVY = 0.5
+"""A link that is no base and has a larger share of the robot's mass is named."""
+SLENDER, WIDE = 0.1, 1.5
+"""Radii of gyration, as shares of the farthest that a link's shapes reach from its centre of mass."""
+AWAY = 1.5
+"""A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
+NEARLY_ALONG = math.radians(5.0)
+"""An axis closer to a coordinate axis than this, and not along it, was measured or typed."""
+NEAR_LIMIT = 0.05
+"""rad; the standing robot is closer to a limit than this."""
+SLOW = 2.0
+"""Hz; legs whose motors turn their joints more slowly than this cannot balance a robot."""
+STEP = 0.1
+"""rad; the step that a joint's bandwidth is told by."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something that looks wrong: the ``part``, what was ``found``, and what is ``usual``."""
+
+    part: str
+    found: str
+    usual: str
+
+
+def check_up(robot: RobotDescription) -> dict[str, Any]:
+    """The figures of a robot and the remarks about it, as plain data in SI units."""
+    standing = standing_rows(robot)
+    remarks = [
+        *_links(robot), *_axes(robot), *_limits(robot), *_sides(robot), *_motors(robot, standing)
+    ]  # fmt: skip
+    return {
+        "name": robot.name,
+        "mass_kg": robot.total_mass,
+        "motors": standing,
+        "remarks": [vars(remark) for remark in remarks],
+    }
+
+
+def _links(robot: RobotDescription) -> Iterator[Remark]:
+    """Masses and inertias."""
+    for link in robot.links:
+        share = link.mass / robot.total_mass
+        if link.name != robot.base and share > HEAVY:
+            yield Remark(f"link {link.name}", f"{share:.0%} of the mass",
+                         "less than half for a link that is no base")  # fmt: skip
+        if not link.shapes:
+            continue
+        reach, middle = _extent(link)
+        away = float(np.linalg.norm(np.array(link.com) - middle))
+        if away > AWAY * reach:
+            yield Remark(f"link {link.name}", f"its centre of mass is {away:.3g} m from the middle of its shapes",
+                         f"within them, {reach:.3g} m")  # fmt: skip
+        xx, yy, zz = link.inertia[:3]
+        gyration = math.sqrt(max(xx, yy, zz) / link.mass)
+        if not SLENDER * reach <= gyration <= WIDE * reach:
+            yield Remark(f"link {link.name}", f"radius of gyration {gyration:.3g} m",
+                         f"{SLENDER * reach:.2g} to {WIDE * reach:.2g} m for its shapes")  # fmt: skip
+
+
+def _extent(link: Link) -> tuple[float, Array]:
+    """How far a link's shapes reach from their middle [m], and that middle (3,)."""
+    ends = np.array([end for shape in link.shapes for end in (shape.start, shape.end)])
+    radii = np.repeat([shape.radius for shape in link.shapes], 2)[:, None]
+    low, high = (ends - radii).min(axis=0), (ends + radii).max(axis=0)
+    return 0.5 * float(np.linalg.norm(high - low)), 0.5 * (low + high)
+
+
+def _axes(robot: RobotDescription) -> Iterator[Remark]:
+    """Axes that are nearly, and not quite, along a coordinate axis."""
+    for joint in robot.joints:
+        along = max(abs(component) for component in joint.axis)
+        off = math.acos(min(1.0, along))
+        if 1e-6 < off < NEARLY_ALONG:
+            yield Remark(f"joint {joint.name}", f"its axis is {math.degrees(off):.2g} deg off a coordinate axis",
+                         "along it, or clearly inclined")  # fmt: skip
+
+
+def _limits(robot: RobotDescription) -> Iterator[Remark]:
+    """Limits, and how the standing robot keeps off them."""
+    for k, joint in enumerate(robot.joints):
+        if joint.limits is None:
+            yield Remark(
+                f"joint {joint.name}", "no limits", "a range, for the planner and the stops"
+            )
+            continue
+        low, high = joint.limits
+        if joint.kind == "hinge" and high - low > 2.0 * math.pi + 1e-6:
+            yield Remark(f"joint {joint.name}", f"a range of {math.degrees(high - low):.0f} deg",
+                         "at most 360 deg")  # fmt: skip
+        angle = float(robot.standing_position[k])
+        room = min(angle - low, high - angle)
+        if joint.name not in robot.held and robot.feet and room < NEAR_LIMIT:
+            yield Remark(f"joint {joint.name}", f"stands {room:.2g} {joint.unit('rad')} from its limit",
+                         f"{NEAR_LIMIT:g} or more")  # fmt: skip
+
+
+def _sides(robot: RobotDescription) -> Iterator[Remark]:
+    """Legs of which left and right differ, and signs of joints that do."""
+    from ..planner.models.symmetry import mirrored_pairs
+    from ..robots.welding import welded
+
+    if not robot.feet:
+        return
+    try:
+        part = welded(robot).robot
+    except ValueError:
+        return
+    pairs = mirrored_pairs(part)
+    if pairs is None:
+        yield Remark("the legs", "left and right are no mirror images, so every jump is planned with all joints",
+                     "lengths within 1 mm, masses and inertias within 2 %")  # fmt: skip
+        return
+    for pair in pairs:
+        signs = [
+            f"{part.joints[i].name} and {part.joints[j].name}"
+            for i, j, sign in pair.joints
+            if sign < 0.0 and abs(part.joints[i].axis[1]) > 0.9
+        ]
+        if signs:
+            yield Remark(
+                "signs",
+                f"{', '.join(signs)} turn opposite ways about y",
+                "the same way, left and right",
+            )
+
+
+def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Remark]:
+    """Motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
+    held = {joint.name for joint in robot.joints if joint.name in robot.held}
+    for row in rows:
+        share = row["standing_share"]
+        if share is not None and share > 1.0:
+            yield Remark(f"motor {row['motor']}", f"standing takes {share:.3g} times its peak torque",
+                         "less than half")  # fmt: skip
+        elif share is not None and share > 0.5:
+            yield Remark(
+                f"motor {row['motor']}",
+                f"standing takes {share:.0%} of its peak torque",
+                "less than half",
+            )
+        if (
+            row["bandwidth_hz"] is not None
+            and row["bandwidth_hz"] < SLOW
+            and row["motor"] not in held
+        ):
+            yield Remark(f"motor {row['motor']}", f"a bandwidth of {row['bandwidth_hz']:.2g} Hz",
+                         f"{SLOW:g} Hz or more")  # fmt: skip
+    if not any(robot.motors.rotor_inertia):
+        yield Remark(
+            "the motors",
+            "rotor inertia zero",
+            "more: it is most of a joint's inertia where gears are high",
+        )
+
+
+def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
+    """Of every motor its peak torque, what standing takes of it (none without feet), and the bandwidth:
+    how often a second it could turn its joint by ``STEP`` and back, everything behind it at rest."""
+    from ..hal.simulated.mujoco_model import build_mujoco_model
+    from ..hal.simulated.stance import joint_inertias, standing_torques
+
+    model = build_mujoco_model(robot)
+    needed = standing_torques(robot, model) if robot.contacts else None
+    inertia = joint_inertias(robot, model)
+    peak, rows = robot.motors.peak_torque, []
+    for k, motor in enumerate(robot.transmission.motors):
+        gears = np.abs(robot.joint_to_motor[k])
+        joint = int(gears.argmax())
+        share = None if needed is None or peak[k] <= 0.0 else float(abs(needed[k]) / peak[k])
+        rate = math.sqrt(float(peak[k]) * float(gears[joint]) / (inertia[joint] * STEP))
+        rows.append({
+            "motor": motor, "peak_torque": float(peak[k]), "unit": robot.motor_unit(k, "N m"),
+            "standing_torque": None if needed is None else float(abs(needed[k])),
+            "standing_share": share,
+            "bandwidth_hz": rate / (2.0 * math.pi) if peak[k] > 0.0 else None,
+        })  # fmt: skip
+    return rows
+
+
+def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
+    """What keeps a robot from jumping whatever the jump, in its own terms; empty where nothing does."""
+    if robot.base_joint != "floating":
+        return [
+            f"its base is {robot.base_joint}: write base_joint: floating, if it can leave the ground"
+        ]
+    if not robot.contacts:
+        return ["it has no feet: write them under feet: [{name: NAME, at: LINK, radius: METRES}]"]
+    weak = [
+        f"motor {row['motor']} has {row['peak_torque']:.3g} {row['unit']}, and standing alone takes "
+        f"{row['standing_torque']:.3g}: it is too weak by a factor of {row['standing_share']:.2g}"
+        for row in standing_rows(robot)
+        if row["standing_share"] is not None and row["standing_share"] > 1.0
+    ]
+    return weak[:3]
+
+
+def torque_factor(task: Any, robot: RobotDescription) -> float | None:
+    """How many times as strong and fast the motors must be for a task to have a plan; none where they are
+    not what is in the way."""
+    from ..planner.library.library import solve_and_check
+    from ..planner.task.files import JumpTaskError, PlanError
+
+    for factor in FACTORS:
+        try:
+            solve_and_check(task, with_stronger_motors(robot, factor), refine=False)
+        except (JumpTaskError, PlanError):
+            continue
+        return factor
+    return None
+
+
+FACTORS = (1.25, 1.5, 2.0, 3.0)
+SCALED = ("peak_torque", "continuous_torque", "corner_speed", "no_load_speed")
+
+
+def with_stronger_motors(robot: RobotDescription, factor: float) -> RobotDescription:
+    """The robot with motors of so many times the torque and speed, in every profile."""
+    profiles = {}
+    for name, profile in robot.profiles.items():
+        motors = {
+            motor: rating.model_copy(
+                update={k: factor * v for k in SCALED if (v := getattr(rating, k)) is not None}
+            )
+            for motor, rating in profile.motors.items()
+        }
+        scaled = {key: factor * getattr(profile, key) for key in SCALED}
+        profiles[name] = profile.model_copy(update={**scaled, "motors": motors})
+    return robot.changed(profiles=profiles)

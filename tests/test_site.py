@@ -1,0 +1,150 @@
+"""The documentation as a site: every page has its place, every code block and every link is right."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+import typer
+import yaml
+
+import aloft
+from aloft.cli.app import make_app
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
+TOCTREE = re.compile(r"```\{toctree\}\n:caption: (\S+)\n:hidden:\n\n(.*?)```", re.DOTALL)
+
+
+def test_every_page_stands_once_in_one_of_four_parts() -> None:
+    parts = dict(TOCTREE.findall((DOCS / "index.md").read_text()))
+    assert list(parts) == ["Tutorials", "How-to", "Reference", "Explanation"]
+    entries = [line for text in parts.values() for line in text.split("\n") if line]
+    named = [re.sub(r".*<(.*)>", r"\1", entry) for entry in entries]
+    found = [(DOCS / f"{name}.md").resolve() for name in named]
+    assert sorted(found) == sorted(page for page in PAGES if page != DOCS / "index.md")
+
+
+def code_blocks(language: str) -> list[object]:
+    found: list[object] = []
+    for page in PAGES:
+        for number, (indent, kind, text) in enumerate(BLOCK.findall(page.read_text())):
+            if kind == language:
+                body = re.sub(f"^{indent}", "", text, flags=re.MULTILINE)
+                found.append(pytest.param(body, id=f"{page.relative_to(ROOT)}-{number}"))
+    assert found
+    return found
+
+
+@pytest.mark.parametrize("text", code_blocks("yaml"))
+def test_yaml_on_a_page_can_be_read(text: str) -> None:
+    assert yaml.safe_load(text) is not None or text.startswith("# yaml-language-server")
+
+
+@pytest.mark.parametrize("text", code_blocks("toml"))
+def test_toml_on_a_page_can_be_read(text: str) -> None:
+    assert tomllib.loads(text)
+
+
+@pytest.mark.parametrize("text", code_blocks("python"))
+def test_python_on_a_page_can_be_read(text: str) -> None:
+    assert ast.parse(text).body
+
+
+COMMANDS = typer.main.get_command(make_app())
+
+
+def unknown_in(line: str) -> str:
+    """What a command line asks of ``aloft`` that it does not have."""
+    words = shlex.split(line, comments=True)
+    command, names = COMMANDS, "aloft"
+    for word in words[1:]:
+        inner = getattr(command, "commands", None)
+        if inner is not None and not word.startswith("-"):
+            if word not in inner:
+                return f"{names} has no verb {word}"
+            command, names = inner[word], f"{names} {word}"
+        elif word.startswith("-") and not re.match(r"-\d", word):
+            known = {o for p in command.params for o in [*p.opts, *p.secondary_opts]}
+            if word.partition("=")[0] not in {*known, "--help", "--install-completion"}:
+                return f"{names} has no option {word}"
+    return ""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_on_a_page_are_known(page: Path) -> None:
+    for _, kind, text in BLOCK.findall(page.read_text()):
+        if kind not in ("sh", "console", ""):
+            continue
+        for line in text.replace("\\\n", " ").splitlines():
+            line = line.strip().removeprefix("$ ")
+            if line.startswith("aloft "):
+                line = re.split(r"\s(?:[|>&;]|2>)", line)[0]
+                assert not unknown_in(line), line
+
+
+def test_a_command_that_is_not_there_is_found() -> None:
+    assert unknown_in("aloft runn graphs/jump.yaml") == "aloft has no verb runn"
+    assert unknown_in("aloft run x.yaml --sead 3") == "aloft run has no option --sead"
+    assert not unknown_in("aloft log export x.rrd --mcap y.mcap  # --nothing")
+
+
+class References(HTMLParser):
+    """What a built page refers to, and the anchors that it has."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.to: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in ("href", "src") and value:
+                self.to.append(value)
+            elif name == "id" and value:
+                self.anchors.add(value)
+
+
+@pytest.mark.long
+def test_the_site_is_built_without_a_warning_and_every_link_leads_somewhere(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-q", "--fail-on-warning", "--keep-going", "-c", "docs",
+         "-d", tmp_path / "doctrees", ".", tmp_path / "site"],
+        cwd=ROOT, capture_output=True, text=True, timeout=500, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    site = tmp_path / "site"
+    pages = {path: References(path.read_text()) for path in site.rglob("*.html")}
+    assert len(pages) > len(PAGES)
+    for path, page in pages.items():
+        for target in page.to:
+            address = urlsplit(target)
+            if address.scheme:
+                assert address.scheme in ("https", "data", "mailto"), target
+                continue
+            there = path
+            if address.path:
+                there = (path.parent / unquote(address.path)).resolve()
+            assert there.is_file(), f"{path.relative_to(site)}: {target}"
+            if address.fragment and there in pages:
+                assert unquote(address.fragment) in pages[there].anchors, (path, target)
+    interface = (site / "docs" / "api.html").read_text()
+    for name in aloft.__all__:
+        if inspect.isclass(value := getattr(aloft, name)) or inspect.isfunction(value):
+            assert f">{name}</span>" in interface, name
+    assert "searchindex" in (site / "search.html").read_text()
+    assert "docs/tutorial" in (site / "searchindex.js").read_text()
+    assert "docs/index.html" in (site / "index.html").read_text()
+    assert "data-theme" in (site / "docs" / "index.html").read_text()
