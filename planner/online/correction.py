@@ -58,9 +58,9 @@ class Corrector:
         self._rows, self._values = np.zeros(rows), np.zeros(pattern.nnz())
         self._buffer, self._evaluate = jacobian.buffer()
         for number, array in enumerate((self._variables, self._parameters)):
-            self._buffer.set_arg(number, memoryview(array))
+            self._buffer.set_arg(number, array.data)
         for number, array in enumerate((self._rows, self._values)):
-            self._buffer.set_res(number, memoryview(array))
+            self._buffer.set_res(number, array.data)
         self._place, self._count = np.zeros(rows, dtype=np.int64), np.zeros(1, dtype=np.int64)
         self._vector, self._step = np.zeros(rows), np.zeros(variables)
         self._found = np.zeros(1, dtype=np.bool_)

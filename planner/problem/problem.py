@@ -217,7 +217,9 @@ class ProblemBuilder:
         chosen = [table[row] for row in kept.tolist()]
         rows = slice(start, start + len(chosen))
         if chosen:
-            self.families[rows], self.row_lower[rows], self.row_upper[rows] = zip(*chosen, strict=True)
+            self.families[rows], self.row_lower[rows], self.row_upper[rows] = zip(
+                *chosen, strict=True
+            )
 
     def _set(self, name: str, k: int, **values: Any) -> None:
         start = self.assembly.parameter_start[name, k]
