@@ -55,6 +55,7 @@ class MotionCapture(Block):
     truth = Input(RobotTruth, text="where the robot is")
     place = Output(PlaceMeasurement, text="the last measurement that has come")
     line = State(CaptureLine, text="measurements under way")
+    last = State(PlaceMeasurement, text="the last measurement that has come")
 
     def save_state(self) -> None:
         """Keep where the stream is."""
@@ -76,21 +77,25 @@ class MotionCapture(Block):
 
     def step(self) -> None:
         """Take a measurement, and give the one whose time has come; the numbers are NumPy's."""
-        line, place, errors = self.line, self.place, self._errors
+        line, last, place, errors = self.line, self.last, self.place, self._errors
         here, number = int(line.taken) % LINE, int(line.taken) + 1
         self._random.generator.standard_normal(out=errors)
         lost = 0.5 * (1.0 + math.erf(errors[4] / math.sqrt(2.0))) < self.params.dropout
         line.number[here] = 0 if lost else number
         line.time[here] = self.time
-        line.position[here] = self.truth.base_position + self.params.noise * errors[:3]
+        where = line.position[here]
+        np.multiply(errors[:3], self.params.noise, out=where)
+        np.add(where, self.truth.base_position, out=where)
         line.heading[here] = (
             yaw(self.truth.base_orientation) + self.params.heading_noise * errors[3]
         )
         line.taken[()] = number
         come = (number - 1 - self._late) % LINE
         if number > self._late and line.number[come] > 0:
-            place.number[()], place.time[()] = line.number[come], line.time[come]
-            place.position[:], place.heading[()] = line.position[come], line.heading[come]
+            last.number[()], last.time[()] = line.number[come], line.time[come]
+            last.position[:], last.heading[()] = line.position[come], line.heading[come]
+        place.number[()], place.time[()] = last.number, last.time
+        place.position[:], place.heading[()] = last.position, last.heading
 
 
 class PlaceHistory(Signal):
