@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..runtime.language.errors import ExitCode
 from .shared.options import AsJson, Overrides
 from .shared.output import console, errors_reported, print_json, say, table
 
+if TYPE_CHECKING:
+    from ..clib.check import Checked
+
 export = typer.Typer(
     name="export",
-    help="Write a graph, or a part of it, for other tools: as a Functional Mock-up Unit.",
+    help="Write a graph, or a part of it, for other tools: as a library of C or a Functional Mock-up Unit.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -65,6 +70,73 @@ def fmu(
             say(out, f"FMPy's validator: {problem}")
         if made.problems == ():
             say(out, "FMPy's validator found no problem")
+
+
+@export.command("c")
+def c(
+    graph: Annotated[
+        str, typer.Argument(help="The graph file, and behind a colon the sub-graph or block.")
+    ],
+    to: Annotated[
+        Path, typer.Option("--to", help="The folder to write; its name is the library's.")
+    ],
+    target: Annotated[
+        str, typer.Option("--target", help="The processor: x86_64, aarch64 or wasm.")
+    ] = "x86_64",
+    check: Annotated[
+        Path | None,
+        typer.Option("--check", help="A recording of the graph, of which every byte is compared."),
+    ] = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
+    ] = None,
+    set_: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """A library of C of a graph or of a sub-graph: no Python, no allocation, the same bytes.
+
+    Of a whole graph the robot stays outside: what it reads are the outputs. --check runs every tick
+    of a recording through the library, for other processors in an emulator or in Node. The exit code is
+    1 where a byte differs.
+    """
+    with errors_reported(as_json):
+        from ..clib.check import check as compare
+        from ..clib.write import write_library
+
+        path, part = _parts(graph)
+        made = write_library(path, to, part, set_ or [], output or [], target)
+        found = compare(made.description, check) if check is not None else None
+        if as_json:
+            result = {**made.about, "check": None if found is None else asdict(found)}
+            print_json({"folder": str(to), **result})
+        else:
+            out = console()
+            about = made.about
+            rows = [(name, f"{size} bytes") for name, size in about["files_bytes"].items()]
+            rows += [
+                (text, f"{about[f'{key}_bytes']} bytes")
+                for key, text in (
+                    ("memory", "an instance"), ("constant", "constants"), ("state", "a saved state"),
+                )
+            ]  # fmt: skip
+            out.print(table("", ["", "size"], rows))
+            say(out, f"{to}: {len(about['blocks'])} blocks for {target}")
+            if found is not None:
+                say(out, _verdict(found))
+        if found is not None and found.difference:
+            raise typer.Exit(int(ExitCode.NOT_SUCCESSFUL))
+
+
+def _verdict(found: Checked) -> str:
+    """The result of a check in one sentence."""
+    if found.difference:
+        return f"the bytes differ from the recording: {found.difference}"
+    seen = ", ".join(f"{name} in {count} ticks" for name, count in found.statuses.items())
+    return (
+        f"{found.ticks} ticks: all {found.signal_bytes} bytes of signals and {found.state_bytes} bytes of "
+        f"state are as recorded{f'; {seen}' if seen else ''}"
+    )
 
 
 def _parts(graph: str) -> tuple[str, str]:

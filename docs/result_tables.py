@@ -442,7 +442,7 @@ def real_table(robots: Sequence[Mapping[str, Any]]) -> str:
     for kind in robots[0]["arms"][arms[0]]:
         cells = [kind]
         for arm in arms:
-            runs = [robot["arms"][arm][kind] for robot in robots]
+            runs = [robot["arms"][arm][kind] for robot in robots if arm in robot["arms"]]
             times = [sum(run[k]["success"] for run in runs) for k in range(len(runs[0]))]
             low, high = wilson_interval(times[-1], len(runs))
             cells.append(

@@ -43,6 +43,9 @@ class Part(BaseModel):
     seen_only: ClassVar[tuple[str, ...]] = ()
     """Fields that say what the part looks like, on which nothing that is computed depends. They are
     in a dump only with ``context={"looks": True}``: a robot keeps its content without its meshes."""
+    simulated_only: ClassVar[tuple[str, ...]] = ()
+    """Fields that only effects of a simulated robot need, and no plan and no controller. They are in a dump with
+    ``context={"simulated": True}`` and in one with looks."""
 
     @model_serializer(mode="wrap")
     def _without_unused(
@@ -50,12 +53,17 @@ class Part(BaseModel):
     ) -> dict[str, Any]:
         data: dict[str, Any] = serialize(self)
         fields = type(self).model_fields
-        looks = bool((info.context or {}).get("looks"))
+        context = info.context or {}
+        looks = bool(context.get("looks"))
+        simulated = looks or bool(context.get("simulated"))
         for name in self.later:
             if getattr(self, name) == fields[name].default:
                 data.pop(name, None)
         for name in self.seen_only:
             if not looks or getattr(self, name) == fields[name].default:
+                data.pop(name, None)
+        for name in self.simulated_only:
+            if not simulated or getattr(self, name) == fields[name].default:
                 data.pop(name, None)
         return data
 
@@ -156,6 +164,8 @@ class MotorRating(Part):
     The meaning of each value is that of ``ActuatorProfile``; ``None`` is the profile's own value.
     """
 
+    simulated_only = ("gear_play",)
+
     peak_torque: float | None = None
     corner_speed: float | None = None
     no_load_speed: float | None = None
@@ -163,6 +173,7 @@ class MotorRating(Part):
     rotor_inertia: float | None = None
     friction: float | None = None
     damping: float | None = None
+    gear_play: float | None = None
 
 
 class ActuatorProfile(Part):
@@ -171,7 +182,7 @@ class ActuatorProfile(Part):
     ``peak_torque`` [N m] is available up to ``corner_speed`` and falls linearly to zero at
     ``no_load_speed`` [rad/s]; braking torque is ``peak_torque`` at any speed. ``rotor_inertia``
     [kg m^2] is that at the gearbox output; ``friction`` [N m] and ``damping`` [N m s/rad] act at
-    each joint's side of the gearbox.
+    each joint's side of the gearbox. ``gear_play`` [rad] is the width of the play of the gear, at its output.
 
     ``motors`` gives other values for motors by name or by a shell pattern such as ``*_knee_*``;
     later entries win. For a motor that drives a slide, N stands for N m and m for rad.
@@ -179,6 +190,7 @@ class ActuatorProfile(Part):
     """
 
     later = ("motors",)
+    simulated_only = ("gear_play",)
 
     peak_torque: float
     corner_speed: float
@@ -187,6 +199,7 @@ class ActuatorProfile(Part):
     rotor_inertia: float
     friction: float
     damping: float
+    gear_play: float = 0.0
     motors: Mapping[str, MotorRating] = {}
 
 
@@ -194,7 +207,7 @@ class ActuatorProfile(Part):
 class Motors:
     """The chosen profile's values, one element a motor (n_joints,), at the gearbox output.
 
-    ``friction`` and ``damping`` are one element a joint: the joint at the motor's place in the
+    ``friction``, ``damping`` and ``gear_play`` are one element a joint: the joint at the motor's place in the
     order of the description.
     """
 
@@ -206,6 +219,37 @@ class Motors:
     rotor_inertia: Array
     friction: Array
     damping: Array
+    gear_play: Array
+
+
+class PowerSupply(Part):
+    """What feeds the motors: a pack, or a supply on a bench.
+
+    ``rated_voltage`` [V] is that at which the motors reach the speeds of their profile. A pack that is nearly full has
+    ``open_voltage`` [V] without load, behind ``resistance`` [ohm]; ``recovery_resistance`` [ohm] builds up under load.
+    A pack of ``capacity`` [A s] loses ``fall`` [V] from full to empty. ``board_power`` [W] is what computer and boards
+    draw. ``torque_constant`` [N m/A, at the output] and ``winding_resistance`` [ohm] are those of all motors; where
+    they are not known, copper heat is that of a motor whose voltage alone ends its peak torque at the corner speed.
+    """
+
+    rated_voltage: float = Field(gt=0.0)
+    open_voltage: float = Field(gt=0.0)
+    resistance: float = Field(ge=0.0)
+    recovery_resistance: float = Field(0.0, ge=0.0)
+    capacity: float = Field(gt=0.0)
+    fall: float = Field(0.0, ge=0.0)
+    board_power: float = Field(0.0, ge=0.0)
+    torque_constant: float | None = Field(None, gt=0.0)
+    winding_resistance: float | None = Field(None, ge=0.0)
+
+    def heating(self, motors: Motors) -> Array:
+        """Copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""
+        if self.torque_constant is not None and self.winding_resistance is not None:
+            heat = self.winding_resistance / self.torque_constant**2
+            return np.full(len(motors.peak_torque), heat)
+        driven = motors.peak_torque > 0.0
+        slower = np.where(driven, motors.no_load_speed - motors.corner_speed, 0.0)
+        return slower / np.where(driven, motors.peak_torque, 1.0)
 
 
 class Transmission(Part):
@@ -271,6 +315,7 @@ class RobotDescription(Part):
 
     later = ("base_joint", "profile", "sensors", "held")
     seen_only = ("looks",)
+    simulated_only = ("supply",)
 
     name: str
     text: str = ""
@@ -292,6 +337,8 @@ class RobotDescription(Part):
     """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
+    supply: PowerSupply | None = None
+    """What feeds the motors; ``None``: nobody has said it."""
     looks: Mapping[str, Appearance] = {}
     """What links are drawn as, by name; others are drawn as their collision shapes."""
 
@@ -351,7 +398,7 @@ class RobotDescription(Part):
                 values(what, names)
                 for what in (
                     "peak_torque", "corner_speed", "no_load_speed", "continuous_torque",
-                    "rotor_inertia", "friction", "damping",
+                    "rotor_inertia", "friction", "damping", "gear_play",
                 )
             ),
         )  # fmt: skip

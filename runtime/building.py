@@ -3,11 +3,11 @@
 ::
 
     graph = GraphBuilder(rate="100 Hz", duration="2 s")
-    wish = graph.add("wish", "blocks.SineWave", amplitude=1.0)
+    setpoint = graph.add("setpoint", "blocks.SineWave", amplitude=1.0)
     error = graph.add("error", "blocks.Sum", weights=[1, -1])
     rate = graph.add("rate", "blocks.Gain", {"u": error.y}, gain="4 1/s")
     position = graph.add("position", "blocks.Integrator", {"u": rate.y})
-    graph.wire("error.a", wish.y)
+    graph.wire("error.a", setpoint.y)
     graph.wire("error.b", position.y)
     result = graph.load().run()
 """

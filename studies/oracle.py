@@ -59,7 +59,7 @@ def told_values(
         | _ages(params, errors, draw)
         | _motors(block, params, robot, errors, draw)
         | _joints(params, robot, errors, draw)
-        | _pack(params)
+        | _pack(params, robot)
     )
 
 
@@ -155,7 +155,7 @@ def _joints(
         "joint_pd.damping": damping,
         "weight.friction": friction,
         "weight.damping": damping,
-        "timing.play": params.encoders.backlash,
+        "timing.play": float(params.encoders.backlash * robot.motors.gear_play.max(initial=0.0)),
         "dynamics.rotor_inertia": _by_joint(robot, rotors),
     }
 
@@ -168,8 +168,8 @@ def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, f
     return {name: float(value) for name, value in zip(names, values, strict=True)}
 
 
-def _pack(params: SimulatorParameters) -> dict[str, Any]:
+def _pack(params: SimulatorParameters, robot: RobotDescription) -> dict[str, Any]:
     """The pack's resistance, so that its sag under load is no fault."""
     if params.battery is None:
         return {}
-    return {"safety.pack_resistance": params.battery.resistance}
+    return {"safety.pack_resistance": params.battery.of(robot).resistance}

@@ -16,7 +16,7 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "logs", "studies",
+    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "clib", "logs", "studies",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
@@ -86,6 +86,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "ros2": ("robots", "runtime/language"),
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
+    "clib": ("mathematics/compiling", "fmi/exporting", "logs/file", "runtime"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (

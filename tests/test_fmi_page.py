@@ -41,11 +41,11 @@ def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(result.signal("place.y.value"), reference.signal("place.y.value"))
     assert np.ptp(force) > 5.0
     # as the page says: set, get and step give the graph's numbers, and simulate_fmu comes a step late
-    inputs = {"wish": reference.signal("wish.y.value")[:, 0],
+    inputs = {"setpoint": reference.signal("setpoint.y.value")[:, 0],
               "measured": reference.signal("place.y.value")[:, 0]}  # fmt: skip
     monkeypatch.chdir(tmp_path)
     page = runpy.run_path("by_calls.yaml")
-    by_calls = page["forces"](inputs["wish"].tolist(), inputs["measured"].tolist())
+    by_calls = page["forces"](inputs["setpoint"].tolist(), inputs["measured"].tolist())
     assert np.array_equal(by_calls, force[:, 0])
     times = np.arange(len(force)) * 0.002
     rows_of = np.array(

@@ -69,7 +69,7 @@ def test_the_mass_is_the_same_on_two_machines() -> None:
     two = check(GALLERY / "mass_two.yaml")
     one = {block.path: block for block in check(GALLERY / "mass.yaml").blocks}
     assert {block.path: block.machine for block in two.blocks} == {
-        path: "desk" if path in ("wish", "pid") else "rail" for path in one
+        path: "desk" if path in ("setpoint", "pid") else "rail" for path in one
     }
 
 

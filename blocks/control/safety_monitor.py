@@ -519,8 +519,8 @@ def measured_value(health: RobotHealth, fault: int, place: int) -> float:
 @kernel
 def first_bad_switch(switches: SwitchHealth) -> int:
     """The first foot switch that is at fault; the last one if none is."""
-    place = 0
-    while place < switches.fault.shape[0] - 1 and switches.fault[place] == SwitchFault.NONE:
+    place, fault = 0, switches.fault
+    while place < fault.shape[0] - 1 and (fault[place] == 0 or fault[place] == SwitchFault.HEAVY):
         place += 1
     return place
 

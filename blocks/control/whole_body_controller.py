@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Indices1D
+from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
@@ -290,6 +290,11 @@ class WholeBodyController(KernelBlock):
             keep_solution, self._active_calls.loaded, self._code, command, self.memory,
             self._unsolved,
         )  # fmt: skip
+        self._hold_settings = HoldSettings(np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
+        self._hold = signal_call(
+            hold_torque, self.phase, self._model, command, self.memory, self._hold_settings
+        )
+        self.event_calls = (self._hold,)
         self._arrange()
 
     def _make_tasks(self, n: int) -> None:
@@ -321,7 +326,10 @@ class WholeBodyController(KernelBlock):
         return [chosen.params(kind, getattr(self.params, kind)) for chosen in self._chosen]
 
     def prepare(self) -> None:
-        p, weights = self.params, self._weights
+        p, weights, hold = self.params, self._weights, self._hold_settings
+        hold.ticks[0], hold.decay[0], hold.weight[0] = (
+            p.fallback_ticks, p.fallback_decay, self._weight,
+        )  # fmt: skip
         weights.acceleration[0], weights.force[0] = p.acceleration_weight, p.force_weight
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
@@ -353,26 +361,7 @@ class WholeBodyController(KernelBlock):
             self._fallback.run()
             self._keep.run()
         if self._unsolved[0]:
-            self._hold_torque()
-
-    def _hold_torque(self) -> None:
-        """The last solved torque, which decays, and then the torque that carries the weight."""
-        p, memory, command = self.params, self.memory, self.command
-        memory.failed[()] += 1
-        memory.failures[()] += 1
-        command.solved[()] = False
-        command.failures[()] = memory.failures
-        command.force.fill(0.0)
-        command.acceleration.fill(0.0)
-        failed = int(memory.failed)
-        if failed <= p.fallback_ticks:
-            np.multiply(memory.torque, p.fallback_decay**failed, out=command.torque)
-            return
-        stance, model = self.phase.stance, self._model
-        command.force[stance, 2] = self._weight / np.count_nonzero(stance)
-        command.torque[...] = model.nonlinear[6:]
-        for point in np.flatnonzero(stance):
-            command.torque -= command.force[point, 2] * model.jacobian[point, 2, 6:]
+            self._hold.run()
 
 
 @cache
@@ -440,3 +429,48 @@ def keep_solution(
     memory.failed = 0
     command.solved = True
     command.failures = memory.failures
+
+
+class HoldSettings(NamedTuple):
+    """What holds where no solution was found, each (1,): for how many ``ticks`` the last torque is
+    held, by which factor it decays in each, and the robot's ``weight`` [N]."""
+
+    ticks: Indices1D
+    decay: Array1D
+    weight: Array1D
+
+
+@kernel
+def hold_torque(
+    phase: PhaseState,
+    model: RigidBodyTerms,
+    command: WholeBodyCommand,
+    memory: SolverMemory,
+    settings: HoldSettings,
+) -> None:
+    """The last solved torque, which decays, and then the torque that carries the weight."""
+    memory.failed += 1
+    memory.failures += 1
+    command.solved = False
+    command.failures = memory.failures
+    command.force[:, :] = 0.0
+    command.acceleration[:] = 0.0
+    if memory.failed <= settings.ticks[0]:
+        share = 1.0
+        for _ in range(int(memory.failed)):
+            share *= settings.decay[0]
+        command.torque[:] = share * memory.torque
+        return
+    loaded = 0
+    for point in range(phase.stance.shape[0]):
+        if phase.stance[point]:
+            loaded += 1
+    for joint in range(command.torque.shape[0]):
+        command.torque[joint] = model.nonlinear[6 + joint]
+    for point in range(phase.stance.shape[0]):
+        if phase.stance[point]:
+            command.force[point, 2] = settings.weight[0] / loaded
+            for joint in range(command.torque.shape[0]):
+                command.torque[joint] -= (
+                    command.force[point, 2] * model.jacobian[point, 2, 6 + joint]
+                )

@@ -6,7 +6,7 @@ from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import ContactState, ContactSwitches, SwitchHealth
+from ..signals import ContactState, ContactSwitches, SwitchFault, SwitchHealth
 
 
 class ContactTimers(Signal):
@@ -25,7 +25,8 @@ class ContactDetector(Block):
     not interrupt a contact, and a foot that lands toe first is in contact at its toe only: the
     points of a foot do not influence one another.
 
-    A switch that is said to be at ``fault`` counts as open (``SwitchMonitor``).
+    ``SwitchMonitor`` says which switches are not to be believed: one at fault counts as open, and a heavy one as
+    closed.
 
     The hold delays the report of a lift-off by the same time; a block that needs lift-off sooner
     reads the switches or the plan's time. The block does not estimate forces.
@@ -66,7 +67,8 @@ class ContactDetector(Block):
         constants: Constants,
     ) -> None:
         for point in range(switches.closed.shape[0]):
-            if switches.closed[point] and faults.fault[point] == 0:
+            fault = faults.fault[point]
+            if fault == SwitchFault.HEAVY or (switches.closed[point] and fault == SwitchFault.NONE):
                 timers.closed[point] += 1
                 timers.opened[point] = 0
                 if timers.closed[point] >= params.close_samples:

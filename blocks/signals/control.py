@@ -35,10 +35,12 @@ class SwitchFault(IntEnum):
     """It stayed open under a foot that stands."""
     BOUNCING = 3
     """It opened and closed too often."""
+    HEAVY = 4
+    """No fault: it needs more than its share of the weight, and its point stands although it is open."""
 
 
 class SwitchHealth(Signal):
-    """Which foot switches are not to be believed, and whether the robot should stop for that."""
+    """Which foot switches are not to be believed now, and whether the robot should stop for that."""
 
     fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="see SwitchFault")
     stop = Field(dtype="bool", text="one of them is at fault, and the robot is not in the air")

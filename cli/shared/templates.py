@@ -74,8 +74,8 @@ GRAPH = """\
 rate: 100 Hz
 duration: 3 s
 blocks:
-  wish:      {{use: blocks.Step, with: {{at: 0.5 s, after: 1 m}}}}
-  error:     {{use: blocks.Sum, with: {{weights: [1, -1]}}, in: {{a: wish.y, b: position.y}}}}
+  setpoint:  {{use: blocks.Step, with: {{at: 0.5 s, after: 1 m}}}}
+  error:     {{use: blocks.Sum, with: {{weights: [1, -1]}}, in: {{a: setpoint.y, b: position.y}}}}
   loop_rate: {{use: blocks.Gain, with: {{gain: 4.0, unit: 1/s}}, in: {{u: error.y}}}}
   position:  {{use: blocks.Integrator, in: {{u: loop_rate.y}}}}
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from difflib import get_close_matches
 from math import prod
@@ -40,6 +40,7 @@ class Terminal:
     text: str
     start: Any = 0
     depends: tuple[str, ...] = ()
+    frame: str | None = None
 
     def plain(self) -> dict[str, Any]:
         """The terminal as plain data."""
@@ -58,7 +59,12 @@ class Cut:
 
 
 def cut(
-    path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()
+    path: str,
+    part: str = "",
+    overrides: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    alone: bool = False,
 ) -> Cut:
     """Cut a part out of a graph.
 
@@ -69,6 +75,8 @@ def cut(
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``; none: those that the sub-graph declares, or
             those of the whole graph that no block reads.
+        alone: whether only blocks are taken on which an output depends, and no robot. The outputs of
+            a whole graph are then what its robots read.
 
     Raises:
         LoadError: the graph may not run.
@@ -83,13 +91,20 @@ def cut(
         there = f"the nearest is {near[0]}" if near else f"there is {', '.join(names[:12])}"
         raise AloftError(f"{path} has no sub-graph {part!r}; {there}")
     external = {b.path: specs[b.path] for b in inside if b.use == "blocks.External"}
-    inside = [b for b in inside if b.path not in external]
+    robots = [p for p in specs if alone and specs[p].block_type.outside != "no"]
+    inside = [b for b in inside if b.path not in external and b.path not in robots]
+    if not outputs and not part and robots:
+        outputs = _read_by(robots, specs, [b.path for b in inside])
+    chosen = _outputs(flat, part, graph, outputs, [b.path for b in inside])
+    if alone:
+        ends = [source.rpartition(".")[0] for source in chosen.values()]
+        needed = _ancestors(ends, specs, {*robots, *external})
+        inside = [b for b in inside if b.path in needed]
     read = _read_from_outside(inside, specs)
     for block in external:
         read.setdefault(block, {})["y"] = None
     titles = _input_names(flat, part, read, external)
     stubs, inputs = _stubs(read, titles, specs, external)
-    chosen = _outputs(flat, part, graph, outputs, [b.path for b in inside])
     results = []
     for name, source in chosen.items():
         block, _, port = source.rpartition(".")
@@ -99,12 +114,12 @@ def cut(
         results += [replace(each, depends=before) for each in found]
     _check_names([*inputs, *results])
     blocks = tuple(replace(b, machine=None) for b in inside)
-    alone = replace(flat, blocks=blocks, duration=None, clock=None, machines=None, links=None)
+    without = replace(flat, blocks=blocks, duration=None, clock=None, machines=None, links=None)
     lines = [
         f"  {path}: {{use: fmi.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
         for path, ports in stubs.items()
     ]
-    return Cut(alone.text + "".join(lines), tuple(inputs), tuple(results), graph, blocks)
+    return Cut(without.text + "".join(lines), tuple(inputs), tuple(results), graph, blocks)
 
 
 Read = dict[str, dict[str, "dict[str, None] | None"]]
@@ -189,6 +204,7 @@ def _terminals(
             field.dtype_name,
             _unit_text(_quantity(spec, port, field_name)),
             field.text or spec.block_type.outputs[port].text,
+            frame=_quantity(spec, port, field_name).frame,
         )
         for field_name, field in fields.items()
         if wanted is None or field_name in wanted
@@ -244,6 +260,38 @@ def _outputs(
     if not ends:
         raise AloftError("every output of the graph is read by a block; name some with --output")
     return {_structured(name): name for name in ends}
+
+
+def _read_by(
+    robots: Iterable[str], specs: Mapping[str, BlockSpec], inside: Sequence[str]
+) -> list[str]:
+    """The outputs inside that robots read, of blocks that act on no true state."""
+    wires = [wire for path in robots for wire in specs[path].wires.values()]
+    return list(
+        dict.fromkeys(
+            wire.source
+            for wire in wires
+            if wire.source_block in inside
+            and not any(
+                port.reads_truth for port in specs[wire.source_block].block_type.inputs.values()
+            )
+        )
+    )
+
+
+def _ancestors(
+    blocks: Iterable[str], specs: Mapping[str, BlockSpec], outside: Container[str]
+) -> dict[str, None]:
+    """Blocks and all on which they depend, in this tick or through earlier ones, but not through
+    what is outside."""
+    found: dict[str, None] = {}
+    pending = list(blocks)
+    while pending:
+        path = pending.pop()
+        if path not in found and path not in outside:
+            found[path] = None
+            pending += [wire.source_block for wire in specs[path].wires.values()]
+    return found
 
 
 def _whole(name: str, wire: FlatWire, inside: Iterable[str]) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
+from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
 from .drives import DriveTrain, MotorLimits, MotorScratch
 from .effects import BatteryParameters
@@ -22,7 +23,8 @@ from .state import PhysicsState
 
 
 class Pack(NamedTuple):
-    """The pack's parameters as numbers, and the motors' curves at the rated voltage, (n_motors,)."""
+    """The pack's parameters as numbers, and the motors' curves at the rated voltage and their copper heat for
+    their torque squared [W/(N m)^2], (n_motors,)."""
 
     open_voltage: float
     resistance: float
@@ -32,10 +34,10 @@ class Pack(NamedTuple):
     capacity: float
     board_power: float
     rated_voltage: float
-    heating: float
     timestep: float
     slope: Array1D
     no_load: Array1D
+    heating: Array1D
 
 
 @kernel
@@ -48,7 +50,7 @@ def draw_power(pack: Pack, motors: DriveTrain, scratch: MotorScratch, memory: Ph
     power = pack.board_power
     for k in range(scratch.torque.shape[0]):
         torque = scratch.torque[k]
-        power += torque * scratch.speed[k] + pack.heating * torque * torque
+        power += torque * scratch.speed[k] + pack.heating[k] * torque * torque
     battery = memory.battery
     inner = pack.open_voltage - pack.fall * battery[1] / pack.capacity - battery[2]
     inner = max(inner, 0.0)
@@ -84,16 +86,21 @@ class Battery:
 
     Args:
         params: of the pack.
+        robot: whose description has a ``supply``.
         timestep: of the physics [s].
         memory: keeps voltage and charge.
     """
 
-    def __init__(self, params: BatteryParameters, timestep: float, memory: PhysicsState) -> None:
-        self._params, self._timestep, self._memory = params, timestep, memory
+    def __init__(
+        self, params: BatteryParameters, robot: RobotDescription, timestep: float,
+        memory: PhysicsState,
+    ) -> None:  # fmt: skip
+        self._supply, self._heating = params.of(robot), params.of(robot).heating(robot.motors)
+        self._recovery_time, self._timestep, self._memory = params.recovery_time, timestep, memory
 
     def begin(self) -> None:
         """The pack is full and has rested."""
-        self._memory.battery[:] = [self._params.open_voltage, 0.0, 0.0, 0.0]
+        self._memory.battery[:] = [self._supply.open_voltage, 0.0, 0.0, 0.0]
 
     @property
     def voltage(self) -> Array:
@@ -103,11 +110,10 @@ class Battery:
 
     def feeding(self, limits: MotorLimits) -> KernelCall:
         """Feeds the motors in a physics step, and sets what they can do in the next one."""
-        p, motors = self._params, limits.motors
+        p, motors = self._supply, limits.motors
         pack = Pack(
-            p.open_voltage, p.resistance, -math.expm1(-self._timestep / p.recovery_time),
+            p.open_voltage, p.resistance, -math.expm1(-self._timestep / self._recovery_time),
             p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage,
-            p.winding_resistance / p.torque_constant**2, self._timestep, np.array(motors.slope),
-            np.array(motors.no_load),
+            self._timestep, np.array(motors.slope), np.array(motors.no_load), self._heating,
         )  # fmt: skip
         return signal_call(draw_power, pack, motors, limits.scratch, self._memory)

@@ -35,14 +35,14 @@ from .state import PhysicsState
 class EncoderModel(NamedTuple):
     """The encoders of all joints: ``delay`` (n,) in physics steps, the ``share`` of a new velocity that
     passes the filter in a step, ``phase`` (n,) of the ``eccentricity`` [rad], ``compliance`` [rad/(N m)]
-    and half the ``backlash`` [rad], of which a ``crossing`` share is made up in a step."""
+    and half the ``play`` (n,) [rad], of which a ``crossing`` share is made up in a step."""
 
     delay: Indices1D
     share: float
     eccentricity: float
     phase: Array1D
     compliance: float
-    play: float
+    play: Array1D
     crossing: float
 
 
@@ -66,7 +66,7 @@ def sense_joints(
     """
     for k in range(position.shape[0]):
         reading = position[k] + model.compliance * torque[k]
-        end = model.play * math.tanh(torque[k] / PLAY_TORQUE)
+        end = model.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
         memory.encoder_play[k] += model.crossing * (end - memory.encoder_play[k])
         reading += memory.encoder_play[k]
         reading += model.eccentricity * math.sin(position[k] + model.phase[k])
@@ -87,7 +87,7 @@ def sense_joints(
 class DrawnMotors(NamedTuple):
     """All motors: what maps their torques and speeds to joints and back, (n, n); ``constant`` (n,), the
     factor on their torque constants; ``saturation`` at the ``peak`` torque (n,) [N m]; the ``share`` of a new
-    torque that passes the current loop in a step; ``limit`` (n,) [N m]; ``ripple`` [N m], ``periods`` in a
+    torque that passes the current loop in a step; ``limit`` (n,) [N m]; ``ripple`` (n,) [N m], ``periods`` in a
     turn and their ``phase`` (n,); ``friction``, the share that is lost under load; ``cogging`` (n,) [N m], its
     ``teeth`` in a turn and their phase ``at_tooth`` (n,)."""
 
@@ -98,7 +98,7 @@ class DrawnMotors(NamedTuple):
     peak: Array1D
     share: float
     limit: Array1D
-    ripple: float
+    ripple: Array1D
     periods: int
     phase: Array1D
     friction: float
@@ -137,9 +137,8 @@ def produce_torque(
             load = min(abs(given) / model.peak[k], 1.0)
         given *= model.constant[k] * (1.0 - model.saturation * load * load)
         given -= model.friction * abs(given) * math.tanh(scratch.speed[k] / SLIDING_SPEED)
-        if model.peak[k] > 0.0:
-            turned = model.periods * scratch.angle[k] + model.phase[k]
-            given += model.ripple * math.sin(turned)
+        turned = model.periods * scratch.angle[k] + model.phase[k]
+        given += model.ripple[k] * math.sin(turned)
         turned = model.teeth * scratch.angle[k] + model.at_tooth[k]
         given += model.cogging[k] * math.sin(turned)
         scratch.gained[k] = given - requested[k]
@@ -172,7 +171,7 @@ class DriveEffects:
             np.full(n, round(encoders.delay / timestep)),
             -math.expm1(-timestep / time) if time > 0.0 else 1.0,
             encoders.eccentricity, turn * stream(seed, Purpose.ECCENTRICITY).random(n),
-            encoders.compliance, 0.5 * encoders.backlash, -math.expm1(-timestep / PLAY_TIME),
+            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -math.expm1(-timestep / PLAY_TIME),
         )  # fmt: skip
         draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
         self.torque_constant = motors.torque_constant * (
@@ -188,7 +187,7 @@ class DriveEffects:
             np.ascontiguousarray(robot.joint_to_motor.T), self.torque_constant,
             motors.saturation, np.array(robot.motors.peak_torque),
             -math.expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
-            motors.ripple, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
+            motors.ripple * robot.motors.peak_torque, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
             motors.load_friction, motors.cogging * robot.motors.peak_torque, motors.cogging_periods,
             turn * stream(seed, Purpose.COGGING).random(n),
         )  # fmt: skip

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 
 from ...mathematics.arrays import Array
-from ...runtime.language.parameters import Parameters, ThreeNumbers, parameter
+from ...robots.robot_description import PowerSupply, RobotDescription
+from ...runtime.language.parameters import Parameters, ThreeNumbers, TwoNumbers, parameter
 
 
 class ImuEffects(Parameters):
@@ -90,8 +91,9 @@ class EncoderEffects(Parameters):
         0.0, unit="rad/(N m)", ge=0.0, text="by which the gear yields before the encoder"
     )
     backlash: float = parameter(
-        0.0, unit="rad", ge=0.0, text="width of the gear's play before the encoder"
-    )
+        0.0, ge=0.0,
+        text="width of the gear's play before the encoder, as a multiple of the description's `gear_play`",
+    )  # fmt: skip
 
 
 class MotorEffects(Parameters):
@@ -115,8 +117,9 @@ class MotorEffects(Parameters):
         text="what a motor is limited to by its current, below its peak; none: its peak",
     )  # fmt: skip
     ripple: float = parameter(
-        0.0, unit="N m", ge=0.0, text="amplitude of the torque ripple, with a drawn phase"
-    )
+        0.0, ge=0.0, lt=0.5,
+        text="amplitude of the torque ripple, as a share of a motor's peak torque; with a drawn phase",
+    )  # fmt: skip
     ripple_periods: int = parameter(60, ge=1, text="periods of the ripple in a turn of the output")
     cogging: float = parameter(
         0.0, ge=0.0, lt=0.5,
@@ -199,8 +202,10 @@ class SoleParameters(Parameters):
 class CableParameters(Parameters):
     """A cable to the robot's base, which pulls from the first tick on."""
 
-    pull: float = parameter(unit="N", ge=0.0, text="its horizontal force, in a drawn direction")
-    weight: float = parameter(0.0, unit="N", ge=0.0, text="what hangs of it on the robot")
+    pull: float = parameter(
+        ge=0.0, text="its horizontal force in a drawn direction, as a share of the robot's weight"
+    )
+    weight: float = parameter(0.0, ge=0.0, text="what hangs of it on the robot, likewise")
 
 
 class GantryParameters(Parameters):
@@ -227,36 +232,41 @@ class GantryParameters(Parameters):
 
 
 class BatteryParameters(Parameters):
-    """A pack; the defaults are estimates for four lithium-polymer cells of 2.2 A h."""
+    """A pack, or the supply of a bench; what is none is as ``supply`` in the robot's description says."""
 
-    open_voltage: float = parameter(16.0, unit="V", gt=0.0, text="without load, at the start")
-    resistance: float = parameter(0.03, unit="ohm", ge=0.0, text="what a load sees at once")
-    recovery_resistance: float = parameter(
-        0.01, unit="ohm", ge=0.0, text="what builds up under load and recovers after it"
+    open_voltage: float | None = parameter(
+        None, unit="V", gt=0.0, text="without load, at the start"
+    )
+    resistance: float | None = parameter(None, unit="ohm", ge=0.0, text="what a load sees at once")
+    recovery_resistance: float | None = parameter(
+        None, unit="ohm", ge=0.0, text="what builds up under load and recovers after it"
     )
     recovery_time: float = parameter(
         10.0, unit="s", gt=0.0, text="time constant of building up and recovering"
     )
-    capacity: float = parameter(7920.0, unit="A s", gt=0.0, text="charge of the full pack")
-    fall: float = parameter(
-        2.4, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
+    capacity: float | None = parameter(None, unit="A s", gt=0.0, text="charge of the full pack")
+    fall: float | None = parameter(
+        None, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
     )
-    board_power: float = parameter(15.0, unit="W", ge=0.0, text="what computer and boards draw")
-    rated_voltage: float = parameter(
-        14.8, unit="V", gt=0.0,
-        text="voltage at which the motors reach the speeds of the robot's description",
-    )  # fmt: skip
-    winding_resistance: float = parameter(
-        0.2, unit="ohm", ge=0.0, text="of a motor, as its torque current sees it"
+    board_power: float | None = parameter(
+        None, unit="W", ge=0.0, text="what computer and boards draw"
     )
-    torque_constant: float = parameter(
-        0.35, unit="N m/A", gt=0.0, text="torque at the output for each ampere"
-    )
+
+    def of(self, robot: RobotDescription) -> PowerSupply:
+        """The supply of a robot whose description has one, with what is said here in place of its values."""
+        assert robot.supply is not None
+        changes = self.model_dump(exclude_none=True, exclude={"recovery_time"})
+        return robot.supply.model_copy(update=changes)
 
 
 class SwitchEffects(Parameters):
-    """What delays the foot switches; by default nothing."""
+    """What delays the foot switches, and how hard they are to press; by default nothing."""
 
+    threshold: TwoNumbers | None = parameter(
+        None,
+        text="lowest and highest force that closes a switch, drawn per switch, as shares of the weight that stands on "
+        "each contact point; none: `switch_threshold`",
+    )  # fmt: skip
     debounce: float = parameter(
         0.0, unit="s", ge=0.0, le=0.1,
         text="for how long a switch must be pressed or free before the board says so",

@@ -14,7 +14,7 @@ from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .simulated_robot import SimulatedRobot, SimulatorParameters, too_fast_effects
+from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
 from .state import DriveState, TickRecord
 from .unsupported import uneven_contacts, unsupported_motor
 
@@ -92,11 +92,11 @@ class MujocoRobot(SimulatedRobot):
             },
             "encoders": {
                 "delay": 0.00025, "velocity_filter": 0.0005, "eccentricity": 0.002,
-                "compliance": 1e-5, "backlash": 0.002,
+                "compliance": 1e-5, "backlash": 0.2,
             },
             "motors": {
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
-                "torque_limit": 1000.0, "ripple": 0.05, "load_friction": 0.05, "cogging": 0.01,
+                "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
             },
             "battery": {"resistance": 0.03},
             "links": {
@@ -106,9 +106,9 @@ class MujocoRobot(SimulatedRobot):
                 "friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1,
                 "static_friction": 1.2, "static_friction_spread": 0.3,
             },
-            "switches": {"debounce": 0.001, "sticking": 0.002},
+            "switches": {"threshold": [0.04, 0.25], "debounce": 0.001, "sticking": 0.002},
             "soles": {"time_constant": 0.006, "damping_ratio": 0.8},
-            "cable": {"pull": 0.2, "weight": 0.1},
+            "cable": {"pull": 0.004, "weight": 0.002},
         }  # fmt: skip
 
     @classmethod
@@ -130,7 +130,7 @@ class MujocoRobot(SimulatedRobot):
                 uneven,
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
-        yield from too_fast_effects(params, robot)
+        yield from impossible_effects(params, robot)
         bus = params.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"

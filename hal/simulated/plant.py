@@ -152,7 +152,7 @@ class ExternalForces:
         it makes begin anew, the second after it."""
         assert params.cable is not None
         base = self._points.wrenches[self._base, :3]
-        force = np.array(draw_pull(params.cable, params.seed))
+        force = np.array(draw_pull(params.cable, params.seed, self._robot))
         return [self.releasing(), KernelCall(add_force, force, base)]
 
     def check(self, push: ExternalForce) -> None:
@@ -272,7 +272,7 @@ class Plant:
         )
         self.battery = None
         if params.battery is not None:
-            self.battery = Battery(params.battery, params.timestep, physics)
+            self.battery = Battery(params.battery, robot, params.timestep, physics)
         self.switches = None
         if params.switches != SwitchEffects():
             self.switches = SwitchDelays(params.switches, params.timestep, physics)

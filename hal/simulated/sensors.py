@@ -12,6 +12,7 @@ from ...blocks.signals import ImuReading, JointState
 from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices1D, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...robots.robot_description import MountedSensorPart
@@ -181,8 +182,12 @@ class SimulatedSensors:
         }
         self.encoder_offset = self._joint_errors["position"].bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
+        limits, points = params.switch_threshold, max(1, len(robot.contacts))
+        if params.switches.threshold is not None:
+            load = robot.total_mass * GRAVITY / points
+            limits = [load * share for share in params.switches.threshold]
         self.switch_threshold = SwitchSensors.draw_thresholds(
-            params.switch_threshold, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
+            limits, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
         )
         """The force that closes every switch [N]."""
         self.ground_force = -self.switch_threshold

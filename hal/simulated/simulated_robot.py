@@ -168,7 +168,7 @@ class SimulatorParameters(DriveGains):
         None, text="the pack; none: a supply whose voltage never changes"
     )
     switches: SwitchEffects = parameter(
-        SwitchEffects(), text="the foot switches, besides threshold and bounce"
+        SwitchEffects(), text="the foot switches, besides `switch_threshold` and bounce"
     )
     soles: SoleParameters | None = parameter(
         None, text="soles of rubber; none: as stiff as all else"
@@ -194,8 +194,10 @@ class SimulatorParameters(DriveGains):
 
     @model_validator(mode="after")
     def _check_ranges(self) -> Self:
-        for name in ("friction_range", "switch_threshold"):
-            value = getattr(self, name)
+        for name, value in (
+            ("friction_range", self.friction_range), ("switch_threshold", self.switch_threshold),
+            ("switches.threshold", self.switches.threshold),
+        ):  # fmt: skip
             if value is not None and not 0.0 < value[0] <= value[1]:
                 raise ValueError(f"{name} must be two positive numbers in rising order: {value}")
         return self
@@ -227,11 +229,17 @@ _STEPS = (5e-4, 2.5e-4, 1e-4, 5e-5, 2.5e-5, 1e-5, 1e-6)
 """Steps of the physics that divide a millisecond [s]."""
 
 
-def too_fast_effects(
+def impossible_effects(
     params: SimulatorParameters, robot: RobotDescription
 ) -> Iterator[UnmetRequirement]:
-    """Report effects that the physics' steps are too long for."""
+    """Report effects that the robot or the physics' steps do not allow."""
     step = params.timestep
+    if params.battery is not None and robot.supply is None:
+        yield UnmetRequirement(
+            f"the description of {robot.name} does not say what feeds it", parameter="battery",
+            expected="`supply` in the description", found="none",
+            fix="supply: {rated_voltage: ..., open_voltage: ..., resistance: ..., capacity: ...}",
+        )  # fmt: skip
     fastest = 0.45 / step
     for name in ("bandwidth", "mount_frequency"):
         frequency = getattr(params.imu, name)

@@ -85,10 +85,14 @@ def _static_friction(joints: JointEffects, seed: int, n: int) -> tuple[float, ..
     return tuple((1.0 + beyond).tolist())
 
 
-def draw_pull(cable: CableParameters, seed: int) -> tuple[float, float, float]:
+def draw_pull(
+    cable: CableParameters, seed: int, robot: RobotDescription
+) -> tuple[float, float, float]:
     """The force of a cable [N, world]."""
+    pull = cable.pull * robot.total_mass * GRAVITY
+    hanging = cable.weight * robot.total_mass * GRAVITY
     heading = 2.0 * math.pi * float(stream(seed, Purpose.CABLE).random())
-    return cable.pull * math.cos(heading), cable.pull * math.sin(heading), -cable.weight
+    return pull * math.cos(heading), pull * math.sin(heading), -hanging
 
 
 def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Variation:

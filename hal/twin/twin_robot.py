@@ -18,7 +18,7 @@ from ..simulated.plant import Plant
 from ..simulated.simulated_robot import (
     SimulatedRobot,
     SimulatorParameters,
-    too_fast_effects,
+    impossible_effects,
 )
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from ..simulated.unsupported import uneven_contacts, unsupported_motor
@@ -137,7 +137,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         complaint = unsupported_motor(robot) or uneven_contacts(robot)
         if complaint:
             yield UnmetRequirement(complaint, fix="correct the robot's description")
-        yield from too_fast_effects(params, robot)
+        yield from impossible_effects(params, robot)
         if len(robot.contacts) > 7:
             yield UnmetRequirement(
                 f"{robot.name} has {len(robot.contacts)} contact points, and a packet of the "

@@ -77,9 +77,27 @@ def optimised(assembly: str) -> bytes:
     Raises:
         RuntimeError: the module is not valid.
     """
-    binding, machine = _binding(), target_machine()
+    return _optimised(assembly, _binding().get_process_triple(), target_machine())
+
+
+def cross_compiled(assembly: str, triple: str, cpu: str, features: str = "") -> bytes:
+    """The object file of a module for another kind of processor.
+
+    Raises:
+        RuntimeError: the module is not valid, or LLVM has no such processor.
+    """
+    binding = _binding()
+    binding.initialize_all_targets()
+    binding.initialize_all_asmprinters()
+    target = binding.Target.from_triple(triple)
+    machine = target.create_target_machine(cpu=cpu, features=features, opt=3, reloc="pic")
+    return _optimised(assembly, triple, machine)
+
+
+def _optimised(assembly: str, triple: str, machine: Any) -> bytes:
+    binding = _binding()
     module = binding.parse_assembly(assembly)
-    module.triple = binding.get_process_triple()
+    module.triple = triple
     module.data_layout = str(machine.target_data)
     module.verify()
     options = binding.create_pipeline_tuning_options(speed_level=3)
@@ -89,6 +107,36 @@ def optimised(assembly: str) -> bytes:
     builder.getModulePassManager().run(module, builder)
     code: bytes = machine.emit_object(module)
     return code
+
+
+def read_only_arguments(assembly: str, names: set[str]) -> dict[str, tuple[bool, ...]]:
+    """For each operand of some functions of a module whether nothing is written through it.
+
+    It is what LLVM can prove; an operand that is no address counts as such.
+
+    Raises:
+        RuntimeError: the module is not valid.
+    """
+    binding, machine = _binding(), target_machine()
+    # functions that others could replace are not looked into, hence: internal, and used by nobody
+    module = binding.parse_assembly(assembly)
+    options = binding.create_pipeline_tuning_options(speed_level=1)
+    builder = binding.create_pass_builder(machine, options)
+    functions = [each for each in module.functions if each.name in names]
+    for each in functions:
+        each.linkage = "external"
+    manager = binding.create_new_module_pass_manager()
+    manager.add_sroa_pass()
+    manager.add_simplify_cfg_pass()
+    manager.add_post_order_function_attributes_pass()
+    manager.run(module, builder)
+    return {
+        each.name: tuple(
+            str(a.type) != "ptr" or any(w in (b"readonly", b"readnone") for w in a.attributes)
+            for a in each.arguments
+        )
+        for each in functions
+    }
 
 
 def assemble(assembly: str) -> bytes:

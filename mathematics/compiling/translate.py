@@ -6,7 +6,7 @@ reordering of sums and no fused multiply-add, so the machine code rounds as plai
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .arguments import HEADER, ArgumentType, ArrayType
@@ -49,19 +49,19 @@ class Translator:
             CompileError: the kernel does what compiled code cannot.
         """
         made = self._translate(kernel, signature)
-        functions: dict[str, Translated] = {}
-        pending = [made]
-        while pending:
-            each = pending.pop()
-            if each.name not in functions:
-                functions[each.name] = each
-                pending += each.callees.values()
-        declared: dict[str, str] = {}
-        for each in functions.values():
-            declared |= each.declared
         name = f"{kernel.__module__}.{kernel.__qualname__}"
-        texts = [each.text for each in functions.values()]
-        return "\n".join((*declared.values(), *texts, _entry_point(made, name, signature)))
+        return "\n".join((_with_callees([made]), _entry_point(made, name, signature), ATTRIBUTES))
+
+    def functions(
+        self, kernels: Sequence[tuple[Callable[..., Any], tuple[ArgumentType, ...]]]
+    ) -> tuple[str, list[Translated]]:
+        """Kernels for arguments of some types: the text of all with what they call, and each.
+
+        Raises:
+            CompileError: a kernel does what compiled code cannot.
+        """
+        made = [self._translate(kernel, signature) for kernel, signature in kernels]
+        return _with_callees(made), made
 
     def _translate(self, kernel: Any, signature: tuple[ArgumentType, ...]) -> Translated:
         key = id(kernel), signature
@@ -78,6 +78,28 @@ class Translator:
 
     def _callee(self, function: Any, signature: tuple[ArgumentType, ...]) -> Translated | None:
         return self._translate(function, signature) if is_kernel(function) else None
+
+
+def _with_callees(made: Sequence[Translated]) -> str:
+    """Functions and all that they call, each once, behind what they call of libraries."""
+    functions: dict[str, Translated] = {}
+    pending = list(made)
+    while pending:
+        each = pending.pop()
+        if each.name not in functions:
+            functions[each.name] = each
+            pending += each.callees.values()
+    declared: dict[str, str] = {}
+    for each in functions.values():
+        declared |= each.declared
+    return "\n".join((*declared.values(), *(each.text for each in functions.values())))
+
+
+ATTRIBUTES = """\
+attributes #0 = { nounwind }
+attributes #1 = { nounwind willreturn memory(none) }
+!0 = !{!"branch_weights", i32 1, i32 4000}"""
+"""What the functions of a module refer to, at its end."""
 
 
 def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...]) -> str:
@@ -143,8 +165,5 @@ def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...
             "done:",
             "  ret void",
             "}",
-            "attributes #0 = { nounwind }",
-            "attributes #1 = { nounwind willreturn memory(none) }",
-            '!0 = !{!"branch_weights", i32 1, i32 4000}',
         )
     )

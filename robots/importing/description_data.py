@@ -356,7 +356,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     known = {name: angle for name, angle in model.pose.items() if name in names}
     data["standing"] = known
     data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
-    for key in ("profile", "sensors", "standing", "held", "looks"):
+    for key in ("profile", "sensors", "standing", "held", "supply", "looks"):
         if key in added:
             data[key] = added[key]
     _stand_within_limits(data)

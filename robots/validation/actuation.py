@@ -157,7 +157,7 @@ def _check_rating(
         draft.add(
             (*path, key), f"{owner}: {none} {key} of {number(value)}", expected, number(value), fix
         )
-    for key in ("rotor_inertia", "friction", "damping"):
+    for key in ("rotor_inertia", "friction", "damping", "gear_play"):
         value = getattr(rating, key)
         if value is not None and not (math.isfinite(value) and value >= 0.0):
             draft.add(

@@ -197,6 +197,9 @@ class Block:
     event: NDArray[np.int64] | None = None
     """Not zero where the last step asks for ``on_event``, (1,); none where it never does."""
 
+    event_calls: Sequence[KernelCall] = ()
+    """What a library without Python does in the place of ``on_event``, where there is something."""
+
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         ports = {n: v for n, v in vars(cls).items() if isinstance(v, Port)}

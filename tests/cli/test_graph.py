@@ -11,8 +11,8 @@ Call = Callable[..., Any]
 GRAPH = """
 rate: 100 Hz
 blocks:
-  wish: {use: blocks.SineWave}
-  inner: {use: part.yaml, in: {u: wish.y}}
+  setpoint: {use: blocks.SineWave}
+  inner: {use: part.yaml, in: {u: setpoint.y}}
 """
 
 

@@ -54,7 +54,7 @@ def test_show_lists_the_effects_that_can_be_simulated() -> None:
     assert bandwidth["unit"] == "Hz" and bandwidth["default"] is None
     assert bandwidth["trial"] == "100 Hz"
     assert bandwidth["source"] == "data sheets of MEMS units: 5 to 400 Hz to choose from"
-    assert rows["switch_threshold"]["trial"] == ["1 N", "6 N"], "the last trial decides"
+    assert rows["switch_threshold"]["trial"] == ["0.5 N", "3 N"], "from a trial that it includes"
     assert rows["gyro_noise"]["trial"] == "0.02 rad/s", "of an included trial"
     assert rows["gears.stiffness"]["required"] and rows["gears.stiffness"]["group_is_off"]
     assert rows["gears.stiffness"]["trial"] is None

@@ -107,18 +107,18 @@ def test_graph_prints_order_rates_and_wires(folder: Path, call: Call, call_json:
 rate: 100 Hz
 duration: 2 s
 blocks:
-  wish: {use: blocks.SineWave, rate: 50 Hz}
-  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: position.y}}
+  setpoint: {use: blocks.SineWave, rate: 50 Hz}
+  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: setpoint.y, b: position.y}}
   rate: {use: blocks.Gain, with: {unit: 1/s}, in: {u: error.y}}
   position: {use: blocks.Integrator, in: {u: rate.y}}
 """)
     text = call("graph", "ring.yaml").stdout
     assert text.startswith("ring: base rate 100 Hz, 200 ticks\n")
-    order = [text.index(f" {name} ") for name in ("position", "wish", "error")]
+    order = [text.index(f" {name} ") for name in ("position", "setpoint", "error")]
     assert order == sorted(order)
-    assert "a <- wish.y (Vector, holds 50 Hz)" in text
+    assert "a <- setpoint.y (Vector, holds 50 Hz)" in text
     data = call_json("graph", "ring.yaml")
-    assert [row["path"] for row in data["blocks"]] == ["position", "wish", "error", "rate"]
+    assert [row["path"] for row in data["blocks"]] == ["position", "setpoint", "error", "rate"]
     assert call("graph", "ring.yaml", "--mermaid").stdout.startswith("flowchart LR\n")
     flat = call("graph", "ring.yaml", "--flat", "--set", "position.initial=0.5").stdout
     (folder / "flat.yaml").write_text(flat)
@@ -205,7 +205,7 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
         timeout=240
     )
     told, last = output.splitlines()
-    assert told.endswith("no problems; 22 blocks at 500 Hz"), errors
+    assert told.endswith("no problems; 24 blocks at 500 Hz"), errors
     searches, frozen, *modules = last.split()
     assert int(searches) < 10 and int(frozen) > 10_000
     tops = {name.partition(".")[0] for name in modules}

@@ -69,7 +69,10 @@ def test_what_came_later_changes_no_content() -> None:
     data = find_robot("bruce").model_dump(mode="json")
     assert not {"base_joint", "profile", "sensors", "held"} & set(data)
     assert "kind" not in data["joints"][0] and "motors" not in data["profiles"]["koala"]
-    assert RobotDescription.model_validate(data) == find_robot("bruce")
+    assert "supply" not in data and "gear_play" not in data["profiles"]["koala"]
+    whole = find_robot("bruce").model_dump(mode="json", context={"simulated": True})
+    assert whole["supply"]["rated_voltage"] == 14.8
+    assert RobotDescription.model_validate(whole) == find_robot("bruce")
 
 
 TEXT = """\

@@ -25,11 +25,11 @@ def test_sources_are_written_as_in_a_file() -> None:
 
 def loop() -> GraphBuilder:
     graph = GraphBuilder(name="loop", rate="100 Hz", duration="0.5 s")
-    wish = graph.add("wish", "blocks.Constant", value=np.array([1.0]))
+    setpoint = graph.add("setpoint", "blocks.Constant", value=np.array([1.0]))
     error = graph.add("error", "blocks.Sum", weights=[1, -1])
     rate = graph.add("rate", Gain, {"u": error.y}, gain="4 1/s")
     graph.add("position", "blocks.Integrator", {"u": rate.y}, on=None)
-    graph.wire("error.a", wish.y)
+    graph.wire("error.a", setpoint.y)
     graph.wire("error.b", Source("position").y)
     return graph
 
@@ -77,8 +77,8 @@ def test_what_cannot_be_meant_is_refused() -> None:
     with pytest.raises(AloftError, match="there are two blocks 'rate'"):
         graph.add("rate", "blocks.Gain")
     with pytest.raises(AloftError, match="there is no block 'eror'; the nearest is error"):
-        graph.wire("eror.a", "wish.y")
+        graph.wire("eror.a", "setpoint.y")
     with pytest.raises(AloftError, match=r"there is no block 'qqq'$"):
-        graph.wire("qqq.a", "wish.y")
+        graph.wire("qqq.a", "setpoint.y")
     with pytest.raises(AloftError, match=r"error\.a is wired already"):
-        graph.wire("error.a", "wish.y")
+        graph.wire("error.a", "setpoint.y")

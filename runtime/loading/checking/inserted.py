@@ -12,12 +12,11 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....files.nodes import ListNode, MapNode, Node, ScalarNode, plain, text_of
 from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Block, Input, Output
-from ...language.delay import DelayParameters, delay_block_type
+from ...language.delay import DelayParameters, copy_call, delay_block_type
 from ...language.errors import UnitError
 from ...language.parameters import Parameters, parameter
 from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities, Quantity
@@ -85,9 +84,9 @@ class Gather(Block):
         return known[0] if known and same else UNCHECKED
 
     def setup(self) -> None:
-        """Write the numbers, and take a view of every stretch, so that no tick makes one."""
+        """Write the numbers, and make a call for every stretch."""
         target: Signal = self.__dict__["y"]
-        self._copies: list[tuple[NDArray[Any], NDArray[Any]]] = []
+        calls = []
         for piece in self.pieces:
             out = target.views()[piece.target].reshape(-1)
             if piece.numbers:
@@ -95,12 +94,13 @@ class Gather(Block):
                 continue
             source = self.__dict__[piece.port].views()[piece.field].reshape(-1)
             for first, to, length in piece.copies:
-                self._copies.append((out[to : to + length], source[first : first + length]))
+                calls.append(copy_call(source[first : first + length], out[to : to + length]))
+        self.kernel_calls = calls
 
     def step(self) -> None:
         """Copy."""
-        for out, source in self._copies:
-            np.copyto(out, source)
+        for call in self.kernel_calls:
+            call.run()
 
 
 def gather_block_type(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.blocks.control.safety_monitor import SafetyFault, SafetyMonitor
-from aloft.blocks.signals import CommandMode, DrivePhase, SwitchFault
+from aloft.blocks.control.safety_monitor import SafetyFault, SafetyMonitor, first_bad_switch
+from aloft.blocks.signals import CommandMode, DrivePhase, SwitchFault, SwitchHealth
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -375,3 +375,11 @@ def test_a_foot_switch_at_fault_ends_the_run_when_the_robot_may_stop(bench):
 def test_needs_a_robot():
     with pytest.raises(BlockError, match="it needs a robot, and the graph names none"):
         BlockBench(SafetyMonitor, dimensions=dict(ROBOT.dimensions))
+
+
+def test_a_heavy_switch_is_not_the_one_at_fault() -> None:
+    health = SwitchHealth.allocate({"n_contacts": 4})
+    health.fault[:] = [SwitchFault.HEAVY, SwitchFault.NONE, SwitchFault.BOUNCING, SwitchFault.NONE]
+    assert first_bad_switch(health) == 2
+    health.fault[2] = SwitchFault.NONE
+    assert first_bad_switch(health) == 3

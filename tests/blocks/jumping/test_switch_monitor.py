@@ -75,15 +75,56 @@ def test_just_before_touchdown_a_switch_may_close() -> None:
     assert faults(bench) == GOOD
 
 
+LIGHT_TOE = [True, True, False, True]
+
+
 def test_stuck_open_is_found_while_it_stands() -> None:
     bench = make()
-    step(bench, [True, True, False, True], Phase.STAND, 100)
-    assert faults(bench) == GOOD
-    step(bench, [True, True, False, True], Phase.STAND, 1)
+    step(bench, CLOSED, Phase.STAND, 10)
+    step(bench, LIGHT_TOE, Phase.STAND, 100)
+    assert faults(bench)[2] == SwitchFault.HEAVY and not bench.get("health").stop
+    step(bench, LIGHT_TOE, Phase.STAND, 1)
     assert faults(bench)[2] == SwitchFault.STUCK_OPEN and bench.get("health").stop
     careless = make(stand_time=None)
     step(careless, OPEN, Phase.STAND, 500)
     assert faults(careless) == GOOD
+
+
+def test_a_heavy_switch_ends_no_run_and_its_point_stands_while_the_robot_does() -> None:
+    bench = make()
+    step(bench, LIGHT_TOE, Phase.STAND, 50)
+    assert faults(bench) == GOOD
+    for phase, said in (
+        (Phase.STAND, SwitchFault.HEAVY), (Phase.SQUAT, SwitchFault.HEAVY), (Phase.THRUST, SwitchFault.NONE)
+    ):  # fmt: skip
+        step(bench, LIGHT_TOE, phase, 101)
+        assert faults(bench)[2] == said and not bench.get("health").stop
+    step(bench, CLOSED, Phase.THRUST, 1)
+    for phase, said in ((Phase.FLIGHT, SwitchFault.NONE), (Phase.RECOVER, SwitchFault.HEAVY)):
+        step(bench, OPEN, phase, 101)
+        assert faults(bench) == [*GOOD[:2], said, GOOD[3]] and not bench.get("health").stop
+
+
+def test_a_switch_near_its_threshold_is_heavy_and_not_stuck() -> None:
+    bench = make()
+    for k in range(10):
+        step(bench, CLOSED if k % 2 == 0 else LIGHT_TOE, Phase.STAND, 12)
+    for _ in range(5):  # it goes on to close now and then
+        step(bench, LIGHT_TOE, Phase.STAND, 1000)
+        step(bench, CLOSED, Phase.STAND, 1)
+    assert faults(bench)[2] == SwitchFault.HEAVY and not bench.get("health").stop
+
+
+def test_a_switch_that_no_thrust_closes_is_stuck_and_stops_after_the_landing() -> None:
+    bench = make()
+    step(bench, LIGHT_TOE, Phase.STAND, 200)
+    step(bench, LIGHT_TOE, Phase.THRUST, 100)
+    step(bench, OPEN, Phase.FLIGHT, 1)
+    assert faults(bench)[2] == SwitchFault.STUCK_OPEN and not bench.get("health").stop
+    step(bench, LIGHT_TOE, Phase.LANDING, 100)
+    assert not bench.get("health").stop
+    step(bench, LIGHT_TOE, Phase.RECOVER, 1)
+    assert bench.get("health").stop and faults(bench)[2] == SwitchFault.STUCK_OPEN
 
 
 @pytest.mark.parametrize(("every", "most"), [(1, 95), (2, 210), (3, 380)])

@@ -17,18 +17,18 @@ pytest.importorskip("fmpy")
 pytest.importorskip("pythonfmu3")
 
 PART = """\
-inputs: {wish: }
+inputs: {setpoint: }
 outputs: {force: gain.y, wound: sum.y}
 blocks:
-  gain: {use: blocks.Gain, with: {n: 3, gain: 20 N/m}, in: {u: inputs.wish}}
+  gain: {use: blocks.Gain, with: {n: 3, gain: 20 N/m}, in: {u: inputs.setpoint}}
   sum: {use: blocks.Integrator, with: {n: 3}, in: {u: gain.y}}
 """
 RAIL = """\
 rate: 100 Hz
 duration: 1 s
 blocks:
-  wish: {use: blocks.SineWave, with: {n: 3, amplitude: 1 m, frequency: 1 Hz}}
-  part: {use: part.yaml, in: {wish: wish.y}}
+  setpoint: {use: blocks.SineWave, with: {n: 3, amplitude: 1 m, frequency: 1 Hz}}
+  part: {use: part.yaml, in: {setpoint: setpoint.y}}
 """
 
 

@@ -20,13 +20,13 @@ pytest.importorskip("pythonfmu3")
 
 CONTROLLER = """\
 inputs:
-  wish:
+  setpoint:
   measured:
 outputs:
   force: bound.y
   wound: i.y
 blocks:
-  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: inputs.wish, b: inputs.measured}}
+  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: inputs.setpoint, b: inputs.measured}}
   p: {use: blocks.Gain, with: {gain: 20 N/m}, in: {u: error.y}}
   i: {use: blocks.Integrator, in: {u: error.y}}
   ki: {use: blocks.Gain, with: {gain: 10 N/(m s)}, in: {u: i.y}}
@@ -37,8 +37,8 @@ RAIL = """\
 rate: 100 Hz
 duration: 1 s
 blocks:
-  wish: {use: blocks.SineWave, with: {amplitude: 1 m, frequency: 1 Hz}}
-  controller: {use: controller.yaml, in: {wish: wish.y, measured: plant.place}}
+  setpoint: {use: blocks.SineWave, with: {amplitude: 1 m, frequency: 1 Hz}}
+  controller: {use: controller.yaml, in: {setpoint: setpoint.y, measured: plant.place}}
   plant: {use: plant.yaml, in: {force: controller.force}}
 """
 PLANT = """\
@@ -95,10 +95,10 @@ def test_a_sub_graph_gives_in_fmpy_the_numbers_of_the_graph(
 ) -> None:
     made = export(str(folder / "rail.yaml"), folder / "controller.fmu", "controller")
     assert made.problems == ()
-    assert [(t.name, t.unit) for t in made.inputs] == [("wish", "m"), ("measured", "m")]
+    assert [(t.name, t.unit) for t in made.inputs] == [("setpoint", "m"), ("measured", "m")]
     assert [(t.name, t.unit) for t in made.outputs] == [("force", "N"), ("wound", "m s")]
     inputs = {
-        "wish": reference.signal("wish.y.value")[:, 0],
+        "setpoint": reference.signal("setpoint.y.value")[:, 0],
         "measured": reference.signal("plant/place.y.value")[:, 0],
     }
     found = master(made.file, inputs, ["force", "wound"], 100)

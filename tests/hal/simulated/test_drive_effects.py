@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import aloft
+from aloft.files.problems import LoadError
 from aloft.hal.simulated.battery import Battery
 from aloft.hal.simulated.drive_effects import DriveEffects
 from aloft.hal.simulated.drives import MotorLimits
@@ -21,7 +24,7 @@ from aloft.hal.simulated.effects import (
 )
 from aloft.hal.simulated.gears import YieldingGears
 from aloft.hal.simulated.state import PhysicsState, TickRecord
-from aloft.robots.description import find_robot
+from aloft.robots.description import RobotDescription, find_robot
 
 from .simulated_bruce import bench, hold
 
@@ -90,7 +93,8 @@ def test_the_velocity_is_filtered_and_the_angle_is_not() -> None:
 
 
 def test_a_gear_before_the_encoder_yields_and_has_play() -> None:
-    read = reader(compliance=0.002, backlash=0.01)
+    assert ROBOT.motors.gear_play.tolist() == [0.01] * N
+    read = reader(compliance=0.002, backlash=1.0)
     assert read(0.3, 0.0, 0.0)[0] == 0.3
     for torque in (5.0, -5.0):
         seen = [read(0.3, 0.0, torque)[0] for _ in range(100)]
@@ -133,9 +137,9 @@ def test_the_current_is_limited() -> None:
 
 
 def test_ripple_has_its_amplitude_and_no_mean() -> None:
-    turn = 2.0 * math.pi / 12
+    turn, peak = 2.0 * math.pi / 12, float(ROBOT.motors.peak_torque[4])
     given = np.array([
-        giver(angle=float(angle), ripple=0.1, ripple_periods=12)(1.0)[4] - 1.0
+        giver(angle=float(angle), ripple=0.1 / peak, ripple_periods=12)(1.0)[4] - 1.0
         for angle in np.linspace(0.0, turn, 32, endpoint=False)
     ])  # fmt: skip
     assert abs(given.mean()) < 1e-9 and abs(given).max() == pytest.approx(0.1, rel=0.02)
@@ -158,7 +162,7 @@ def test_cogging_pulls_at_rest_and_without_current() -> None:
     ("effects", "message"),
     [
         ({"motors": {"cogging": 0.01, "cogging_periods": 500}}, "cogging of 500 periods a turn changes"),
-        ({"motors": {"ripple": 0.1, "ripple_periods": 500}}, "torque ripple of 500 periods a turn"),
+        ({"motors": {"ripple": 0.01, "ripple_periods": 500}}, "torque ripple of 500 periods a turn"),
         (
             {"joints": {"static_friction": 3.0, "stribeck_velocity": 0.01}},
             "static friction of 3 times that in motion falls faster than physics steps of 0.0005 s",
@@ -245,19 +249,21 @@ def test_gears_that_are_too_stiff_for_the_steps_are_refused() -> None:
     )
 
 
-def pack(**params: Any) -> tuple[Battery, PhysicsState, MotorLimits, Any]:
+def pack(
+    robot: RobotDescription = ROBOT, **params: Any
+) -> tuple[Battery, PhysicsState, MotorLimits, Any]:
     chosen = BatteryParameters.model_validate(params)
     memory = PhysicsState.allocate({**SIZES, "n_battery": 4})
-    battery = Battery(chosen, STEP, memory)
+    battery = Battery(chosen, robot, STEP, memory)
     battery.begin()
     limits = MotorLimits(ROBOT, TickRecord.allocate({**ROBOT.dimensions}))
     return battery, memory, limits, battery.feeding(limits)
 
 
 def test_a_pack_sags_as_its_resistance_says() -> None:
-    battery, memory, limits, call = pack(
-        open_voltage=16.0, resistance=0.04, board_power=0.0, winding_resistance=0.0
-    )
+    assert ROBOT.supply is not None
+    cold = ROBOT.changed(supply=ROBOT.supply.model_copy(update={"winding_resistance": 0.0}))
+    battery, memory, limits, call = pack(cold, open_voltage=16.0, resistance=0.04, board_power=0.0)
     limits.scratch.torque[:], limits.scratch.speed[:] = 4.0, 20.0
     call.run()
     power, voltage = 4.0 * 20.0 * N, float(battery.voltage[0])
@@ -270,6 +276,28 @@ def test_a_pack_sags_as_its_resistance_says() -> None:
     limits.scratch.torque[:] = -4.0  # braking charges it
     call.run()
     assert battery.voltage[0] > 15.9 and memory.battery[3] < 0.0
+
+
+def test_copper_heat_follows_from_speeds_where_no_winding_is_known() -> None:
+    """Behind its torque constant k = U / w0 a winding of resistance R = U (1 - wc / w0) k / T lets the torque T flow up
+    to the corner speed wc, and heats by R / k^2 for the torque squared."""
+    motors = ROBOT.motors
+    assert ROBOT.supply is not None
+    voltage, free, corner = ROBOT.supply.rated_voltage, motors.no_load_speed, motors.corner_speed
+    constant = voltage / free
+    winding = voltage * (1.0 - corner / free) * constant / motors.peak_torque
+    unknown = ROBOT.supply.model_copy(update={"winding_resistance": None})
+    np.testing.assert_allclose(unknown.heating(motors), winding / constant**2)
+    np.testing.assert_allclose(ROBOT.supply.heating(motors), 0.2 / 0.35**2)
+
+
+def test_a_robot_whose_supply_nobody_described_has_no_pack() -> None:
+    graph = Path(aloft.__file__).parent / "graphs" / "robots" / "a1_stand.yaml"
+    with pytest.raises(LoadError) as caught:
+        aloft.load(graph, overrides={"robot.battery": {}})
+    text = str(caught.value)
+    assert "the description of a1 does not say what feeds it" in text
+    assert "supply: {rated_voltage: ..., open_voltage:" in text
 
 
 def test_beyond_what_a_pack_can_give_its_voltage_is_half() -> None:

@@ -111,3 +111,17 @@ def test_threshold_is_between_its_limits_and_per_switch() -> None:
     thresholds: Any = robot.block.plant.sensors.switch_threshold
     assert len(set(thresholds.tolist())) == 4
     assert (thresholds >= 0.5).all() and (thresholds <= 3.0).all()
+
+
+def test_thresholds_may_be_shares_of_the_weight_on_each_point() -> None:
+    share = 5.118 * 9.81 / 4.0
+    given = bench(switch_threshold=[0.1 * share, 0.5 * share], seed=1).block.plant
+    shares = bench(switches={"threshold": [0.1, 0.5]}, seed=1).block.plant
+    assert given is not None and shares is not None
+    np.testing.assert_allclose(
+        shares.sensors.switch_threshold, given.sensors.switch_threshold, rtol=1e-3
+    )
+    with pytest.raises(
+        Exception, match=r"switches\.threshold must be two positive numbers in rising"
+    ):
+        bench(switches={"threshold": [0.5, 0.1]})

@@ -20,6 +20,8 @@ from .simulated_bruce import bench, hold
 from .test_drive_effects import SIZES
 
 ROBOT = find_robot("bruce")
+WEIGHT = 5.118 * 9.81
+"""N"""
 
 
 def world(**params: Any) -> Any:
@@ -125,7 +127,7 @@ def test_gravity_leans_with_the_floor() -> None:
 
 def test_a_cable_pulls_and_hangs_on_the_robot() -> None:
     loads = []
-    for cable in (None, {"pull": 2.0, "weight": 3.0}):
+    for cable in (None, {"pull": 2.0 / WEIGHT, "weight": 3.0 / WEIGHT}):
         robot = bench(**({"cable": cable} if cable else {}))
         hold(robot)
         robot.step(1500)
@@ -137,13 +139,13 @@ def test_a_cable_pulls_and_hangs_on_the_robot() -> None:
 
 
 def test_a_cable_adds_to_a_push() -> None:
-    robot = bench(cable={"pull": 0.0, "weight": 3.0})
+    robot = bench(cable={"pull": 0.0, "weight": 3.0 / WEIGHT})
     hold(robot)
     robot.set("push", force=[0.0, 0.0, -5.0], point=0)
     robot.step(250)
     robot.block.emit()
     weight = robot.get("truth").contact_force.sum(axis=0)[2]
-    assert weight == pytest.approx(5.118 * 9.81 + 8.0, abs=0.1)
+    assert weight == pytest.approx(WEIGHT + 8.0, abs=0.1)
 
 
 def test_switches_close_late_and_open_later() -> None:

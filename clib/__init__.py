@@ -1,0 +1,1 @@
+"""Graphs as libraries of C, without Python."""

@@ -1,0 +1,146 @@
+"""A library that ``aloft export c`` has written, called from Python."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.language.errors import AloftError
+
+
+class Library:
+    """One instance of a library, in memory of its own.
+
+    Args:
+        description: the file ``NAME.json``; the shared library lies beside it.
+
+    Attributes:
+        about: what the description says.
+        inputs, outputs: views of what a step reads and writes, by the names of the terminals.
+        memory: the bytes of the instance.
+
+    Raises:
+        AloftError: there is no such library, or it cannot be loaded here.
+    """
+
+    def __init__(self, description: Path) -> None:
+        try:
+            self.about: Mapping[str, Any] = json.loads(description.read_text(encoding="utf-8"))
+            name = self.about["name"]
+            self._code: Any = ctypes.CDLL(str(description.parent.resolve() / f"lib{name}.so"))
+        except (OSError, ValueError, KeyError) as error:
+            raise AloftError(f"{description} is no library that can run here: {error}") from error
+        self.memory = _aligned(self.about["memory_bytes"])
+        self._in, self._out = (_aligned(self.about[f"{k}_bytes"]) for k in ("input", "output"))
+        self.inputs = views(self._in, self.about["inputs"])
+        self.outputs = views(self._out, self.about["outputs"])
+        self._self, self._arguments = (
+            _pointer(self.memory),
+            (_pointer(self._in), _pointer(self._out)),
+        )
+        self._step = self._function("step")
+        self._expect(self._function("init")(self._self, ctypes.c_int64(self.memory.size)), "init")
+
+    def _function(self, key: str) -> Any:
+        function = self._code[f"{self.about['name']}_{key}"]
+        function.restype = ctypes.c_int32
+        return function
+
+    def _expect(self, status: int, what: str) -> None:
+        if status:
+            raise AloftError(f"{self.about['name']}_{what} returns {status}")
+
+    def reset(self) -> None:
+        """Go back to the state of a new instance."""
+        self._expect(self._function("reset")(self._self), "reset")
+
+    def take(self, inputs: NDArray[np.uint8]) -> None:
+        """Take all inputs from the bytes of their struct in C."""
+        self._in[:] = inputs
+
+    def step(self) -> int:
+        """One tick: from ``inputs`` to ``outputs``. Returns the status."""
+        return int(self._step(self._self, *self._arguments))
+
+    @property
+    def step_call(self) -> tuple[int, int, int, int]:
+        """The address of the function ``step``, and its arguments."""
+        address = ctypes.cast(self._step, ctypes.c_void_p).value or 0
+        memory, given, found = (int(a.ctypes.data) for a in (self.memory, self._in, self._out))
+        return address, memory, given, found
+
+    def last_block(self) -> str:
+        """The path of the block that the last status is about; empty where it is about none."""
+        number = self._function("last_block")(self._self)
+        return str(self.about["blocks"][number]) if number >= 0 else ""
+
+    def save(self) -> bytes:
+        """The state as bytes."""
+        state = _aligned(self.about["state_bytes"])
+        self._expect(self._function("save")(self._self, _pointer(state)), "save")
+        return state.tobytes()
+
+    def restore(self, state: bytes) -> None:
+        """Take back a state that ``save`` gave.
+
+        Raises:
+            AloftError: it is of another library.
+        """
+        copy = _aligned(self.about["state_bytes"])
+        if len(state) != copy.size:
+            raise AloftError(
+                f"a state of {self.about['name']} has {copy.size} bytes, not {len(state)}"
+            )
+        copy[:] = np.frombuffer(state, np.uint8)
+        self._expect(self._function("restore")(self._self, _pointer(copy)), "restore")
+
+    def set(self, parameter: str, value: float) -> None:
+        """Change a live parameter, ``block.parameter`` or an element of it, ``block.parameter[0]``.
+
+        Raises:
+            AloftError: there is none of that name, or the value is outside its bounds.
+        """
+        names = [each["name"] for each in self.about["parameters"]]
+        if parameter not in names:
+            raise AloftError(
+                f"no live parameter {parameter!r}; there is {', '.join(names) or 'none'}"
+            )
+        number = ctypes.c_int32(names.index(parameter))
+        if self._function("set")(self._self, number, ctypes.c_double(value)):
+            raise AloftError(f"{parameter} cannot be {value!r}")
+
+    def get(self, parameter: str) -> float:
+        """The present value of a live parameter."""
+        names = [each["name"] for each in self.about["parameters"]]
+        function = self._code[f"{self.about['name']}_get"]
+        function.restype = ctypes.c_double
+        return float(function(self._self, ctypes.c_int32(names.index(parameter))))
+
+
+def views(
+    data: NDArray[np.uint8], terminals: Sequence[Mapping[str, Any]]
+) -> dict[str, NDArray[Any]]:
+    """The terminals in the bytes of a struct of C, or of several, (..., bytes)."""
+    found = {}
+    for each in terminals:
+        dtype, first = np.dtype(each["dtype"]), each["offset"]
+        size = int(np.prod(each["shape"], dtype=np.int64)) * dtype.itemsize
+        part = data[..., first : first + size].view(dtype)
+        found[each["name"]] = part.reshape((*data.shape[:-1], *each["shape"]))
+    return found
+
+
+def _aligned(size: int) -> NDArray[np.uint8]:
+    raw = np.zeros(size + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + size]
+
+
+def _pointer(array: NDArray[np.uint8]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

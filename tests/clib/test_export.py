@@ -1,0 +1,206 @@
+"""``aloft export c``: the library computes the bytes of the graph, by itself and in any memory."""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aloft
+from aloft.clib.check import check
+from aloft.clib.library import Library
+from aloft.clib.module import Status
+from aloft.clib.targets import TARGETS
+from aloft.clib.write import write_library
+from aloft.logs.recording.recorder import Recorder
+from aloft.runtime.language.errors import AloftError
+
+CONTROLLER = """\
+inputs: {wish: , measured: }
+outputs: {force: bound.y, long_ago: slow.y}
+blocks:
+  pid: {use: blocks.PID, with: {kp: 20, ki: 5, kd: 3, unit: N/m}, in: {setpoint: inputs.wish, measured: inputs.measured}}
+  bound: {use: blocks.Saturation, with: {lower: -5, upper: 5}, in: {u: pid.u}}
+  slow: {use: blocks.MovingAverage, rate: 100 Hz, with: {samples: 3}, in: {u: {from: bound.y, delay: 2}}}
+"""
+MASS = """\
+rate: 500 Hz
+duration: 1 s
+blocks:
+  wish: {use: blocks.Step, with: {at: 0.1 s, after: 1 m}}
+  controller: {use: controller.yaml, in: {wish: wish.y, measured: place.y}}
+  mass: {use: blocks.Gain, with: {gain: 0.5 1/kg}, in: {u: controller.force}}
+  speed: {use: blocks.Integrator, in: {u: mass.y}}
+  place: {use: blocks.Integrator, in: {u: speed.y}}
+"""
+needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="there is no C compiler (cc)")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The graph of a PID on a mass, and a recording of it."""
+    made = tmp_path_factory.mktemp("export")
+    (made / "controller.yaml").write_text(CONTROLLER)
+    (made / "mass.yaml").write_text(MASS)
+    aloft.load(made / "mass.yaml").run(sinks=[Recorder(made / "mass.rrd")]).raise_if_failed()
+    return made
+
+
+@pytest.fixture(scope="module")
+def written(folder: Path) -> Path:
+    return write_library(str(folder / "mass.yaml"), folder / "pd", "controller").description
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_byte_of_a_recording_comes_out_of_the_library(folder: Path, target: str) -> None:
+    tools = TARGETS[target]
+    if not tools.linker() or not all(map(shutil.which, tools.runner[:1])):
+        pytest.skip(f"no tools for {target}: apt install {tools.packages}")
+    made = write_library(
+        str(folder / "mass.yaml"), folder / target / "pd", "controller", target=target
+    )
+    found = check(made.description, folder / "mass.rrd")
+    assert (found.difference, found.ticks, found.statuses) == ("", 500, {})
+    assert found.signal_bytes > 500 * 8 * 4
+    assert found.state_bytes > 0
+
+
+@needs_compiler
+def test_the_check_names_the_first_byte_that_differs(folder: Path) -> None:
+    overrides = ["controller/pid.kp=20.000001"]
+    made = write_library(
+        str(folder / "mass.yaml"), folder / "other" / "pd", "controller", overrides
+    )
+    found = check(made.description, folder / "mass.rrd")
+    assert found.difference.startswith("tick 50: controller/")
+
+
+@needs_compiler
+@pytest.mark.parametrize("compiler", ["cc", "c++"])
+def test_the_example_builds_without_a_warning(written: Path, tmp_path: Path, compiler: str) -> None:
+    if not shutil.which(compiler):
+        pytest.skip(f"there is no {compiler}")
+    language = ["-x", "c++", "-std=c++11"] if compiler == "c++" else ["-std=c99"]
+    command = [
+        compiler,
+        *language,
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-pedantic",
+        "example.c",
+        "-x",
+        "none",
+    ]
+    subprocess.run(
+        [*command, "libpd.a", "-lm", "-o", tmp_path / "example"], cwd=written.parent, check=True
+    )
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].strip() == "9: 0"
+
+
+@needs_compiler
+def test_a_library_needs_nothing_of_the_system_but_memory_and_mathematics(written: Path) -> None:
+    listed = subprocess.run(
+        ["nm", written.with_suffix(".o")], capture_output=True, text=True, check=True
+    )
+    kinds: dict[str, list[str]] = {}
+    for line in listed.stdout.splitlines():
+        kind, name = line.split()[-2:]
+        kinds.setdefault(kind, []).append(name)
+    assert set(kinds.pop("U", [])) <= {"memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"}
+    assert not set(kinds) & {"D", "d", "B", "b", "C"}, "there is data that can be written"
+
+
+@needs_compiler
+def test_instances_are_independent_and_states_come_back(written: Path) -> None:
+    first, second = Library(written), Library(written)
+    first.inputs["wish"][...] = 1.0
+    second.inputs["wish"][...] = -0.5
+    for _ in range(7):
+        assert (first.step(), second.step()) == (0, 0)
+    kept = first.save()
+    forces = [first.step() or float(first.outputs["force"][0]) for _ in range(5)]
+    second.restore(kept)
+    second.inputs["wish"][...] = 1.0
+    assert [second.step() or float(second.outputs["force"][0]) for _ in range(5)] == forces
+    first.reset()
+    assert bytes(first.memory) == bytes(Library(written).memory)
+    with pytest.raises(AloftError, match="a state of pd has"):
+        first.restore(kept[:-1])
+
+
+@needs_compiler
+def test_a_live_parameter_changes_within_its_bounds(folder: Path) -> None:
+    made = write_library(str(folder / "mass.yaml"), folder / "gain" / "gain", "mass")
+    library = Library(made.description)
+    library.inputs["controller/bound.y".replace("/", ".")][...] = 2.0
+    assert (library.step(), library.outputs["y"].tolist()) == (0, [1.0])
+    library.set("mass.gain[0]", 3.0)
+    assert library.get("mass.gain[0]") == 3.0
+    assert (library.step(), library.outputs["y"].tolist()) == (0, [6.0])
+    with pytest.raises(AloftError, match=r"no live parameter 'mass.gian'; there is mass.gain\[0\]"):
+        library.set("mass.gian", 1.0)
+    with pytest.raises(AloftError, match="cannot be nan"):
+        library.set("mass.gain[0]", np.nan)
+
+
+@needs_compiler
+def test_wrong_calls_and_numbers_are_refused(written: Path) -> None:
+    library = Library(written)
+    name = ctypes.CDLL(str(written.parent / "libpd.so"))
+    assert name.pd_step(None, None, None) == Status.BAD_INSTANCE
+    room = np.zeros(library.memory.size, np.uint8)
+    pointer = ctypes.c_void_p(room.ctypes.data)
+    assert name.pd_reset(pointer) == Status.BAD_INSTANCE
+    assert name.pd_init(pointer, ctypes.c_int64(room.size - 1)) == Status.BAD_ARGUMENT
+    library.inputs["measured"][...] = np.nan
+    before = library.memory.copy()
+    assert library.step() == Status.BAD_INPUT
+    assert bytes(library.memory) == bytes(before)
+    library.inputs["measured"][...] = 1e308
+    assert library.step() == Status.NOT_FINITE, "the force is infinite"
+    library.inputs["measured"][...] = 0.0
+    assert library.step() == Status.NOT_FINITE, "nothing goes on before a reset"
+    library.reset()
+    assert library.step() == Status.OK
+
+
+def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:
+    (tmp_path / "noisy.yaml").write_text(
+        "rate: 100 Hz\nblocks:\n"
+        "  noise: {use: blocks.WhiteNoise, with: {std: 1}}\n"
+        "  twice: {use: blocks.Gain, with: {gain: 2}, in: {u: noise.y}}\n"
+        "  sine: {use: blocks.Function, with: {function: sin}, in: {u: twice.y}}\n"
+    )
+    with pytest.raises(AloftError) as caught:
+        write_library(str(tmp_path / "noisy.yaml"), tmp_path / "noisy")
+    file = tmp_path / "noisy.yaml"
+    assert str(caught.value).splitlines() == [
+        "2 blocks need Python, so there is no library:",
+        f"  {file}:3:3: block 'noise' (WhiteNoise) has a step in plain Python",
+        f"  {file}:5:3: block 'sine' (Function) has a step in plain Python",
+    ]
+
+
+def test_names_and_targets_that_cannot_be(folder: Path) -> None:
+    graph = str(folder / "mass.yaml")
+    with pytest.raises(AloftError, match="'int' cannot be the name of a library; write it as"):
+        write_library(graph, folder / "int")
+    with pytest.raises(AloftError, match="no target 'z80'; there is x86_64, aarch64, wasm"):
+        write_library(graph, folder / "pd", target="z80")
+
+
+@needs_compiler
+@pytest.mark.long
+@pytest.mark.parametrize("graph", ["jump", "push", "somersault", "hops"])
+def test_the_controllers_of_jumps_give_all_recorded_bytes(graph: str, tmp_path: Path) -> None:
+    recording = tmp_path / f"{graph}.rrd"
+    aloft.load(f"aloft:{graph}.yaml").run(sinks=[Recorder(recording)]).raise_if_failed()
+    made = write_library(f"aloft:{graph}.yaml", tmp_path / graph)
+    found = check(made.description, recording)
+    assert found.difference == ""
+    assert found.ticks > 1000
+    assert found.signal_bytes > 1000 * found.ticks
