@@ -54,14 +54,14 @@ def _standing(found: ReadRobot) -> str:
         return "read: no feet"
     if not robot.standing or any("no standing pose was found" in note for note in found.notes):
         return "read: no standing pose was found"
+    obstacles = obstacles_to_jumping(robot)
+    if obstacles:
+        return f"does not stand: {obstacles[0]}"
     try:
-        weak = obstacles_to_jumping(robot)
         unusual = len(check_up(robot)["remarks"])
         settings = [f"robot={str(found.path)!r}", *SETTINGS]
         run = load(shipped_folder() / "robots" / "stand.yaml", settings).run()
     except AloftError as error:
-        return f"does not stand: {str(error).splitlines()[-1]}"
-    if weak:
-        return f"does not stand: {weak[0]}"
+        return f"does not stand: {str(error).splitlines()[0].rpartition(': ')[2]}"
     verdict = "stands" if run.success else "does not stand"
     return f"{verdict}: {run.reason}, {unusual} remarks of check-up"

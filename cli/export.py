@@ -136,6 +136,7 @@ def _verdict(found: Checked) -> str:
     return (
         f"{found.ticks} ticks: all {found.signal_bytes} bytes of signals and {found.state_bytes} bytes of "
         f"state are as recorded{f'; {seen}' if seen else ''}"
+        f"{'' if found.step_s is None else f'; a tick takes {1e6 * found.step_s:.3g} us'}"
     )
 
 

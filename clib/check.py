@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import tempfile
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,13 +28,15 @@ _DRIVERS = Path(__file__).parent
 @dataclass(frozen=True)
 class Checked:
     """How many ticks, bytes of signals and bytes of state were compared, and where they first
-    differ; ``statuses`` counts what the steps returned beside zero."""
+    differ; ``statuses`` counts what the steps returned beside zero. ``step_s`` is the median duration of
+    a step [s], with the call from Python; none where an emulator ran it."""
 
     ticks: int
     signal_bytes: int
     state_bytes: int
     difference: str
     statuses: Mapping[str, int]
+    step_s: float | None
 
 
 def check(description: Path, recording: Path) -> Checked:
@@ -50,7 +53,7 @@ def check(description: Path, recording: Path) -> Checked:
     run = read(recording)
     _expect_fitting(about, run)
     steps = _inputs(about, run)
-    memories = _run(description, about, steps)
+    memories, step = _run(description, about, steps)
     codes = memories[:, 8:12].copy().view(np.int32)[:, 0]
     counts = {Status(int(c)).name: int(np.sum(codes == c)) for c in np.unique(codes) if c}
     rows, layout = run.rows, run.header.bus.layout()
@@ -75,7 +78,12 @@ def check(description: Path, recording: Path) -> Checked:
         for each, names in ((layout, signals), (state_layout, states))
     ]
     return Checked(
-        len(steps), sizes[0] * len(steps), sizes[1] * len(frames), first[1] if first else "", counts
+        len(steps),
+        sizes[0] * len(steps),
+        sizes[1] * len(frames),
+        first[1] if first else "",
+        counts,
+        step,
     )
 
 
@@ -103,17 +111,20 @@ def _inputs(about: Mapping[str, Any], run: RecordedRun) -> NDArray[np.uint8]:
 
 def _run(
     description: Path, about: Mapping[str, Any], steps: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """The memory of an instance after each step, (ticks, bytes)."""
+) -> tuple[NDArray[np.uint8], float | None]:
+    """The memory of an instance after each step, (ticks, bytes), and the median duration of one."""
     size = about["memory_bytes"]
     if about["target"] == "x86_64":
         library = Library(description)
         memories = np.empty((len(steps), size), np.uint8)
+        times = np.empty(len(steps))
         for k, row in enumerate(steps):
             library.take(row)
+            began = time.perf_counter()
             library.step()
+            times[k] = time.perf_counter() - began
             memories[k] = library.memory
-        return memories
+        return memories, float(np.median(times))
     with tempfile.TemporaryDirectory(prefix="aloft-check-") as folder:
         given, found = Path(folder) / "inputs", Path(folder) / "memories"
         given.write_bytes(steps.tobytes())
@@ -123,7 +134,7 @@ def _run(
         )
         if done.returncode:
             raise AloftError(f"the library fails on {about['target']}: {done.stderr.strip()}")
-        return np.frombuffer(found.read_bytes(), np.uint8).reshape(len(steps), size)
+        return np.frombuffer(found.read_bytes(), np.uint8).reshape(len(steps), size), None
 
 
 def _program(description: Path, about: Mapping[str, Any], folder: Path) -> list[str]:

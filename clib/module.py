@@ -40,7 +40,7 @@ class Status(IntEnum):
 
 STATUS_TEXTS = {
     Status.OK: "the tick is complete",
-    Status.EVENT: "the tick is complete; a block asks for the end of the run, see last_block",
+    Status.EVENT: "the tick is complete; a block asks for attention, see last_block",
     Status.FALLBACK: "the tick is complete; a block found no solution and used what it has instead",
     Status.NOT_FINITE: "a signal is NaN or infinite; reset, or restore a state",
     Status.DIVIDED_BY_ZERO: "a block divided by zero, see last_block",
@@ -249,6 +249,7 @@ class Module:
         code.label("whole")
         self._check_inputs(code)
         code(f"store i32 0, ptr {code.at(CODE)}")
+        code(f"store i32 -1, ptr {code.at(BLOCK)}")
         for struct, bus, size in self.input_fields.values():
             code.copy(code.at(bus), code.at(struct, "%in"), size)
         code(f"%tick = load i64, ptr {code.at(self._place(self._tick))}")
@@ -313,6 +314,10 @@ class Module:
         for call in block.event_calls:
             self._call(code, call, number_of_block)
         status = Status.FALLBACK if block.event_calls else Status.EVENT
+        known = code.value(f"load i32, ptr {code.at(CODE)}")
+        code.branch(  # what asks for attention is not hidden by a fallback
+            code.value(f"icmp ne i32 {known}, {int(Status.EVENT)}"), code.name("tell"), after
+        )
         code(f"store i32 {int(status)}, ptr {code.at(CODE)}")
         code(f"store i32 {number_of_block}, ptr {code.at(BLOCK)}")
         code.jump(after)

@@ -71,7 +71,7 @@ def link(name: str, folder: Path, target: Target) -> list[Path]:
     program = target.linker()
     if program.startswith("wasm-ld"):
         file = folder / f"{name}.wasm"
-        _run([program, "--no-entry", "--export-dynamic", "--export=__heap_base", f"{name}.o", "-o", file.name], folder)  # fmt: skip
+        _run([program, "--no-entry", "--export-dynamic", "--allow-undefined", "--export=__heap_base", f"{name}.o", "-o", file.name], folder)  # fmt: skip
         return [file]
     archiver = next((each for each in target.archivers if shutil.which(each)), "")
     if archiver:

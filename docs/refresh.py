@@ -29,6 +29,7 @@ from result_tables import (
     comparison_table,
     direction_table,
     effects_table,
+    every_robot_table,
     frontier_table,
     ground_table,
     impulse_table,
@@ -245,6 +246,11 @@ def write_robots_results(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
 
 
+def write_every_robot(file: Path) -> None:
+    """Every URDF of example-robot-data, read and put on its feet."""
+    refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
+
+
 def write_effects(file: Path) -> None:
     """What each effect of a real robot does to a jump."""
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
@@ -309,6 +315,7 @@ PAGES = {
     "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
     "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
+    "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
     "excerpts": Page(write_excerpts),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),

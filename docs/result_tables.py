@@ -284,6 +284,16 @@ def tasks_table(summary: Row) -> str:
     return table(TASKS_HEAD, map(_task, summary["rows"]))
 
 
+def every_robot_table(rows: Sequence[Row]) -> str:
+    """One row a file: its joints, and what became of it."""
+    joints = (row["value"] for row in rows)
+    cells = zip(rows, joints, strict=True)
+    return table(
+        ("file", "joints", "what became of it"),
+        ((row["name"], "" if n is None else f"{n:.0f}", row["note"]) for row, n in cells),
+    )
+
+
 def short_tasks_table(summary: Row) -> str:
     """How many tasks met their goal, the rows of ``README_TASKS``, and those of all that did not.
 

@@ -201,12 +201,10 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
     imported = import_robot(path, content)
     guessed: list[str] = []
     if text is None:
-        from .importing.new_yaml import guess_feet
+        from .importing.new_yaml import guess
 
-        content = {"feet": guess_feet(imported.model, imported.built)}
+        content, guessed = guess(imported)
         imported = import_robot(path, content)
-        names = ", ".join(foot["name"] for foot in content["feet"])
-        guessed = [f"the feet are guessed: {names}"] if names else []
     faults = [*(text.faults if text else ()), *imported.faults]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.
     own = {fault.path[:2] for fault in faults}

@@ -208,6 +208,9 @@ def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
         ]
     if not robot.contacts:
         return ["it has no feet: write them under feet: [{name: NAME, at: LINK, radius: METRES}]"]
+    off = off_its_feet(robot)
+    if off:
+        return [off]
     weak = [
         f"motor {row['motor']} has {row['peak_torque']:.3g} {row['unit']}, and standing alone takes "
         f"{row['standing_torque']:.3g}: it is too weak by a factor of {row['standing_share']:.2g}"
@@ -215,6 +218,26 @@ def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
         if row["standing_share"] is not None and row["standing_share"] > 1.0
     ]
     return weak[:3]
+
+
+def off_its_feet(robot: RobotDescription) -> str:
+    """Why a robot with feet cannot stand on them in its standing pose; empty where it can."""
+    from ..hal.simulated.unsupported import uneven_contacts
+    from ..mathematics.capture_step import support_margin
+    from ..robots.kinematics import standing_contacts, standing_feet
+
+    uneven = uneven_contacts(robot)
+    if uneven:
+        return uneven
+    places = standing_contacts(robot)
+    x, y = (-float(value) for value in standing_feet(robot).mean(axis=0)[:2])
+    margin = support_margin(places, np.ones(len(places), dtype=np.bool_), x, y)
+    if margin > 0.0:
+        return ""
+    return (
+        f"its centre of mass stands {1e3 * -margin:.2g} mm outside its contact points: give it soles "
+        "(feet: [{name: NAME, at: LINK, points: [...]}]), or another standing pose"
+    )
 
 
 def torque_factor(task: Any, robot: RobotDescription) -> float | None:

@@ -37,6 +37,8 @@ OWN_KEYS = ("file", "weld")
 _UP = np.array([0.0, 0.0, 1.0])
 RADIUS = 0.005
 """The radius of a contact point for which the YAML gives none [m]."""
+ROOM = 0.1
+"""How far from a limit joints stand that cannot be at zero [rad, m]."""
 
 
 class Overlay:
@@ -364,7 +366,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
 
 
 def _stand_within_limits(data: dict[str, Any]) -> None:
-    """Let joints that cannot be at zero, and that nobody says more of, stand at their near limit."""
+    """Let joints that cannot be at zero, and that nobody says more of, stand near that limit."""
     standing, held = data["standing"], data.get("held") or {}
     if not isinstance(standing, Mapping) or not isinstance(held, Mapping):
         return
@@ -375,9 +377,9 @@ def _stand_within_limits(data: dict[str, Any]) -> None:
         if known or not isinstance(limits, list) or len(limits) != 2:
             continue
         if all(isinstance(value, (int, float)) for value in limits) and limits[0] < limits[1]:
-            angle = min(max(0.0, limits[0]), limits[1])
-            if angle != 0.0:
-                added[joint["name"]] = angle
+            room = min(ROOM, 0.5 * (limits[1] - limits[0]))
+            if not limits[0] < 0.0 < limits[1]:
+                added[joint["name"]] = min(max(0.0, limits[0] + room), limits[1] - room)
     data["standing"] = {**standing, **added}
 
 

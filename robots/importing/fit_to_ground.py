@@ -106,6 +106,8 @@ PLACE = 1e-2
 """Weight of the feet's places and of the height."""
 WIDEST = 1.6
 """How far from zero a joint starts at most [rad], where its limits' middle is farther."""
+BENT = (0.4, -0.8, 0.4)
+"""Where the pitch joints of a straight leg start, from the hip down [rad]."""
 SHARPEST = 1e-4
 """The tolerance of the conditions that must hold [m, rad]."""
 MARGIN = 0.02
@@ -175,6 +177,8 @@ class _GroundFit:
         self.free = np.flatnonzero(legs & ~held)
         middle = bounded.mean(axis=1)
         self.start = np.where(legs, np.clip(middle, -WIDEST, WIDEST), 0.0)
+        for foot in robot.feet:
+            self._bend(foot.link, carrier)
         given = {**start, **robot.held}
         for k, joint in enumerate(robot.joints):
             self.start[k] = given.get(joint.name, self.start[k])
@@ -190,6 +194,19 @@ class _GroundFit:
         centres = self._points(self._poses(straight[None]))[1][0]
         self.places = centres[:, :2]
         self.height = height * (0.0 - centres[:, 2].mean())
+
+    def _bend(self, link: str, carrier: Mapping[str, tuple[int, str]]) -> None:
+        """Start a leg that is straight in the middle of its limits a little bent: a straight leg does not
+        say to which side its knee goes, and no small change of its angles shortens it."""
+        chain = []
+        while link in carrier:
+            index, link = carrier[link]
+            joint = self.robot.joints[index]
+            if joint.kind == "hinge" and abs(joint.axis[1]) > 0.7:
+                chain.append(index)
+        if len(chain) > 1 and not self.start[chain].any():
+            for index, angle in zip(reversed(chain), BENT, strict=False):
+                self.start[index] = angle * np.sign(self.robot.joints[index].axis[1])
 
     def _is_flat(self, foot: int) -> bool:
         """Whether a foot has three contact points that are not in a line."""

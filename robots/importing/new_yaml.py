@@ -2,18 +2,21 @@
 
 A foot is the last link of a limb of two joints or more that reaches down, at the zero of all
 joints, nearly as far as the farthest one does. Balls that the file has there for collisions are
-taken for its contact points; else it is a ball foot at the lowest body of the link.
+taken for its contact points. Else a leg with an ankle stands on the corners of its lowest shapes, and any
+other on a ball at the lowest body of the link.
 """
 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...files.problems import listing
 from ..robot_description import RobotDescription
 from ..validation import RobotError, find_faults
 from ..validation.faults import number, vector
@@ -29,18 +32,43 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
     Raises:
         RobotError: the file describes no robot.
     """
-    bare = import_robot(file, {})
-    feet = guess_feet(bare.model, bare.built)
-    content: dict[str, Any] = {"name": target.stem, "feet": feet}
-    imported = import_robot(file, content)
+    guessed, more = guess(import_robot(file, {}))
+    feet, held = guessed["feet"], guessed["held"]
+    imported = import_robot(file, {"name": target.stem, **guessed})
     faults = find_faults(imported.data)
     if faults:
         raise RobotError(str(file), _placed(imported, faults))
     robot = RobotDescription.model_validate(imported.data)
-    robot, more = fit_to_ground(robot, False, imported.model.pose)
-    notes = [*imported.notes, *more]
+    robot, fitted = fit_to_ground(robot, False, imported.model.pose)
+    notes = [*more, *imported.notes, *fitted]
     name = os.path.relpath(file, target.parent)
-    return yaml_text(Path(name).as_posix(), robot, feet, notes), notes
+    return yaml_text(Path(name).as_posix(), robot, feet, held, notes), notes
+
+
+def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
+    """The keys ``feet`` and ``held`` of a short YAML for a file that was read without one, and notes.
+
+    Joints are held that move no foot, such as those of arms, or several feet, such as a spine's.
+    """
+    feet = guess_feet(bare.model, bare.built)
+    if not feet:
+        return {"feet": [], "held": {}}, []
+    notes = [f"the feet are guessed: {listing([foot['name'] for foot in feet], 8)}"]
+    carrier = {joint["child"]: joint for joint in bare.built.joints}
+    moved: Counter[str] = Counter()
+    for foot in feet:
+        link = bare.built.frames[foot["at"]].link
+        while link in carrier:
+            moved[carrier[link]["name"]] += 1
+            link = carrier[link]["parent"]
+    held = {
+        joint["name"]: float(bare.data["standing"].get(joint["name"], 0.0))
+        for joint in bare.built.joints
+        if moved[joint["name"]] != 1
+    }
+    if held:
+        notes.append(f"held, as they move no foot or several: {listing([*held], 6)}")
+    return {"feet": feet, "held": held}, notes
 
 
 def _placed(imported: Imported, faults: Any) -> list[Any]:
@@ -53,6 +81,8 @@ REACH = 0.1
 """By how much less than the farthest limb a foot reaches down, as a share."""
 LEVEL = 0.01
 """Contact points lie within this height [m]."""
+JOINTS_WITH_ANKLE, NARROW, SOLE_RADIUS = 5, 0.03, 0.005
+"""Legs of so many joints have an ankle; a sole is not narrower than this [m], and its corners are so round."""
 RADIUS = 0.02
 """The radius of a foot whose shape the file does not give [m]."""
 
@@ -109,6 +139,9 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
             is_ball = np.linalg.norm(shape.end - shape.start) < 0.1 * shape.radius
             if is_ball and frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
                 balls.append((name, frame, 0.5 * (shape.start + shape.end), shape.radius))
+    sole = None if balls else _sole(model, built, link, bottom)
+    if sole is not None:
+        return sole
     if not balls:
         name = min(bodies, key=lambda body: float(bodies[body].position[2]))
         return {"name": name, "at": name, "radius": RADIUS}
@@ -124,15 +157,46 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
     return {"name": name, "at": name, "points": points, "radius": round(radius, 6)}
 
 
+def _sole(model: RawModel, built: LinkTree, link: str, bottom: float) -> dict[str, Any] | None:
+    """The foot as four corners around what of its shapes is near the ground, where a leg of so many joints
+    has an ankle and the shapes are wide; else ``None``."""
+    carrier = {joint["child"]: joint["parent"] for joint in built.joints}
+    count, above = 0, link
+    while above in carrier:
+        count, above = count + 1, carrier[above]
+    found = []
+    for name, frame in _bodies(built, link).items():
+        for shape in model.bodies[name].capsules if name in model.bodies else ():
+            if frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
+                for end in (shape.start, shape.end):
+                    middle = frame.rotation @ end + frame.position
+                    found.append([*(middle[:2] - shape.radius), *(middle[:2] + shape.radius)])
+    if not found or count < JOINTS_WITH_ANKLE:
+        return None
+    each = np.array(found)
+    low, high = each[:, :2].min(axis=0), each[:, 2:].max(axis=0)
+    if (high - low).min() < NARROW:
+        return None
+    name = min(_bodies(built, link), key=lambda body: float(_bodies(built, link)[body].position[2]))
+    frame = built.frames[name]
+    corners = [[x, y, bottom] for x in (high[0], low[0]) for y in (high[1], low[1])]
+    points = [frame.rotation.T @ (np.array(corner) - frame.position) for corner in corners]
+    return {
+        "name": name, "at": name, "radius": SOLE_RADIUS,
+        "points": [[float(value) for value in np.round(point, 6) + 0.0] for point in points],
+    }  # fmt: skip
+
+
 def yaml_text(
-    file: str, robot: RobotDescription, feet: list[dict[str, Any]], notes: list[str]
-) -> str:
+    file: str, robot: RobotDescription, feet: list[dict[str, Any]], held: Mapping[str, float],
+    notes: list[str],
+) -> str:  # fmt: skip
     """The YAML's text.
 
     Args:
         file: what the YAML's key ``file`` says.
         robot: as it was read with these feet.
-        feet: that were guessed, as ``guess_feet`` gives them.
+        feet, held: that were guessed, as ``guess`` gives them.
         notes: what the file lacks, which become comments.
     """
     lines = [
@@ -152,7 +216,7 @@ def yaml_text(
         "",
         "# Joints that stand still at an angle while the robot is at work: arms, a waist.",
     ]
-    lines.append("held: {}")
+    lines += ["held:", *_numbers(held)] if held else ["held: {}"]
     return "\n".join(lines) + "\n"
 
 
@@ -210,4 +274,8 @@ def _sensors(robot: RobotDescription) -> list[str]:
 
 def _angles(key: str, angles: Mapping[str, float]) -> list[str]:
     lines = ["# Found: soles on one level, the centre of mass over their middle.", f"{key}:"]
-    return lines + [f"  {name}: {round(angle, 9):.9g}" for name, angle in angles.items()]
+    return lines + _numbers(angles)
+
+
+def _numbers(angles: Mapping[str, float]) -> list[str]:
+    return [f"  {name}: {round(angle, 9):.9g}" for name, angle in angles.items()]

@@ -18,8 +18,9 @@ CallJson = Callable[..., dict[str, Any]]
 BRUCE, _ = graph_of("bruce")
 
 
-def _leg(side: str, y: float) -> str:
-    return f"""<body name="{side}_thigh" pos="0 {y} -0.05">
+def _leg(side: str) -> str:
+    x, y = LEGS[side]
+    return f"""<body name="{side}_thigh" pos="{x} {y} -0.05">
 <joint name="{side}_hip" axis="0 1 0" range="-90 90"/>
 <geom type="capsule" fromto="0 0 -0.05 0 0 -0.15" size=".02" mass="0.5"/>
 <body name="{side}_foot" pos="0 0 -0.2"><joint name="{side}_knee" axis="0 1 0" range="-150 -5"/>
@@ -27,18 +28,13 @@ def _leg(side: str, y: float) -> str:
 <geom type="sphere" pos="0 0 -0.2" size=".02" mass="0.05"/></body></body>"""
 
 
+LEGS = {"fl": (0.1, 0.1), "fr": (0.1, -0.1), "hl": (-0.1, 0.1), "hr": (-0.1, -0.1)}
 STICKS = f"""<mujoco model="sticks"><compiler angle="degree"/><worldbody>
-<body name="torso" pos="0 0 1"><freejoint/><geom type="box" size=".05 .1 .05" mass="5"/>
-{_leg("left", 0.1)}{_leg("right", -0.1)}</body></worldbody><actuator>
-{
-    "".join(
-        f'<motor joint="{side}_{joint}" gear="50" ctrlrange="-1 1"/>'
-        for side in ("left", "right")
-        for joint in ("hip", "knee")
-    )
-}
+<body name="torso" pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .05" mass="5"/>
+{"".join(map(_leg, LEGS))}</body></worldbody><actuator>
+{"".join(f'<motor joint="{leg}_{joint}" gear="50" ctrlrange="-1 1"/>' for leg in LEGS for joint in ("hip", "knee"))}
 </actuator></mujoco>"""
-"""A robot on two legs that bend ahead and back."""
+"""A robot on four legs that bend ahead and back."""
 
 
 def changes(rise: str = "", turn: str = "", **lengths: str) -> dict[str, float]:
@@ -132,7 +128,12 @@ def test_a_file_of_a_robot_is_enough(folder: Path) -> None:
     path, own = graph_of(str(folder / "stick.xml"))
     graph = load_jump(path, [*own, *settings_for({"distance_x": 0.1}, "")], 0)
     assert graph.checked.robot is not None
-    assert [foot.name for foot in graph.checked.robot.feet] == ["left_foot", "right_foot"]
+    assert [foot.name for foot in graph.checked.robot.feet] == [
+        "fl_foot",
+        "fr_foot",
+        "hl_foot",
+        "hr_foot",
+    ]
     task = task_of(graph)
     assert (task.name, task.robot) == ("10 cm high, 10 cm ahead", "sticks")
 
@@ -144,7 +145,7 @@ def test_a_file_of_a_robot_is_enough(folder: Path) -> None:
         (
             ' gear="50"',
             ' gear="1"',
-            "sticks cannot jump: motor left_knee has 1 N m, and standing alone",
+            "sticks cannot jump: motor fl_knee has 1 N m, and standing alone",
         ),
     ],
 )

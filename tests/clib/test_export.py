@@ -168,6 +168,69 @@ def test_wrong_calls_and_numbers_are_refused(written: Path) -> None:
     assert library.step() == Status.OK
 
 
+CAREFUL = """\
+from aloft import Block, Input, Output, kernel
+from aloft.blocks.general.vectors import Vector, VectorParameters
+from aloft.runtime.language.steps import signal_call
+
+
+@kernel
+def halve(y: Vector) -> None:
+    y.value[:] = 0.5 * y.value
+
+
+class Careful(Block):
+    "Passes numbers on, and halves great ones in its event."
+
+    class Params(VectorParameters):
+        pass
+
+    params: Params
+    u = Input(Vector, text="what is passed on")
+    y = Output(Vector, text="the same, or half of it")
+
+    def setup(self) -> None:
+        self.event_calls = (signal_call(halve, self.y),)
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector) -> bool:
+        y.value[:] = u.value
+        return u.value[0] > 10.0
+
+    def on_event(self) -> None:
+        self.event_calls[0].run()
+"""
+WATCHED = """\
+rate: 100 Hz
+blocks:
+  given: {use: blocks.External}
+  careful: {use: "careful_block:Careful", in: {u: given.y}}
+  bounded: {use: blocks.Assertion, with: {lower: -1, upper: 8}, in: {u: careful.y}}
+"""
+
+
+@needs_compiler
+def test_what_a_block_asks_of_python_is_a_status_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "careful_block.py").write_text(CAREFUL)
+    (tmp_path / "watched.yaml").write_text(WATCHED)
+    made = write_library(
+        str(tmp_path / "watched.yaml"), tmp_path / "watched", outputs=["careful.y", "bounded.ok"]
+    )
+    library = Library(made.description)
+    found = []
+    for given in (3.0, 12.0, 9.0, 3.0):
+        library.inputs["given"][...] = given
+        status = Status(library.step())
+        found.append((status.name, library.last_block(), library.outputs["careful.y"].tolist()))
+    assert found == [
+        ("OK", "", [3.0]),
+        ("FALLBACK", "careful", [6.0]),
+        ("EVENT", "bounded", [9.0]),
+        ("OK", "", [3.0]),
+    ]
+
+
 def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:
     (tmp_path / "noisy.yaml").write_text(
         "rate: 100 Hz\nblocks:\n"

@@ -81,7 +81,7 @@ def test_the_graph_is_good_before_it_is_mutated() -> None:
 
 
 @st.composite
-def mutated(draw: st.DrawFn, text: str) -> str:
+def mutated(draw: st.DrawFn, text: str, pieces: tuple[str, ...] = PIECES) -> str:
     for _ in range(draw(st.integers(0, 3))):
         start = draw(st.integers(0, len(text)))
         end = min(len(text), start + draw(st.integers(0, 12)))
@@ -89,9 +89,9 @@ def mutated(draw: st.DrawFn, text: str) -> str:
         if kind == "delete":
             text = text[:start] + text[end:]
         elif kind == "insert":
-            text = text[:start] + draw(st.sampled_from(PIECES)) + text[start:]
+            text = text[:start] + draw(st.sampled_from(pieces)) + text[start:]
         elif kind == "replace":
-            text = text[:start] + draw(st.sampled_from(PIECES)) + text[end:]
+            text = text[:start] + draw(st.sampled_from(pieces)) + text[end:]
         elif kind == "copy":
             to = draw(st.integers(0, len(text)))
             text = text[:to] + text[start:end] + text[to:]
