@@ -5,14 +5,16 @@ import numpy as np
 from aloft.blocks.control import frames
 from aloft.blocks.control.leg_tracking import LegSettings, limb_geometry, limb_memory
 from aloft.blocks.control.tasks import TaskError, TaskJacobian
+from aloft.blocks.control.whole_body_controller import HoldSettings, SolverMemory
 from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
-from aloft.blocks.signals import RobotTruth
+from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
 from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.landing_law import LandingCost, flight_map
+from aloft.mathematics.whole_body_qp import RigidBodyTerms
 from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
@@ -162,12 +164,36 @@ TERRAIN = Terrain(
     (Ground((0.0, 0.0, -0.1), (1.0, 1.0, 0.1), (0.2, -0.1)),),
     (HeightField((-1.0, -1.0), (0.0, 0.0), ((0.0, 0.1, 0.05), (0.02, 0.0, 0.07))),),
 ).surface
+CHAIN_STARTS, CHAIN_ROWS = np.array([0, 1, 3, 5, 6]), np.array([0, 0, 1, 1, 2, 2])
+"""The non-zeros of a matrix (3, 4) by columns: each row touches two neighbours."""
 UNUSED = {
+    "aloft.mathematics.banded_system.assemble_normal": (
+        CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
+        np.zeros((3, 2)), np.zeros(3, dtype=np.int64),
+    ),
+    "aloft.mathematics.banded_system.factorise_band": (
+        3, 1e-3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]),
+    ),
+    "aloft.mathematics.banded_system.solve_band": (
+        3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
+    ),
+    "aloft.mathematics.banded_system.smallest_correction": (
+        CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
+        np.array([3]), 1e-12, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), NORMAL(3),
+        np.zeros(4), np.zeros(1, dtype=np.bool_),
+    ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
     ),
     "aloft.mathematics.ground_surface.height_of_field": (
         TERRAIN.fields[0], TERRAIN.heights, -0.3, -0.6, np.zeros(3),
+    ),
+    "aloft.blocks.control.whole_body_controller.hold_torque": (
+        as_record(PhaseState.allocate(find_robot("bruce").dimensions)),
+        RigidBodyTerms(np.zeros((16, 16)), np.linspace(-1.0, 1.0, 16), np.ones((4, 3, 16))),
+        as_record(WholeBodyCommand.allocate(find_robot("bruce").dimensions)),
+        as_record(SolverMemory.allocate(find_robot("bruce").dimensions)),
+        HoldSettings(np.zeros(1, np.int64), np.full(1, 0.9), np.full(1, 50.0)),
     ),
     "aloft.blocks.control.frames.move_model": (*MODEL, TREE, body_motion(10)),
     "aloft.blocks.control.frames.update_frame": (

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
-from .layers import Layers, Place, WirePassage, arrange
+from .layers import FEW, Layers, Place, WirePassage, arrange
+from .tracks import LANE, STRAIGHT, TRACK, Hop, Net, assign_tracks
 
 ROW = 18.0
 """From one port to the next."""
@@ -97,45 +98,6 @@ def size_of(node: DiagramNode) -> tuple[float, float]:
     return round(max(head, both, 74.0) + 2 * PAD), HEAD + ROW * rows + FOOT
 
 
-_TRACK = 6.5
-"""From one vertical line to the next."""
-_LANE = 9.0
-"""From one line that leads back to the next."""
-_STRAIGHT = 0.5
-Net = tuple[str, str]
-
-
-@dataclass
-class _Hop:
-    """A net in one gap: it enters at some height on the left and leaves at others on the right.
-
-    ``lane`` is the number of the lane below all blocks that it comes from or goes to.
-    """
-
-    net: Net
-    wire: DiagramWire
-    starts: float | None
-    ends: list[tuple[float, DiagramWire | None]] = field(default_factory=list)
-    goes_to: int | None = None
-    comes_from: int | None = None
-    track: int = 0
-
-    def span(self, floor: float) -> tuple[float, float]:
-        """The least and the greatest height."""
-        heights = [y for y, _ in self.ends]
-        heights += [] if self.starts is None else [self.starts]
-        if self.goes_to is not None or self.comes_from is not None:
-            lane = self.goes_to if self.goes_to is not None else self.comes_from
-            heights.append(floor + _LANE * (lane or 0))
-        return min(heights), max(heights)
-
-    def is_straight(self) -> bool:
-        """Whether it needs no vertical line."""
-        if self.goes_to is not None or self.comes_from is not None or self.starts is None:
-            return False
-        return all(abs(y - self.starts) < _STRAIGHT for y, _ in self.ends)
-
-
 class Router:
     """The wires of one diagram. ``columns`` are the left and right edges of its columns."""
 
@@ -149,14 +111,14 @@ class Router:
         self.wires: dict[Net, DiagramWire] = {}
         low = [box.y + box.height for box in boxes.values()] + list(passages.values())
         self.floor = max(low, default=0.0) + 20.0
-        self.gaps: list[dict[tuple[Net, str], _Hop]] = [{} for _ in range(len(layers.columns) + 1)]
+        self.gaps: list[dict[tuple[Net, str], Hop]] = [{} for _ in range(len(layers.columns) + 1)]
         self.lanes: list[tuple[int, int, Net, list[DiagramWire]]] = []
         for wire in [*layers.forward, *layers.back]:
             self.wires.setdefault(wire.source, wire)
         self._forward()
         self._back()
         for gap in self.gaps:
-            _assign_tracks(list(gap.values()), self.floor)
+            assign_tracks(list(gap.values()), self.floor)
 
     def _out(self, net: Net) -> float:
         box = self.boxes[net[0]]
@@ -166,8 +128,8 @@ class Router:
         box = self.boxes[wire.target[0]]
         return box.y + box.port(wire.target[1], False)
 
-    def _hop(self, gap: int, net: Net, starts: float) -> _Hop:
-        return self.gaps[gap].setdefault((net, ""), _Hop(net, self.wires[net], starts))
+    def _hop(self, gap: int, net: Net, starts: float) -> Hop:
+        return self.gaps[gap].setdefault((net, ""), Hop(net, self.wires[net], starts))
 
     def _forward(self) -> None:
         for passage, height in self.passages.items():
@@ -196,7 +158,7 @@ class Router:
                 hop.goes_to = lane
             else:
                 hop.goes_to = max(hop.goes_to, lane)
-            arrival = _Hop(net, wires[0], None, comes_from=lane)
+            arrival = Hop(net, wires[0], None, comes_from=lane)
             arrival.ends = [(self._into(wire), wire) for wire in wires]
             self.gaps[target][net, f"back{lane}"] = arrival
             self.lanes.append((source + 1, target, net, wires))
@@ -204,7 +166,7 @@ class Router:
     def _x(self, gap: int, track: int) -> float:
         """The place of a vertical line."""
         left = self.columns[gap - 1][1] if gap else 0.0
-        return left + 14.0 + _TRACK * track
+        return left + 14.0 + TRACK * track
 
     def route(self, drawing: Drawing) -> None:
         """Add all lines."""
@@ -212,14 +174,14 @@ class Router:
             for hop in gap.values():
                 self._draw(number, hop, drawing)
         for lane, (begin, target, net, wires) in enumerate(self.lanes):
-            y = self.floor + _LANE * lane
+            y = self.floor + LANE * lane
             start = self._x(begin, self.gaps[begin][net, ""].track)
             end = self._x(target, self.gaps[target][net, f"back{lane}"].track)
             drawing.lines.append(Line(((start, y), (end, y)), wires[0], ends=False))
             if self.gaps[begin][net, ""].goes_to != lane:
                 drawing.dots.append((start, y, wires[0]))
 
-    def _draw(self, number: int, hop: _Hop, drawing: Drawing) -> None:
+    def _draw(self, number: int, hop: Hop, drawing: Drawing) -> None:
         """The lines of a net in a gap."""
         left = self.columns[number - 1] if number else (0.0, 0.0)
         x = self._x(number, hop.track)
@@ -246,7 +208,7 @@ class Router:
         heights += [] if hop.starts is None else [hop.starts]
         for y in dict.fromkeys(heights):
             if (
-                first + _STRAIGHT < y < last - _STRAIGHT
+                first + STRAIGHT < y < last - STRAIGHT
                 or sum(abs(y - other) < 1.0 for other in heights) > 1
             ):
                 drawing.dots.append((x, y, hop.wire))
@@ -265,40 +227,11 @@ class Router:
             return box.x + box.width
         return edges[0] - 2.0
 
-    def _end(self, number: int, hop: _Hop, wire: DiagramWire | None) -> float:
+    def _end(self, number: int, hop: Hop, wire: DiagramWire | None) -> float:
         """Where a branch ends: at a block, or at the edge of the column that it passes."""
         if wire is None:
             return self.columns[number][0] - 2.0
         return self.boxes[wire.target[0]].x
-
-
-def _assign_tracks(hops: list[_Hop], floor: float) -> None:
-    """Give vertical lines that overlap different tracks, so that few lines cross."""
-    bent = [hop for hop in hops if not hop.is_straight()]
-
-    def downwards(hop: _Hop) -> bool:
-        first, last = hop.span(floor)
-        return hop.starts is not None and hop.starts - first < last - hop.starts
-
-    # Those that lead up are sorted from above, those that lead down from below: then a line does
-    # not cross those that enter above or below it on the same way.
-    bent.sort(key=lambda hop: (hop.starts is None, _order(hop, downwards(hop), floor)))
-    tracks: list[list[tuple[float, float]]] = []
-    for hop in bent:
-        first, last = hop.span(floor)
-        for number, taken in enumerate(tracks):
-            if all(last + 5.0 < a or b + 5.0 < first for a, b in taken):
-                hop.track = number
-                taken.append((first, last))
-                break
-        else:
-            hop.track = len(tracks)
-            tracks.append([(first, last)])
-
-
-def _order(hop: _Hop, down: bool, floor: float) -> float:
-    start = hop.starts if hop.starts is not None else hop.span(floor)[1]
-    return -start if down else start
 
 
 def column_gaps(router: Router) -> list[float]:
@@ -310,7 +243,7 @@ def column_gaps(router: Router) -> list[float]:
         least = 16.0 if outside and not gap else 30.0
         ends = [w for hop in gap.values() for _, w in hop.ends if w is not None and router.ends(w)]
         notes = max((width_of(note_of(w), NOTE) for w in ends), default=0.0)
-        widths.append(max(least, 28.0 + _TRACK * count + notes))
+        widths.append(max(least, 28.0 + TRACK * count + notes))
     return widths
 
 
@@ -323,6 +256,7 @@ _STEP = 24.0
 """Smaller steps in a line that passes a column are taken out."""
 _FAR = 1e9
 _ITERATIONS = 120
+_ITERATIONS_OF_MANY = 12
 
 
 def draw(diagram: Diagram) -> Drawing:
@@ -376,7 +310,7 @@ def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
             from_b = boxes[b].port(into, False) if isinstance(b, str) else 0.0
             links.setdefault(a, []).append((b, from_a, from_b, weight))
             links.setdefault(b, []).append((a, from_b, from_a, weight))
-    for sweep in range(_ITERATIONS):
+    for sweep in range(_ITERATIONS if len(y) <= FEW else _ITERATIONS_OF_MANY):
         columns = layers.columns if sweep % 2 == 0 else layers.columns[::-1]
         for column in columns:
             wishes = []

@@ -7,8 +7,8 @@ from aloft.runtime.drawing.diagram import Diagram, DiagramNode, DiagramWire
 from aloft.runtime.drawing.layers import WirePassage, arrange
 
 
-def diagram_of(edges: list[tuple[str, str]]) -> Diagram:
-    nodes: dict[str, DiagramNode] = {}
+def diagram_of(edges: list[tuple[str, str]], order: str = "") -> Diagram:
+    nodes = {name: DiagramNode(name, name) for name in order.split()}
     wires = []
     for a, b in edges:
         for name in (a, b):
@@ -42,12 +42,12 @@ def test_a_long_wire_passes_the_columns_between_once_for_all_its_readers() -> No
 
 
 def test_a_source_stands_beside_its_reader() -> None:
-    layers = arrange(diagram_of([("a", "b"), ("b", "c"), ("d", "c")]))
+    layers = arrange(diagram_of([("a", "b"), ("b", "c"), ("d", "c")], "a b d c"))
     assert layers.layer["d"] == 1
 
 
 def test_crossings_are_taken_out() -> None:
-    layers = arrange(diagram_of([("a", "x"), ("b", "y"), ("b2", "y"), ("c", "x")]))
+    layers = arrange(diagram_of([("a", "x"), ("b", "y"), ("b2", "y"), ("c", "x")], "a b b2 c x y"))
     first = [place for place in layers.columns[0] if isinstance(place, str)]
     assert set(first[:2]) in ({"a", "c"}, {"b", "b2"})
 
@@ -69,4 +69,14 @@ def test_any_graph_has_columns(edges: list[tuple[str, str]]) -> None:
         left = a.layer if isinstance(a, WirePassage) else layers.layer[a]
         right = b.layer if isinstance(b, WirePassage) else layers.layer[b]
         assert right == left + 1
-    assert arrange(diagram).columns == layers.columns
+    assert arrange(diagram_of(edges)).columns == layers.columns
+
+
+def test_what_writes_from_its_state_stands_where_few_wires_lead_back() -> None:
+    edges = [("robot", "see"), ("see", "act"), ("act", "robot"), ("act", "late"), ("late", "see")]
+    diagram = diagram_of([*edges, ("robot", "late"), ("see", "late")], "late robot see act")
+    for path in ("robot", "late"):
+        diagram.nodes[path].moore = True
+    layers = arrange(diagram)
+    assert layers.layer["robot"] == 0 and layers.layer["late"] == 3
+    assert {(w.source[0], w.target[0]) for w in layers.back} == {("act", "robot"), ("late", "see")}
