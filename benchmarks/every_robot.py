@@ -62,6 +62,7 @@ def _standing(found: ReadRobot) -> str:
         settings = [f"robot={str(found.path)!r}", *SETTINGS]
         run = load(shipped_folder() / "robots" / "stand.yaml", settings).run()
     except AloftError as error:
-        return f"does not stand: {str(error).splitlines()[0].rpartition(': ')[2]}"
+        why = str(error).splitlines()[0].rpartition(": ")[2].partition(" (at ")[0]
+        return f"does not stand: {why}"
     verdict = "stands" if run.success else "does not stand"
     return f"{verdict}: {run.reason}, {unusual} remarks of check-up"

@@ -40,8 +40,10 @@ class Calibration(BaseModel):
     """One robot as its own motion shows it; None where nothing was found.
 
     Frames are the base's. Ages are of readings beside the joints' angles [s]; ``rotor_inertia`` and
-    ``torque_constant`` are factors on the description's, ``saturation`` and ``load_friction`` shares of the torque.
-    ``residuals`` say, by joint and sensor, what the model does not explain [N m, rad/s, m/s^2].
+    ``torque_constant`` are factors on the description's, ``saturation`` and ``load_friction`` shares of the torque,
+    ``gear_compliance`` is that of every gear behind its encoder [rad/(N m)].
+    ``residuals`` say, by joint and sensor, what the model does not explain [N m, rad/s, m/s^2];
+    ``ripple_periods`` are those of the motors' ripple and cogging in a turn of the output.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -60,10 +62,12 @@ class Calibration(BaseModel):
     accelerometer_age: Value
     velocity_age: Value
     play: dict[str, Value]
+    gear_compliance: Value = Value(value=0.0, std=0.0)
     open_voltage: Value | None = None
     resistance: Value | None = None
     delay: Value | None = None
     residuals: dict[str, float] = {}
+    ripple_periods: tuple[float, ...] = ()
 
 
 def calibrate_robot(
@@ -110,10 +114,11 @@ def calibration_of(
         mass=_value(motors.mass), imu_position=(x, y, z), imu_rotation=(roll, pitch, yaw),
         gyro_age=_value(sensors.gyro_age), accelerometer_age=_value(sensors.accelerometer_age),
         velocity_age=_value(sensors.velocity_age), play=named(sensors.play),
+        gear_compliance=_value(sensors.gear_compliance),
         open_voltage=None if pack is None else _value(pack.open_voltage),
         resistance=None if pack is None else _value(pack.resistance),
         delay=None if delay is None else _value(delay),
-        residuals={**sensors.residuals, **motors.residuals},
+        residuals={**sensors.residuals, **motors.residuals}, ripple_periods=motors.ripple_periods,
     )  # fmt: skip
 
 

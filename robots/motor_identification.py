@@ -9,6 +9,8 @@ better known than each of them, or follows from the mass if the robot has been w
 known beforehand to some ``Spreads``: the fit is that of the greatest posterior probability.
 
 A constant torque of every joint is fitted, too: it takes up offsets of the encoders and a tilt of the IMU.
+So is torque that comes again with the motor's angle, as ripple and cogging do. How often in a turn is not known: it is
+found from what is left, and fitted as long as that explains much. Without it this torque hides the rest.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from .identification import Estimate, IdentificationError, MeasuredRun
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
 from .sensor_identification import (
+    CUTOFF,
     EDGE,
     IdentifiedSensors,
     fit,
@@ -43,6 +46,12 @@ SOFT_SPEED = 0.08
 """The joint speed at which most of the Coulomb friction acts [rad/s]."""
 CORRELATED = 0.6
 """What the model lacks repeats for about so long [s]."""
+PERIODS = np.arange(20.0, 181.0, 2.0)
+"""The periods in a turn of the output that are looked for in what motors give beside their torque."""
+RIPPLE = 0.01
+"""The size of such torque beforehand, as a share of the peak torque."""
+MOST_PERIODS, EXPLAINED = 3, 0.1
+"""So many are fitted, each if it explains this share of what is left."""
 _DRAWS = 600
 _LINK = 10
 
@@ -58,7 +67,7 @@ class Spreads:
     torque_constant: float = 0.03
     saturation: float = 0.1
     load_friction: float = 0.05
-    rotor_inertia: float = 0.2
+    rotor_inertia: float = 0.1
     friction: float = 0.8
 
 
@@ -74,6 +83,7 @@ class IdentifiedMotors:
         friction, damping: by joint [N m, N m s/rad].
         mass: of the robot [kg].
         residuals: root mean square of the torque that is not explained, by joint [N m].
+        ripple_periods: of torque that comes again with the motor's angle, in a turn of the output.
     """
 
     torque_constant: dict[str, Estimate]
@@ -84,6 +94,7 @@ class IdentifiedMotors:
     damping: dict[str, Estimate]
     mass: Estimate
     residuals: dict[str, float]
+    ripple_periods: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -110,7 +121,7 @@ def identify_motors(
         raise IdentificationError(f"{robot.name} has a {robot.base_joint} base")
     n, links = len(robot.joints), len(robot.links)
     nominal, spread = _link_spread(robot, spreads)
-    rows, right = _equations(robot, motion, sensors, nominal, spread)
+    rows, right, free = _equations(robot, motion, sensors, nominal, spread)
     known = robot.motors
     differences = _differences(n)
     prior = np.concatenate([
@@ -122,8 +133,26 @@ def identify_motors(
     places = np.cumsum([_LINK * links, 1, n, n, n, n])
     constants = slice(int(places[-2]), int(places[-1]))
     with_mean = np.concatenate([rows[..., : constants.start], rows[..., constants] @ differences, rows[..., constants.stop :]], axis=2)  # fmt: skip
-    solution, covariance, _ = fit(with_mean, right, prior, EVERY * motion.period, CORRELATED)
-    left = np.sqrt(((right - with_mean @ solution) ** 2).mean(axis=0))
+    told, turned = len(prior), _motor_angles(robot, motion, sensors)
+    step = EVERY * motion.period
+    solution, covariance, _ = fit(with_mean, right, prior, step, CORRELATED)
+    error, periods = right - with_mean @ solution, []
+    ripple = np.tile(RIPPLE * np.asarray(known.peak_torque), 2)
+    for _ in range(MOST_PERIODS):
+        often = most_alike(error[:, 6:] @ robot.joint_to_motor.T, turned, motion.period)
+        columns = np.zeros((*right.shape, 2 * n))
+        waves = _waves(turned, often, motion.period)
+        columns[:, 6:] = -np.hstack([robot.joint_to_motor.T] * 2) * waves[:, None, :]
+        wider = np.concatenate([with_mean, free @ columns], axis=2)
+        more = fit(wider, right, np.concatenate([prior, ripple]), step, CORRELATED)
+        left = right - wider @ more[0]
+        if (left**2).mean() > (1.0 - EXPLAINED) * (error**2).mean():
+            break
+        with_mean, prior, error = wider, np.concatenate([prior, ripple]), left
+        solution, covariance, _ = more
+        periods.append(often)
+    solution, covariance = solution[:told], covariance[:told, :told]
+    size = np.sqrt((error**2).mean(axis=0))
     back = np.zeros((rows.shape[2], len(solution)))
     back[: constants.start, : constants.start] = np.eye(constants.start)
     back[constants, constants.start : -2] = differences
@@ -157,7 +186,7 @@ def identify_motors(
         each(robot.transmission.motors, motors), one(int(saturation[0])), one(int(load[0])),
         one(int(rotor[0])), each(names, friction), each(names, damping),
         Estimate(scale * mass, float(np.hypot(scale * mass_std, scale_std * scale * mass))),
-        {name: float(left[6 + k]) for k, name in enumerate(names)},
+        {name: float(size[6 + k]) for k, name in enumerate(names)}, tuple(periods),
     )  # fmt: skip
 
 
@@ -165,6 +194,31 @@ def _differences(n: int) -> Array:
     """Directions in which torque constants differ and their mean stays, (n, n - 1)."""
     values, vectors = np.linalg.eigh(np.eye(n) - np.full((n, n), 1.0 / n))
     return np.asarray(vectors[:, values > 0.5])
+
+
+def _motor_angles(
+    robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors
+) -> Array:
+    """The angles of the motors [rad], tick by tick while the robot stands."""
+    return _seated(motion, sensors, standing_span(robot, motion)) @ robot.joint_to_motor.T
+
+
+def _waves(turned: Array, periods: float, period: float) -> Array:
+    """Sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the
+    equations, (ticks, 2 n)."""
+    edge = round(EDGE / period)
+    waves = smooth(np.hstack([np.sin(periods * turned), np.cos(periods * turned)]), period)
+    return waves[edge : len(turned) - edge : EVERY]
+
+
+def most_alike(error: Array, turned: Array, period: float) -> float:
+    """Of ``PERIODS`` the one whose waves are most like the errors of the motors' torques."""
+    scores = []
+    for periods in PERIODS:
+        waves = _waves(turned, float(periods), period)
+        alike = np.tile(error, 2) * waves
+        scores.append(float((alike.sum(axis=0) ** 2 / (waves**2).sum(axis=0)).sum()))
+    return float(PERIODS[int(np.argmax(scores))])
 
 
 def _link_spread(robot: RobotDescription, spreads: Spreads) -> tuple[Array, Array]:
@@ -203,8 +257,9 @@ def _link_spread(robot: RobotDescription, spreads: Spreads) -> tuple[Array, Arra
 def _equations(
     robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors, nominal: Array,
     spread: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """The projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities)."""
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """The projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities), and the projections
+    (ticks, n_velocities, n_velocities)."""
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
@@ -216,7 +271,9 @@ def _equations(
         if carriers[k] < 0:
             joint = next(j.name for j in robot.joints if j.child == link.name)
             carriers[k] = model.getJointId(joint) - 1
-    angles, speeds, bends, turning, turns, force, torque = _motion(robot, motion, sensors)
+    angles, speeds, bends, turning, turns, force, torque = filtered_motion(
+        motion, sensors, standing_span(robot, motion)
+    )
     to_motor, rotors = robot.joint_to_motor, robot.rotor_matrix
     peak = np.asarray(robot.motors.peak_torque)
     coulomb, viscous = np.asarray(robot.motors.friction), np.asarray(robot.motors.damping)
@@ -224,7 +281,7 @@ def _equations(
     edge = round(EDGE / motion.period)
     q, v, a = np.zeros(7 + n), np.zeros(6 + n), np.zeros(6 + n)
     q[6] = 1.0
-    all_rows, all_right = [], []
+    all_rows, all_right, all_free = [], [], []
     for k in range(edge, len(angles) - edge, EVERY):
         q[7:], v[3:6], v[6:] = angles[k], turning[k], speeds[k]
         a[:3], a[3:6], a[6:] = force[k], turns[k], bends[k]
@@ -251,37 +308,48 @@ def _equations(
         )
         _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
         used = directions[sizes > 1e-6 * sizes[0]]
-        all_rows.append(rows - used.T @ (used @ rows))
-        all_right.append(right - used.T @ (used @ right))
-    return np.array(all_rows), np.array(all_right)
+        free = np.eye(6 + n) - used.T @ used
+        all_rows.append(free @ rows)
+        all_right.append(free @ right)
+        all_free.append(free)
+    return np.array(all_rows), np.array(all_right), np.array(all_free)
 
 
-def _motion(
-    robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors
-) -> tuple[Array, ...]:
-    """The filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
-    angular velocity and acceleration, the specific force of its origin, and the joints' torques."""
-    span, period = standing_span(robot, motion), motion.period
+def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Array:
+    """The joints' angles without the play of their gears."""
     width = np.array([each.value for each in sensors.play.values()])
+    return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
+
+
+def filtered_motion(
+    motion: MeasuredRun, sensors: IdentifiedSensors, span: slice,
+    cutoff: float = CUTOFF,
+) -> tuple[Array, ...]:  # fmt: skip
+    """The filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
+    angular velocity and acceleration, the specific force of its origin, and the joints' torques.
+
+    The robot ends as it began, so its mean angular velocity is the gyroscope's bias; it stands still at first.
+    """
+    period = motion.period
     torque = motion.torque[span]
-    angles = smooth(motion.position[span] - 0.5 * width * play_positions(torque, period), period)
-    speeds = smooth(motion.velocity[span], period)
+    angles = smooth(_seated(motion, sensors, span), period, cutoff)
+    speeds = smooth(motion.velocity[span], period, cutoff)
     speeds = shifted(speeds, sensors.velocity_age.value / period)
     rotation = np.array([each.value for each in sensors.imu_rotation])
     place = np.array([each.value for each in sensors.imu_position])
     turning = shifted(
-        smooth(motion.angular_velocity[span], period), sensors.gyro_age.value / period
+        smooth(motion.angular_velocity[span], period, cutoff), sensors.gyro_age.value / period
     )
     turning = turning - turning.mean(axis=0)
     turning = turning - np.cross(turning, rotation)
     # A mean over the tick before is half a tick older than a sample.
     late = sensors.accelerometer_age.value / period + 0.5
-    force = shifted(smooth(motion.specific_force[span], period), late)
+    force = shifted(smooth(motion.specific_force[span], period, cutoff), late)
     force = force - np.cross(force, rotation)
     force = force * (GRAVITY / np.linalg.norm(force[: round(0.8 / period)], axis=1).mean())
     turns = slope(turning, period)
     force = force - np.cross(turns, place) - np.cross(turning, np.cross(turning, place))
-    torque = shifted(smooth(torque, period), 0.5)
+    torque = shifted(smooth(torque, period, cutoff), 0.5)
     return angles, speeds, slope(speeds, period), turning, turns, force, torque
 
 

@@ -7,7 +7,8 @@ The feet stand still, so the joints' velocities say how the base moves, and the 
 
 for the velocity w_b and the specific force f_b of the base's origin; r is the IMU's place, s are errors
 of scale. An encoder on the motor, before a gear with play, differs from the joint by half of the play on the side
-of the torque, and turns once a turn by its eccentricity. Everything is linear in what is unknown, and
+of the torque, and turns once a turn by its eccentricity. A gear that yields turns the joint by its torque times a
+compliance, so the base moves by what no encoder before the gear tells, and the gyroscope does. Everything is linear in what is unknown, and
 all signals pass the same filter, forwards and backwards, which takes noise away and no time.
 
 The IMU's angle is found from the gyroscope. The accelerometer's vertical is the gyroscope's, integrated.
@@ -51,6 +52,10 @@ HIDDEN_TORQUE = 0.1
 """Torque that currents do not tell, such as ripple [N m]: with no more than this a rotor may be anywhere in its play."""
 USUAL_PLAY, RESOLVED = 0.01, 2e-4
 """The play by which the error of an unseated rotor is weighted, and what an encoder tells at best [rad]."""
+USUAL_COMPLIANCE = 2e-3
+"""The compliance of gears is of this size beforehand [rad/(N m)]."""
+LEAST_COMPLIANCE = 3e-4
+"""No compliance is claimed to be known better [rad/(N m)]: play that is not seated looks like one."""
 LEAST_AGE, LEAST_PLAY = 1.5e-4, 1.5e-3
 """No age [s] and no play [rad] is claimed to be known better."""
 
@@ -64,6 +69,7 @@ class IdentifiedSensors:
         imu_rotation: the rotation vector from the base's axes to the IMU's [rad].
         gyro_age, accelerometer_age, velocity_age: of the readings, beside those of the joints' angles [s].
         play: of the gear before each encoder, by joint [rad].
+        gear_compliance: of all gears, behind the encoders [rad/(N m)].
         residuals: root mean squares of what is not explained, by sensor [rad/s, m/s^2].
     """
 
@@ -73,6 +79,7 @@ class IdentifiedSensors:
     accelerometer_age: Estimate
     velocity_age: Estimate
     play: dict[str, Estimate]
+    gear_compliance: Estimate
     residuals: dict[str, float]
 
 
@@ -136,7 +143,8 @@ def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> Identified
         smooth(motion.angular_velocity[span], period),
         smooth(motion.specific_force[span], period),
     )
-    turn, gyro_late, gyro_left = _gyroscope(base[:, 3:6], gyro, period)
+    yields = base_motion(robot, position, slope(smooth(torque, period), period))[:, 3:6]
+    turn, gyro_late, gyro_left, compliance = _gyroscope(base[:, 3:6], gyro, yields, period)
     angle = np.array([each.value for each in turn])
     place, force_late, force_left = _accelerometer(
         base, gyro, force, angle, gyro_late.value, period
@@ -146,7 +154,7 @@ def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> Identified
     # is half a tick older than a sample.
     return IdentifiedSensors(
         place, turn, _sum(gyro_late, joint), _sum(force_late, joint, -0.5 * period), joint, play,
-        {"velocity": encoder_left, "gyroscope": gyro_left, "accelerometer": force_left},
+        compliance, {"velocity": encoder_left, "gyroscope": gyro_left, "accelerometer": force_left},
     )  # fmt: skip
 
 
@@ -247,26 +255,32 @@ def base_motion(robot: RobotDescription, position: Array, velocity: Array) -> Ar
 
 
 def _gyroscope(
-    base: Array, gyro: Array, period: float
-) -> tuple[tuple[Estimate, ...], Estimate, float]:
-    """Angle and age of the gyroscope beside the joints' velocities."""
+    base: Array, gyro: Array, yields: Array, period: float
+) -> tuple[tuple[Estimate, ...], Estimate, float, Estimate]:
+    """Angle and age of the gyroscope beside the joints' velocities, what is left, and the compliance of
+    the gears; ``yields`` is how the base turns for a compliance of one."""
     inner = _inner(len(base), period)
-    angle, late = np.zeros(3), 0.0
-    left, covariance = 0.0, np.eye(10)
+    angle, late, compliance = np.zeros(3), 0.0, 0.0
+    left, covariance = 0.0, np.eye(11)
     for _ in range(ROUNDS):
-        moved = shifted(base, -late / period)
+        moved = shifted(base - compliance * yields, -late / period)
         turned = moved + np.cross(moved, angle)
-        rows = np.zeros((len(base), 3, 10))
+        rows = np.zeros((len(base), 3, 11))
         rows[:, :, :3] = -_cross(moved).transpose(0, 2, 1)
         rows[:, :, 3] = -slope(moved, period)
         rows[:, :, 4:7] = np.eye(3)
         for axis in range(3):
             rows[:, axis, 7 + axis] = moved[:, axis]
-        prior = np.array([0.03, 0.03, 0.03, 0.01, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02])
+        rows[:, :, 10] = -yields
+        prior = np.array([0.03, 0.03, 0.03, 0.01, *[0.02] * 6, USUAL_COMPLIANCE])
         found, covariance, left = fit(rows[inner], (gyro - turned)[inner], prior, period)
         angle, late = angle + found[:3], late + float(found[3])
+        compliance += float(found[10])
     std = np.sqrt(np.diag(covariance))
-    return _three(angle, std[:3]), Estimate(late, float(std[3])), left
+    return (
+        _three(angle, std[:3]), Estimate(late, float(std[3])), left,
+        Estimate(compliance, math.hypot(std[10], LEAST_COMPLIANCE)),
+    )  # fmt: skip
 
 
 def _accelerometer(

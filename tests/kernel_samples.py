@@ -164,7 +164,24 @@ TERRAIN = Terrain(
     (Ground((0.0, 0.0, -0.1), (1.0, 1.0, 0.1), (0.2, -0.1)),),
     (HeightField((-1.0, -1.0), (0.0, 0.0), ((0.0, 0.1, 0.05), (0.02, 0.0, 0.07))),),
 ).surface
+CHAIN_STARTS, CHAIN_ROWS = np.array([0, 1, 3, 5, 6]), np.array([0, 0, 1, 1, 2, 2])
+"""The non-zeros of a matrix (3, 4) by columns: each row touches two neighbours."""
 UNUSED = {
+    "aloft.mathematics.banded_system.assemble_normal": (
+        CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
+        np.zeros((3, 2)), np.zeros(3, dtype=np.int64),
+    ),
+    "aloft.mathematics.banded_system.factorise_band": (
+        3, 1e-3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]),
+    ),
+    "aloft.mathematics.banded_system.solve_band": (
+        3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
+    ),
+    "aloft.mathematics.banded_system.smallest_correction": (
+        CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
+        np.array([3]), 1e-12, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), NORMAL(3),
+        np.zeros(4), np.zeros(1, dtype=np.bool_),
+    ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
     ),

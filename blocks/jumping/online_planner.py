@@ -35,10 +35,10 @@ class PlanAnswer(PlanRows):
 class OnlinePlanner(Block):
     """Plans the jump that was asked for, and hands the plan over, a part in every run.
 
-    It belongs in the background (``background: {latency: 500 ms}``): a plan takes some tenths of a second.
-    The motion to begin with is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``).
-    From it the solver takes a fixed number of iterations on the whole-body problem of ``aloft plan``, on 44 knots with
-    all coordinates. The plan must pass the check with exact dynamics that every plan passes. A jump out of
+    It belongs in the background (``background: {latency: 500 ms}``): a plan takes some tenths of a second on a busy machine.
+    A motion is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``), and corrected in a few steps
+    until it fulfils all constraints of the whole-body problem of ``aloft plan``, on 44 knots with all coordinates
+    (``planner/online/correction``). The plan must pass the check with exact dynamics that every plan passes. A jump out of
     reach is replaced by the nearest within it; where no motion is found, or it fails the check, the
     nearest stored plan is the answer. ``part.outcome`` says so, and the metrics count it.
 
@@ -85,9 +85,7 @@ class OnlinePlanner(Block):
         except PlanFileError as error:
             raise BlockError(str(error)) from error
         self._planner = HopPlanner(self.robot, samples)
-        self._planner.plan(
-            HopRequest(0.0, 0.0, 0.0)
-        )  # loads compiled functions and makes the solver
+        self._planner.prepare()
         self._table = hop_table
         self._times: list[float] = []
 

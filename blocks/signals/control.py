@@ -55,6 +55,15 @@ class BaseState(Signal):
     angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity of the base")
 
 
+class PlaceMeasurement(Signal):
+    """Where the base is, as seen from outside."""
+
+    number = Field(dtype="int64", text="counts the measurements, from 1; zero: none yet")
+    time = Field(unit="s", text="when it was taken")
+    position = Field(3, unit="m", frame="world", text="base origin")
+    heading = Field(unit="rad", frame="world", text="heading of the base")
+
+
 class EstimatorHealth(Signal):
     """An estimator's own uncertainty, and the quality of its measurements.
 

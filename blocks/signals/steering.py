@@ -26,7 +26,7 @@ class PlanOutcome(IntEnum):
     NEAREST = 2
     """What was asked is out of reach; the plan is of the nearest that is within."""
     UNSOLVED = 3
-    """The solver found no motion; the plan is the nearest of the stored ones."""
+    """No motion was found; the plan is the nearest of the stored ones."""
     INVALID = 4
     """The plan failed its check; the nearest of the stored ones is followed."""
 

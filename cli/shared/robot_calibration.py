@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from .output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from ...robots.calibration import Calibration
+    from ...robots.identification import MeasuredRun
     from ...robots.robot_description import RobotDescription
 
 _FIELDS = {
@@ -20,6 +22,7 @@ _FIELDS = {
     "rate": "imu.angular_velocity", "force": "imu.specific_force", "closed": "contacts.closed",
     "voltage": "health.voltage",
 }  # fmt: skip
+_PHASE = "phase.phase.phase"
 
 
 def calibrate(
@@ -34,6 +37,12 @@ def calibrate(
     mass: Annotated[
         float | None, typer.Option(help="The robot's mass by a balance [kg].", min=0.0)
     ] = None,
+    jump: Annotated[
+        Path | None,
+        typer.Option(
+            help="A graph or a recording of a jump: list by its phases what is not explained."
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write the values for a graph here.")
     ] = None,
@@ -42,13 +51,16 @@ def calibrate(
     """Find the IMU's place, angle and age, torque constants, friction, play and pack of a robot.
 
     A graph is run first; graphs/calibrate.yaml is one for BRUCE. Every value has its standard deviation,
-    and what the model does not explain is listed by joint and sensor.
+    and what the model does not explain is listed by joint and sensor, and by phase.
     """
     from ...robots.calibration import fragment
 
     with errors_reported(as_json):
         signals, period, description = _measured(source, settings or [], robot, command)
         found = _found(signals, period, description, mass, source)
+        if jump is not None:
+            signals, period, description = _measured(jump, [], robot, command, whole=False)
+        phases = _by_phase(signals, period, description, found)
         text = fragment(description, found, source.name)
         if out is not None:
             try:
@@ -58,12 +70,18 @@ def calibrate(
     if as_json:
         print_json({
             "success": True, "source": str(source), "calibration": found.model_dump(),
-            "graph": text, "written": str(out) if out else None,
+            "residuals_by_phase": phases, "graph": text, "written": str(out) if out else None,
         })  # fmt: skip
         return
     console().print(table(str(source), ("value", ">found", ">+-", "unit"), list(_rows(found))))
     left = [(name, f"{value:.3g}") for name, value in found.residuals.items()]
     console().print(table("not explained", ("joint or sensor", ">root mean square"), left))
+    columns = ("base or joint", *(f">{name}" for name in phases))
+    by_phase = [
+        (part, *(f"{each[part]:.3g}" for each in phases.values()))
+        for part in next(iter(phases.values()), {})
+    ]
+    console().print(table("not explained by phase [N, N m]", columns, by_phase))
     if out is not None:
         say(console(), f"wrote {out}: include it behind controllers/late_sensors.yaml")
     else:
@@ -71,9 +89,10 @@ def calibrate(
 
 
 def _measured(
-    source: Path, settings: list[str], robot: str, command: str
+    source: Path, settings: list[str], robot: str, command: str, whole: bool = True
 ) -> tuple[dict[str, Any], float, RobotDescription]:
-    """All signals that are needed, from a run that is made now or from a recording."""
+    """All signals that are needed, from a run that is made now or from a recording; ``whole``: a run
+    that does not succeed is of no use."""
     names = {key: f"{robot}.{field}" for key, field in _FIELDS.items()}
     names |= {key: f"{command}.{key}" for key in ("stiffness", "damping")}
     names["asked"] = f"{command}.torque"
@@ -84,10 +103,11 @@ def _measured(
             graph = load(source, settings)
             result = graph.run()
             result.raise_if_failed()
-            if not result.success:
+            if whole and not result.success:
                 raise AloftError(f"{source}: the robot did not sway to the end: {result.reason}")
             assert graph.checked.robot is not None
             signals = {key: result.signal(name) for key, name in names.items()}
+            signals["phase"] = _phases(result.signal, len(signals["asked"]))
             return signals, result.period, graph.checked.robot
         if settings:
             raise AloftError("--set is for a graph; a recording has been made already")
@@ -97,11 +117,62 @@ def _measured(
         if run.header.robot is None:
             raise AloftError(f"{source}: the graph {run.header.name} names no robot")
         signals = {key: run[name] for key, name in names.items()}
+        signals["phase"] = _phases(run.__getitem__, len(signals["asked"]))
         return signals, 1.0 / run.header.base_rate, run.header.robot
     except KeyError as error:
         raise AloftError(
             f"{source}: {error.args[0]}; --robot and --command name the blocks"
         ) from error
+
+
+def _phases(signal: Callable[[str], Any], ticks: int) -> Any:
+    """The phase of each tick; a robot whose graph tells none stands."""
+    import numpy as np
+
+    try:
+        return signal(_PHASE)
+    except KeyError:
+        return np.zeros(ticks, dtype=np.int64)
+
+
+def _motion(signals: dict[str, Any], period: float) -> MeasuredRun:
+    import numpy as np
+
+    from ...robots.identification import MeasuredRun
+
+    return MeasuredRun(
+        period, signals["position"], signals["velocity"], signals["torque"], signals["rate"],
+        signals["force"], np.zeros((len(signals["position"]), 3)), signals["closed"],
+    )  # fmt: skip
+
+
+def _by_phase(
+    signals: dict[str, Any], period: float, robot: RobotDescription, found: Calibration
+) -> dict[str, dict[str, float]]:
+    """What is not explained in the phases in which the robot moves as it is told."""
+    from ...blocks.signals.jumping import Phase
+    from ...robots.phase_residuals import phase_residuals
+
+    standing = (Phase.STAND, Phase.SQUAT, Phase.RECOVER)
+    names = {
+        int(each): each.name.lower()
+        for each in (
+            Phase.STAND,
+            Phase.SQUAT,
+            Phase.THRUST,
+            Phase.FLIGHT,
+            Phase.LANDING,
+            Phase.RECOVER,
+        )
+    }
+    return phase_residuals(
+        robot,
+        _motion(signals, period),
+        signals["phase"],
+        names,
+        frozenset(map(int, standing)),
+        found,
+    )
 
 
 def _found(
@@ -111,15 +182,10 @@ def _found(
     mass: float | None,
     source: Path,
 ) -> Calibration:
-    import numpy as np
-
     from ...robots.calibration import calibrate_robot
-    from ...robots.identification import IdentificationError, MeasuredRun
+    from ...robots.identification import IdentificationError
 
-    motion = MeasuredRun(
-        period, signals["position"], signals["velocity"], signals["torque"], signals["rate"],
-        signals["force"], np.zeros((len(signals["position"]), 3)), signals["closed"],
-    )  # fmt: skip
+    motion = _motion(signals, period)
     feedback = (signals["stiffness"] != 0.0).any(axis=1) | (signals["damping"] != 0.0).any(axis=1)
     try:
         return calibrate_robot(robot, motion, signals["voltage"], signals["asked"], feedback, mass)
@@ -142,6 +208,7 @@ def _rows(found: Calibration) -> list[tuple[str, str, str, str]]:
         row("age of joint velocities", found.velocity_age, "ms", 1e3),
         row("saturation", found.saturation, ""), row("load friction", found.load_friction, ""),
         row("rotor inertia, factor", found.rotor_inertia, ""),
+        row("compliance of gears", found.gear_compliance, "mrad/(N m)", 1e3),
     ]  # fmt: skip
     if found.delay is not None:
         rows.append(row("delay from tick to torque", found.delay, "ms", 1e3))

@@ -25,7 +25,7 @@ from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
-from ..models.exact_dynamics import ExactDynamics, JointMotion, joint_motion
+from ..models.exact_dynamics import AFTER, BEFORE, ExactDynamics, JointMotion, joint_motion
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 
@@ -196,8 +196,10 @@ class _MiddleValues:
 def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
     """The reference's fields in one state under those forces."""
     com, com_velocity, momentum = dynamics.centroidal(q, v)
-    points, _ = dynamics.contact_jacobians(q)
+    points = dynamics.evaluated_points(q)
     yaw, pitch = dynamics.foot_angles()
+    arms = points - com
+    moments = arms[:, AFTER] * force[:, BEFORE] - arms[:, BEFORE] * force[:, AFTER]
     return {
         "com": com,
         "com_velocity": com_velocity,
@@ -205,7 +207,7 @@ def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str,
         "orientation": q[3:7].copy(),
         "angular_velocity": v[3:6].copy(),
         "angular_momentum": momentum,
-        "angular_momentum_rate": np.cross(points - com, force).sum(axis=0),
+        "angular_momentum_rate": moments.sum(axis=0),
         "foot_position": dynamics.sole_places(),
         "foot_velocity": dynamics.sole_velocities(v),
         "foot_yaw": yaw,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,12 +58,12 @@ class Coordinates:
         """The number of contact force variables."""
         return len(self.contacts) * len(self.axes)
 
-    @property
+    @cached_property
     def free_base(self) -> tuple[int, ...]:
         """Which of the base's six coordinates are reduced coordinates: these come first."""
         return tuple(int(i) for i in range(6) if np.any(self.matrix[i]))
 
-    @property
+    @cached_property
     def turning(self) -> tuple[int, ...]:
         """Which of the reduced coordinates are angles of the base."""
         return tuple(i for i, axis in enumerate(self.free_base) if axis >= 3)
@@ -75,11 +76,19 @@ class Coordinates:
 
     def reduce(self, whole: Array) -> Array:
         """The reduced coordinates of a mirrored motion (..., n_velocities)."""
-        return np.asarray(whole @ np.linalg.pinv(self.matrix).T)
+        return np.asarray(whole @ self._reduction)
 
     def reduce_forces(self, forces: Array) -> Array:
         """The contact force variables from all contact forces (..., 3 n_contacts)."""
-        return np.asarray(forces @ np.linalg.pinv(self.force_matrix).T)
+        return np.asarray(forces @ self._force_reduction)
+
+    @cached_property
+    def _reduction(self) -> Array:
+        return np.asarray(np.linalg.pinv(self.matrix).T)
+
+    @cached_property
+    def _force_reduction(self) -> Array:
+        return np.asarray(np.linalg.pinv(self.force_matrix).T)
 
     def contains(self, whole: Array) -> bool:
         """Whether these positions (..., n_velocities) are ones that the coordinates can take."""

@@ -324,15 +324,13 @@ class ExactDynamics:
         """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
         axes."""
         pin = self.pin
-        pin.computeJointJacobians(self.model, self.data, q)
-        pin.updateFramePlacements(self.model, self.data)
+        points = self.evaluated_points(q)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         rows = [
             np.array(pin.getFrameJacobian(self.model, self.data, frame, axes))
             for frame in self.contact_frames
         ]
         found = [row[:3] for row in rows]
-        points = self._contact_places()
         for ball in self.balls:
             # The material at the lowest point moves with the frame's origin and turns about it.
             frame = self.data.oMf[self.contact_frames[ball.point]]
@@ -340,6 +338,12 @@ class ExactDynamics:
             skew(points[ball.point] - frame.translation, lever)
             found[ball.point] = rows[ball.point][:3] - lever @ rows[ball.point][3:]
         return points, np.vstack(found)
+
+    def evaluated_points(self, q: Array) -> Array:
+        """As ``points``, of a state whose Jacobians are evaluated as well, for ``sole_velocities``."""
+        self.pin.computeJointJacobians(self.model, self.data, q)
+        self.pin.updateFramePlacements(self.model, self.data)
+        return self._contact_places()
 
     def points(self, q: Array) -> Array:
         """The contact points in the world [m], of balls the lowest points, (n_contacts, 3)."""

@@ -1,8 +1,8 @@
 """Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples``.
 
-Hops are spread evenly over all requests by a Halton sequence. They are solved from the shortest to the
-longest, each from the nearest of those before it or from nothing; those without a valid plan are left
-out. It takes a minute or two of one core.
+Hops are spread evenly over all requests by a Halton sequence, half of them ahead and half of them back. They are
+solved from the shortest to the longest, each from the nearest of those before it or from nothing; those
+without a valid plan are left out. It takes five minutes of one core.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from .hop_plans import samples_path
 from .hop_request import REACH, HopRequest, coarse, task_of
 from .plan_samples import PlanSamples, differences, samples_of, write_samples
 
-COUNT = 48
+COUNT = 96
 """Requests that are tried."""
+MARGIN = 1.08
+"""How much further than the reach they go, so that requests at its edge lie between them."""
 BASES = (2, 3, 5)
 STILL = HopRequest(0.0, 0.0, 0.0)
 
@@ -38,12 +40,13 @@ def halton(index: int, base: int) -> float:
 
 def request(index: int) -> HopRequest:
     """A request of the sequence."""
-    distance, direction, turn = (halton(index + 1, base) for base in BASES)
-    radius, angle = math.sqrt(distance), 2.0 * math.pi * direction
+    distance, direction, turn = (halton(index // 2 + 1, base) for base in BASES)
+    radius, angle = MARGIN * math.sqrt(distance), math.pi * (direction - 0.5)
+    along = REACH["ahead"] if index % 2 == 0 else -REACH["back"]
     return HopRequest(
-        round(REACH["ahead"] * radius * math.cos(angle), 4),
+        round(along * radius * math.cos(angle), 4),
         round(REACH["aside"] * radius * math.sin(angle), 4),
-        round(REACH["turn"] * (2.0 * turn - 1.0), 4),
+        round(MARGIN * REACH["turn"] * (2.0 * turn - 1.0), 4),
     )
 
 
@@ -69,7 +72,12 @@ def _nearest(
 ) -> PlannedJump | None:
     if not plans:
         return None
-    return plans[min(range(len(asked)), key=lambda row: apart(wanted, asked[row]))]
+
+    # Of its own kind where there is one: see ``PlanSamples.weights``.
+    def distance(row: int) -> tuple[bool, float]:
+        return (asked[row].ahead < 0.0) != (wanted.ahead < 0.0), apart(wanted, asked[row])
+
+    return plans[min(range(len(asked)), key=distance)]
 
 
 def _plan(

@@ -1,4 +1,4 @@
-"""Makes the plan of the next hop within a fixed number of iterations, or says what is done instead."""
+"""Makes the plan of the next hop within a fixed number of steps, or says what is done instead."""
 
 from __future__ import annotations
 
@@ -9,17 +9,13 @@ from ...blocks.signals import PlanOutcome
 from ...robots.description import RobotDescription
 from ..checking.validity import checked
 from ..problem.guess import ballistic_guess
+from ..problem.problem import FullProblem
 from ..problem.unpacking import can_start, pack, unpack
 from ..solving.solve import make_problem
-from ..solving.solver import solve
 from ..task.plan import PlannedJump
+from .correction import Corrector
 from .hop_request import HopRequest, coarse, task_of, within_reach
 from .plan_samples import PlanSamples
-
-ITERATIONS = 35
-"""Of the solver. What has not come to an end by then seldom does."""
-BARRIER = 1e-2
-"""The barrier's parameter to begin with: with a lower one four of ten plans did not come to an end."""
 
 
 @dataclass(frozen=True)
@@ -30,15 +26,15 @@ class HopPlan:
         plan: it, with its report.
         done: what it does.
         outcome: how it came about.
-        iterations: of the solver.
-        failed: the tests of the check that the solver's plan failed.
+        steps: of Newton's method.
+        failed: the tests of the check that the corrected plan failed.
         solve_s, check_s: processor time.
     """
 
     plan: PlannedJump
     done: HopRequest
     outcome: PlanOutcome
-    iterations: int
+    steps: int
     failed: tuple[str, ...]
     solve_s: float
     check_s: float
@@ -50,27 +46,33 @@ class HopPlanner:
     def __init__(self, robot: RobotDescription, samples: PlanSamples) -> None:
         self.robot = robot
         self.samples = samples
+        self._correctors: dict[object, Corrector] = {}
+
+    def prepare(self) -> None:
+        """Load compiled functions and make the correctors, so that no later plan has to wait for them."""
+        for ahead in (0.0, -0.05):  # feet land in another way after a jump back
+            self.plan(HopRequest(ahead, 0.0, 0.0))
 
     def plan(self, wanted: HopRequest) -> HopPlan:
         """The plan of a request, or of what is nearest to it."""
         within = within_reach(wanted)
-        found, iterations, solve_s = self._solve(within)
+        found, steps, solve_s = self._solve(within)
         if found is None:
-            return self._stored(within, PlanOutcome.UNSOLVED, iterations, (), solve_s, 0.0)
+            return self._stored(within, PlanOutcome.UNSOLVED, steps, (), solve_s, 0.0)
         started = time.process_time()
         plan = checked(found, self.robot)
         check_s = time.process_time() - started
         if not plan.valid:
             failed = tuple(test["name"] for test in plan.report["tests"] if not test["passed"])
-            return self._stored(within, PlanOutcome.INVALID, iterations, failed, solve_s, check_s)
+            return self._stored(within, PlanOutcome.INVALID, steps, failed, solve_s, check_s)
         outcome = PlanOutcome.PLANNED if within == wanted else PlanOutcome.NEAREST
-        return HopPlan(plan, within, outcome, iterations, (), solve_s, check_s)
+        return HopPlan(plan, within, outcome, steps, (), solve_s, check_s)
 
     def _stored(
         self,
         wanted: HopRequest,
         outcome: PlanOutcome,
-        iterations: int,
+        steps: int,
         failed: tuple[str, ...],
         solve_s: float,
         check_s: float,
@@ -79,20 +81,26 @@ class HopPlanner:
         done = HopRequest(*self.samples.requests[row].tolist())
         stored = self.samples.plan(row)
         plan = replace(stored, task=coarse(stored.task.resolved(self.robot)))
-        return HopPlan(plan, done, outcome, iterations, failed, solve_s, check_s)
+        return HopPlan(plan, done, outcome, steps, failed, solve_s, check_s)
 
     def _solve(self, wanted: HopRequest) -> tuple[PlannedJump | None, int, float]:
-        """A plan that has not been checked, the iterations and the processor time [s]."""
+        """A plan that has not been checked, the steps and the processor time [s]."""
+        started = time.process_time()
         task = coarse(task_of(wanted, self.robot.name).resolved(self.robot))
         problem = make_problem(task, self.robot, coordinates="full")
-        near, cpu = self.samples.interpolated(wanted), 0.0
+        near = self.samples.interpolated(wanted)
         if not can_start(problem, near):
-            return None, 0, cpu
+            return None, 0, time.process_time() - started
         guess = pack(problem, near, ballistic_guess(problem))
-        solution = solve(
-            problem, guess, warm=True, barrier=BARRIER, solver="fatrop", limit=ITERATIONS
-        )
-        if not solution.solved:
-            return None, solution.iterations, solution.cpu
-        plan = PlannedJump(task=task, **unpack(problem, solution.values))
-        return replace(plan, statistics={"coordinates": "full"}), solution.iterations, solution.cpu
+        found = self._corrector(problem).correct(problem, guess)
+        plan = None
+        if found.solved:
+            plan = PlannedJump(task=task, **unpack(problem, found.values))
+            plan = replace(plan, statistics={"coordinates": "full"})
+        return plan, found.steps, time.process_time() - started
+
+    def _corrector(self, problem: FullProblem) -> Corrector:
+        key = problem.assembly.signature
+        if key not in self._correctors:
+            self._correctors[key] = Corrector(problem)
+        return self._correctors[key]

@@ -49,10 +49,12 @@ class PlanSamples:
     flights: Array
 
     def weights(self, wanted: HopRequest) -> Array:
-        """The share of each plan in that of the request, (n,)."""
+        """The share of each plan in that of the request, (n,). Feet land in another way after a jump
+        back than after one ahead, so plans of the other direction have none."""
         apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
-        trust = 1.0 / (square + NEAR * NEAR) ** 3
+        alike = (self.requests[:, 0] < 0.0) == (wanted.ahead < 0.0)
+        trust = alike / (square + NEAR * NEAR) ** 3
         # w = trust (a + b . apart) with sum w = 1 and sum w apart = 0.
         basis = np.concatenate([np.ones((len(apart), 1)), apart], axis=1)
         goal = np.array([1.0, 0.0, 0.0, 0.0])

@@ -216,6 +216,22 @@ class Assembly:
             )
         return found
 
+    def jacobian(self) -> Any:
+        """The function ``nlp_jac_g`` alone."""
+        import casadi as ca
+
+        x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
+        rows, values = [], []
+        for name, users in self.users.items():
+            z = _gather(x, self._columns[name].ravel(), (-1, len(users)))
+            w = ca.reshape(p[self._parameters_of[name]], -1, len(users))
+            found, _, jacobian = self.pieces[name].jacobian.map(len(users))(z, w)
+            rows.append(ca.vec(found))
+            values.append(_nonzeros(jacobian))
+        matrix = self._jacobian(values)
+        return ca.Function("nlp_jac_g", [x, p], [self._sum_rows(x, rows), matrix],
+                           ["x", "p"], ["g", "jac_g_x"])  # fmt: skip
+
     def _sum_rows(self, x: Any, rows: list[Any]) -> Any:
         import casadi as ca
 

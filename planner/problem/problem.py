@@ -214,10 +214,12 @@ class ProblemBuilder:
         for family, count, low, high in families:
             table += [(family, low, high)] * count
         table = [("integration", 0.0, 0.0)] * (self.pieces[name].rows - len(table)) + table
-        for i, row in enumerate(kept):
-            self.families[start + i], self.row_lower[start + i], self.row_upper[start + i] = table[
-                row
-            ]
+        chosen = [table[row] for row in kept.tolist()]
+        rows = slice(start, start + len(chosen))
+        if chosen:
+            self.families[rows], self.row_lower[rows], self.row_upper[rows] = zip(
+                *chosen, strict=True
+            )
 
     def _set(self, name: str, k: int, **values: Any) -> None:
         start = self.assembly.parameter_start[name, k]

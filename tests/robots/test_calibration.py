@@ -18,36 +18,52 @@ from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.calibration import Calibration, calibrate_robot, fragment
 from aloft.robots.description import find_robot
 from aloft.robots.identification import IdentificationError, MeasuredRun
-from aloft.robots.sensor_identification import fit, shifted, smooth, standing_span
-from aloft.studies.oracle import reading_ages
+from aloft.robots.motor_identification import EVERY, most_alike
+from aloft.robots.sensor_identification import (
+    EDGE,
+    fit,
+    identify_sensors,
+    shifted,
+    smooth,
+    standing_span,
+)
+from aloft.runtime.graph import Graph
+from aloft.runtime.running.run_result import RunResult
+from aloft.studies.oracle import reading_ages, told_values
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
 ROBOT = find_robot("bruce")
 
 
-def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
-    graph = aloft.load(GRAPH).with_seed(seed)
+def swayed(graph: Graph) -> tuple[RunResult, MeasuredRun]:
     result = graph.run()
     assert result.success, result.reason
     read = result.signal
-    motion = MeasuredRun(
+    return result, MeasuredRun(
         result.period, read("robot.joints.position"), read("robot.joints.velocity"),
         read("robot.joints.torque"), read("robot.imu.angular_velocity"),
         read("robot.imu.specific_force"), np.zeros((result.ticks, 3)),
         read("robot.contacts.closed"),
     )  # fmt: skip
+
+
+def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
+    graph = aloft.load(GRAPH).with_seed(seed)
+    result, motion = swayed(graph)
+    read = result.signal
     found = calibrate_robot(
         ROBOT, motion, read("robot.health.voltage"), read("safety.command.torque"),
         np.ones(result.ticks, dtype=np.bool_),
     )  # fmt: skip
     params = next(block.params for block in graph.checked.blocks if block.path == "robot")
-    drawn = draw_variation(params, ROBOT)
+    drawn, pack = draw_variation(params, ROBOT), params.battery.of(ROBOT)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
     return found, {
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
         "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
-        "resistance": params.battery.resistance, "voltage": params.battery.open_voltage,
+        "constants": list(told_values(graph)["robot.motor_model.torque_constant"].values()),
+        "resistance": pack.resistance, "voltage": pack.open_voltage,
     }  # fmt: skip
 
 
@@ -67,9 +83,25 @@ def test_a_drawn_robot_is_found(seed: int) -> None:
     assert found.resistance.value == pytest.approx(true["resistance"], rel=0.1)
     for (name, value), friction in zip(found.friction.items(), true["friction"], strict=True):
         assert value.value == pytest.approx(friction, abs=3.0 * value.std), name
+    for periods in (60.0, 72.0):
+        assert min(abs(each - periods) for each in found.ripple_periods) <= 2.0
+    for value, constant in zip(found.torque_constant.values(), true["constants"], strict=True):
+        assert value.value == pytest.approx(constant, abs=3.0 * value.std)
     values = yaml.safe_load(fragment(ROBOT, found, "a run"))["set"]
     assert set(values["timing.play"]) == {joint.name for joint in ROBOT.joints}
     assert set(values["robot.motor_model.torque_constant"]) == set(ROBOT.transmission.motors)
+
+
+@pytest.mark.long
+def test_gears_that_yield_are_told() -> None:
+    """Rotor and joint are two bodies, and the encoder is on the rotor, behind play."""
+    graph = aloft.load(GRAPH, [
+        "robot.seed=97822", "duration=12 s", "plan.sway_time=10 s", "robot.timestep=0.25 ms",
+        "robot.gears={stiffness: 1000 N m/rad, damping: 0.3 N m s/rad}",
+    ])  # fmt: skip
+    compliance = identify_sensors(ROBOT, swayed(graph)[1]).gear_compliance
+    assert compliance.value == pytest.approx(1e-3, abs=2.0 * compliance.std)
+    assert compliance.value > 3.0 * compliance.std
 
 
 def standing(ticks: int) -> MeasuredRun:
@@ -117,6 +149,17 @@ def test_a_foot_that_rocks_spoils_no_fit() -> None:
     rocking = noise + np.where(np.arange(4000)[:, None] % 40 < 4, 0.5, 0.0)
     found, _, _ = fit(rows, rows @ truth + rocking, prior, 0.002, 0.002)
     np.testing.assert_allclose(found, truth, atol=2e-3)
+
+
+def test_ripple_is_found_by_how_often_it_comes_again() -> None:
+    """In two of ten motors, below noise of the same size."""
+    random, time = np.random.default_rng(3), 0.002 * np.arange(10_000)
+    turned = 0.2 * np.sin(np.outer(time, np.linspace(1.0, 4.0, 10)))
+    edge = round(EDGE / 0.002)
+    at = slice(edge, len(time) - edge, EVERY)
+    error = 0.05 * random.normal(size=turned[at].shape)
+    error[:, :2] += 0.07 * np.sin(84.0 * turned[at, :2] + 1.0)
+    assert most_alike(error, turned, 0.002) == pytest.approx(84.0, abs=2.0)
 
 
 def test_readings_of_slow_motions_are_as_old_as_the_simulator_makes_them() -> None:

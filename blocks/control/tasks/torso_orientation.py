@@ -15,10 +15,10 @@ Vector = tuple[float, float, float]
 
 
 class TorsoOrientation(FeedbackTask):
-    """The base's angular acceleration is w_ref' + K_p Log(R' R_ref) + K_d (w_ref - w) (paper, V, task 3).
+    """The base's angular acceleration is s w_ref' + K_p Log(R' R_ref) + K_d (w_ref - w) (paper, V, task 3).
 
-    Without the planned w_ref' the torso of BRUCE lagged by 4 degrees when a squat swings it ahead, took
-    that through thrust and flight, and touched down tilted by twice as much.
+    Without the planned w_ref', of which the share s is fed forward, the torso of BRUCE lagged by 4 degrees when
+    a squat swings it ahead, took that through thrust and flight, and touched down tilted by twice as much.
 
     The rows select the base's angular acceleration [rad/s^2, body].
     """
@@ -35,6 +35,12 @@ class TorsoOrientation(FeedbackTask):
         torso_damping: Vector = parameter(
             (28.0, 28.0, 28.0), unit="1/s", text="gain on the torso's angular velocity error"
         )
+        torso_feedforward: float = parameter(
+            1.0,
+            ge=0.0,
+            le=1.0,
+            text="share of the planned angular acceleration that is fed forward",
+        )
 
     size = 3
     gains_prefix = "torso_"
@@ -45,14 +51,18 @@ class TorsoOrientation(FeedbackTask):
     @kernel
     @staticmethod
     def error(
-        terms: DynamicsTerms, target: WholeBodyTarget, quaternion: Array1D, e: TaskError
+        terms: DynamicsTerms,
+        target: WholeBodyTarget,
+        quaternion: Array1D,
+        params: Gains,
+        e: TaskError,
     ) -> None:
         from_matrix(terms.base_rotation, quaternion)
         conjugate(quaternion, quaternion)
         multiply(quaternion, target.orientation, quaternion)
         logarithm(quaternion, e.value)
         e.rate[:] = target.angular_velocity - terms.velocity[3:6]
-        e.feedforward[:] = target.angular_acceleration
+        e.feedforward[:] = params.torso_feedforward * target.angular_acceleration
 
     @kernel
     @staticmethod

@@ -34,10 +34,10 @@ def test_a_plan_comes_in_parts_and_repeats_to_the_byte() -> None:
     time = np.concatenate([part["time"] for part in first])
     assert (np.diff(time) >= 0.0).all() and len(time) == len(first) * PART_ROWS
     rows = np.concatenate([part["rows"] for part in first])
-    assert rows.shape[1] == 22 + 8 * 2 + 4 * 10
-    # where the feet are in the end: their columns stand behind six columns of three and one of four
-    begin = 3 * 3 + 4 + 3 + 3 + 3
-    assert COLUMNS[7] == "foot_position"
+    assert rows.shape[1] == 25 + 8 * 2 + 4 * 10
+    # where the feet are in the end: their columns stand behind seven columns of three and one of four
+    begin = 3 * 3 + 4 + 3 + 3 + 3 + 3
+    assert COLUMNS[8] == "foot_position"
     middle = rows[-1, begin : begin + 6].reshape(2, 3).mean(axis=0)
     assert middle == pytest.approx([0.12, 0.03, 0.0], abs=2e-3)
     again = parts_of(

@@ -9,7 +9,7 @@ import pytest
 
 from aloft.blocks.signals import PlanOutcome
 from aloft.planner.checking.validity import require_valid
-from aloft.planner.online import next_hop
+from aloft.planner.online import correction
 from aloft.planner.online.hop_plans import shipped_samples
 from aloft.planner.online.hop_request import HopRequest
 from aloft.planner.online.next_hop import HopPlanner
@@ -36,7 +36,7 @@ def test_a_plan_is_valid_and_does_not_depend_on_those_before() -> None:
 def test_where_the_solver_does_not_end_a_stored_plan_is_followed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(next_hop, "ITERATIONS", 2)
+    monkeypatch.setattr(correction, "STEPS", 1)
     found = PLANNER.plan(HopRequest(0.17, -0.06, -0.3))
     assert found.outcome == PlanOutcome.UNSOLVED
     assert np.abs(np.array(found.done) - [0.17, -0.06, -0.3]).max() < 0.3

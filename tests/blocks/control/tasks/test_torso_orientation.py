@@ -24,10 +24,11 @@ def test_the_torso_turns_along_the_logarithm_in_the_body_frame():
         orientation=goal, angular_velocity=goal_rate, angular_acceleration=bend
     )
     e, j = TaskError(*np.zeros((3, 3))), TaskJacobian(rows.jacobian, np.zeros(3))
-    TorsoOrientation.error(terms, target, np.zeros(4), e)
+    params = SimpleNamespace(torso_feedforward=np.array(0.5))
+    TorsoOrientation.error(terms, target, np.zeros(4), params, e)
     TorsoOrientation.jacobian(j)
     feedback_rows(e, j.drift, *gains, rows)
-    expected = bend + 200.0 * np.array([0.3, 0.0, 0.0]) + 28.0 * (goal_rate - rate)
+    expected = 0.5 * bend + 200.0 * np.array([0.3, 0.0, 0.0]) + 28.0 * (goal_rate - rate)
     assert rows.desired == pytest.approx(expected)
     selection = np.zeros((3, 16))
     selection[:, 3:6] = np.eye(3)

@@ -1,0 +1,114 @@
+"""The smallest weighted correction that fulfils linear equations whose variables follow each other in time.
+
+For equations A x = b, of which each touches only variables near its place, the smallest x'Wx is W^-1 A' y with
+(A W^-1 A') y = b. That matrix is positive and has few diagonals. It is kept by columns: ``band[j, k]`` is
+its entry in row j + k and column j, and ``last[j]`` the last row that is not zero there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .arrays import Array1D, Array2D, Flags1D, Indices1D
+from .kernel import kernel
+
+
+@kernel
+def assemble_normal(
+    starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
+    place: Indices1D, equations: int, band: Array2D, last: Indices1D,
+) -> bool:  # fmt: skip
+    """A W^-1 A' of the chosen rows of a sparse matrix, in columns with ascending rows.
+
+    Args:
+        starts, rows, values: the non-zeros of column c are ``values[starts[c]:starts[c + 1]]``.
+        inverse_weights: the diagonal of W^-1, one for each column.
+        place: which equation a row is, ascending, and -1 of those left out.
+        equations: how many are chosen.
+
+    Returns whether all of it is inside of the band.
+    """
+    for j in range(equations):
+        last[j] = j
+        for k in range(band.shape[1]):
+            band[j, k] = 0.0
+    for column in range(inverse_weights.shape[0]):
+        for a in range(starts[column], starts[column + 1]):
+            j = place[rows[a]]
+            if j >= 0 and values[a] != 0.0:
+                value = values[a] * inverse_weights[column]
+                for b in range(a, starts[column + 1]):
+                    i = place[rows[b]]
+                    if i >= 0:
+                        if i - j >= band.shape[1]:
+                            return False
+                        band[j, i - j] += value * values[b]
+                        last[j] = max(last[j], i)
+    return True
+
+
+@kernel
+def factorise_band(equations: int, regularisation: float, band: Array2D, last: Indices1D) -> bool:
+    """The Cholesky factor, in place. To its diagonal the matrix gets that share of it.
+
+    Returns whether all pivots are positive.
+    """
+    for j in range(equations):
+        band[j, 0] *= 1.0 + regularisation
+    for j in range(equations):
+        pivot = band[j, 0]
+        if not 0.0 < pivot < math.inf:
+            return False
+        root = math.sqrt(pivot)
+        width = last[j] - j
+        for k in range(width + 1):
+            band[j, k] = band[j, k] / root
+        for k in range(1, width + 1):
+            value = band[j, k]
+            if value != 0.0:
+                for m in range(width - k + 1):
+                    band[j + k, m] = band[j + k, m] - value * band[j, k + m]
+                last[j + k] = max(last[j + k], last[j])
+    return True
+
+
+@kernel
+def solve_band(equations: int, band: Array2D, last: Indices1D, vector: Array1D) -> None:
+    """Solve with the factor, in place."""
+    for j in range(equations):
+        value = vector[j] / band[j, 0]
+        vector[j] = value
+        for k in range(1, last[j] - j + 1):
+            vector[j + k] = vector[j + k] - value * band[j, k]
+    for j in range(equations - 1, -1, -1):
+        value = vector[j]
+        for k in range(1, last[j] - j + 1):
+            value -= band[j, k] * vector[j + k]
+        vector[j] = value / band[j, 0]
+
+
+@kernel
+def smallest_correction(
+    starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
+    place: Indices1D, equations: Indices1D, regularisation: float,
+    band: Array2D, last: Indices1D, vector: Array1D, out: Array1D, found: Flags1D,
+) -> None:  # fmt: skip
+    """The x with the smallest x'Wx whose chosen rows of A x are the ``vector``, which becomes y.
+
+    ``found`` (1,) tells whether there is one: all equations are inside of the band and independent.
+    """
+    count = equations[0]
+    found[0] = False
+    if not assemble_normal(starts, rows, values, inverse_weights, place, count, band, last):
+        return
+    if not factorise_band(count, regularisation, band, last):
+        return
+    solve_band(count, band, last, vector)
+    for column in range(inverse_weights.shape[0]):
+        total = 0.0
+        for a in range(starts[column], starts[column + 1]):
+            i = place[rows[a]]
+            if i >= 0:
+                total += values[a] * vector[i]
+        out[column] = inverse_weights[column] * total
+    found[0] = True

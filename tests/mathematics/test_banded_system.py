@@ -1,0 +1,54 @@
+"""The smallest correction is that of NumPy's dense algebra, and says where there is none."""
+
+import numpy as np
+import pytest
+
+from aloft.mathematics.banded_system import smallest_correction
+
+BLOCKS, WIDTH, HEIGHT = 6, 5, 3
+
+
+def chain(rng: np.random.Generator) -> np.ndarray:
+    """Rows that touch the variables of their block and of the next one."""
+    matrix = np.zeros((BLOCKS * HEIGHT, (BLOCKS + 1) * WIDTH))
+    for k in range(BLOCKS):
+        rows = slice(k * HEIGHT, (k + 1) * HEIGHT)
+        matrix[rows, k * WIDTH : (k + 2) * WIDTH] = rng.standard_normal((HEIGHT, 2 * WIDTH))
+    return matrix
+
+
+def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT):
+    rows, columns = np.nonzero(matrix.T)[::-1]
+    starts = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
+    place = np.where(chosen, np.cumsum(chosen) - 1, -1)
+    count, height = np.array([chosen.sum()]), len(matrix)
+    vector, out, found = np.zeros(height), np.zeros(matrix.shape[1]), np.zeros(1, dtype=np.bool_)
+    vector[: count[0]] = wanted[chosen]
+    smallest_correction(
+        starts, rows, matrix.T[columns, rows], 1.0 / weights, place, count, 0.0,
+        np.zeros((height, band)), np.zeros(height, dtype=np.int64), vector, out, found,
+    )  # fmt: skip
+    return out, bool(found[0])
+
+
+@pytest.mark.parametrize("left_out", [[], [0, 4, 5, 17]])
+def test_the_smallest_correction_fulfils_the_chosen_rows(left_out) -> None:
+    rng = np.random.default_rng(5)
+    matrix, weights = chain(rng), rng.uniform(0.5, 20.0, (BLOCKS + 1) * WIDTH)
+    wanted, chosen = rng.standard_normal(len(matrix)), np.ones(len(matrix), dtype=bool)
+    chosen[left_out] = False
+    out, found = correct(matrix, wanted, weights, chosen)
+    own = matrix[chosen]
+    normal = own / weights @ own.T
+    assert found
+    assert out == pytest.approx(own.T @ np.linalg.solve(normal, wanted[chosen]) / weights)
+    assert own @ out == pytest.approx(wanted[chosen])
+
+
+def test_rows_that_repeat_each_other_or_leave_the_band_have_no_correction() -> None:
+    rng = np.random.default_rng(6)
+    matrix = chain(rng)
+    every, weights = np.ones(len(matrix), dtype=bool), np.ones(matrix.shape[1])
+    assert not correct(matrix, np.ones(len(matrix)), weights, every, band=HEIGHT)[1]
+    matrix[0] = 0.0
+    assert not correct(matrix, np.ones(len(matrix)), weights, every)[1]
