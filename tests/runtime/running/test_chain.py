@@ -306,9 +306,10 @@ def test_the_jumps_controller_has_no_python_where_its_blocks_are_kernels() -> No
     made = Ticker(bound, ClockSpec(), WallTime())
     assert made.fuse()
     found = chains(made)
-    before = "contacts", "estimator", "ahead", "dynamics", "plan", "phase", "step", "switches"
+    before = "contacts", "estimator", "ahead", "dynamics", "load", "plan", "phase", "step"
     assert any(chain[: len(before)] == before for chain in found)
     assert any("wbc" in chain for chain in found)
+    assert any("ahead/command~delay" in chain for chain in found)
 
 
 def test_a_step_of_its_own_is_refused() -> None:
