@@ -121,7 +121,7 @@ def test_a_shipped_controller_is_spread_by_an_overlay() -> None:
     assert placed.graph.order == alone.order
     assert [spec.path for spec in placed.graph.blocks] == [spec.path for spec in alone.blocks]
     sent = {link.source: [field.name for field in link.fields] for link in placed.links}
-    assert {"contacts", "dynamics", "phase", "wbc", "legs", "robot", "plan"} <= sent.keys()
+    assert {"load", "dynamics", "phase", "wbc", "legs", "robot", "plan"} <= sent.keys()
     # the robot's joints are read on the ground, its IMU and the simulation truth are not
     assert {name.split(".")[1] for name in sent["robot"]} == {"joints"}
 
