@@ -21,6 +21,7 @@ from .every_robot import every_robot
 from .frontier.frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.jumps import jumps
+from .jumps.known_effects import known_effects
 from .jumps.real_robot import real_robot
 from .links.link_delays import link_delays
 from .links.links import links
@@ -47,24 +48,27 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "agreement": agreement,
     "jumps": jumps,
     "real_robot": real_robot,
+    "known_effects": known_effects,
     "frontier": frontier,
     "courses": courses,
     "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
-LONG = ("agreement", "jumps", "real_robot", "frontier", "link_delays", "courses", "every_robot")
+LONG = (
+    "agreement", "jumps", "real_robot", "known_effects", "frontier", "link_delays", "courses", "every_robot",
+)  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
-    "seeds": ("frontier", "link_delays", "real_robot", "courses"),
+    "seeds": ("frontier", "link_delays", "real_robot", "known_effects", "courses"),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick",),
     "since": ("tick",),
     "arms": ("real_robot",),
-    "asked": ("real_robot",),
+    "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""

@@ -69,7 +69,7 @@ def bench(
     seeds: Annotated[
         str,
         typer.Option(
-            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot' and 'courses'."
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects' and 'courses'."
         ),
     ] = "",
     jitter: Annotated[
@@ -89,7 +89,10 @@ def bench(
         typer.Option(help="What robots of 'real_robot' are told, with semicolons: 'calibrated'."),
     ] = "",
     asked: Annotated[
-        str, typer.Option(help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'.")
+        str,
+        typer.Option(
+            help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'; the effects of 'known_effects'."
+        ),
     ] = "",
     harder: Annotated[
         bool,

@@ -256,6 +256,11 @@ def write_effects(file: Path) -> None:
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
 
 
+def write_known_effects(file: Path) -> None:
+    """What each effect does to a jump of a robot that was calibrated with it."""
+    refresh(DOCS / "real_robots.md", "known effects", effects_table(read_json(file)["rows"]))
+
+
 def write_real(file: Path) -> None:
     """Robots as a bench finds them, untold, calibrated, and learning."""
     refresh(DOCS / "real_robots.md", "real", real_table(read_json(file)["robots"]))
@@ -319,6 +324,9 @@ PAGES = {
     "excerpts": Page(write_excerpts),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
+    "known_effects": Page(
+        write_known_effects, "aloft bench known_effects", "results/real_robot/effects.json"
+    ),
     "landing": Page(
         write_landing,
         f"{STUDIES}push_polar.yaml and push_polar_12cm.yaml",

@@ -151,7 +151,7 @@ def graph_of(
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
     if told == "calibration":
-        include.append(calibrated(seed))
+        include.append(calibrated(graphs / "calibrate.yaml", seed, "robot"))
     sets: dict[str, Any] = {
         "plan.task": with_margin(task), "robot.seed": seed, "robot.noise_seed": _NOISES * seed + number,
         **asked.sets,
@@ -170,13 +170,12 @@ def with_margin(task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @cache
-def calibrated(seed: int) -> Path:
-    """The fragment that a calibration of the robot writes. Raises ``CalledProcessError``."""
+def calibrated(graph: Path, seed: int, name: str) -> Path:
+    """The fragment that a calibration of a robot writes, which sways in a graph. Raises ``CalledProcessError``."""
     folder = FOLDER.absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"robot_{seed}.yaml"
-    graph = str(shipped_folder() / "calibrate.yaml")
-    words = ["robot", "calibrate", graph, "--set", f"robot.seed={seed}", "--out", str(file)]
+    file = folder / f"{name}_{seed}.yaml"
+    words = ["robot", "calibrate", str(graph), "--set", f"robot.seed={seed}", "--out", str(file)]
     subprocess.run([sys.executable, "-m", "aloft", *words], check=True, capture_output=True)
     return file
 
