@@ -44,7 +44,7 @@ ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IM
 OTHERS = (
     "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
     "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate",
-    "PhaseState", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SwitchHealth",
+    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SwitchHealth",
     "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""

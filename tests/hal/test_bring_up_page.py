@@ -32,6 +32,7 @@ def test_every_row_names_a_test_that_is_there() -> None:
 
 SLOW = {
     "a foot switch bounces", "a foot switch is stuck open", "a foot switch is stuck closed",
+    "a foot switch was open from the first tick on",
     "the dead man's button or key is let go", "nothing: a run ends while the robot stands",
 }  # fmt: skip
 """Rows that may take longer than ``SOON``: the page says why, or they are no faults."""

@@ -62,7 +62,7 @@ def test_all_of_the_jump_is_found() -> None:
         "states/phase",
         "states/plan.phase",
         "states/solved",
-        "states/active.left_heel",
+        "states/contacts.active.left_heel",
     } <= lanes
     fields = {field.name: field for field in header.bus.fields}
     limits = dict(limits_of(fields["robot.truth.motor_torque"], header))
