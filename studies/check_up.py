@@ -49,7 +49,8 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
     """The figures of a robot and the remarks about it, as plain data in SI units."""
     standing = standing_rows(robot)
     remarks = [
-        *_links(robot), *_axes(robot), *_limits(robot), *_sides(robot), *_motors(robot, standing)
+        *_links(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
+        *_motors(robot, standing),
     ]  # fmt: skip
     return {
         "name": robot.name,
@@ -117,6 +118,13 @@ def _limits(robot: RobotDescription) -> Iterator[Remark]:
                          f"{NEAR_LIMIT:g} or more")  # fmt: skip
 
 
+def _stance(robot: RobotDescription) -> Iterator[Remark]:
+    """Feet that the robot cannot stand on."""
+    off = off_its_feet(robot) if robot.contacts else ""
+    if off:
+        yield Remark("the standing pose", off, "a pose that rests on all contact points")
+
+
 def _sides(robot: RobotDescription) -> Iterator[Remark]:
     """Legs of which left and right differ, and signs of joints that do."""
     from ..planner.models.symmetry import mirrored_pairs
@@ -177,13 +185,14 @@ def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Rem
 
 
 def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
-    """Of every motor its peak torque, what standing takes of it (none without feet), and the bandwidth:
+    """Of every motor its peak torque, what standing takes of it (none where the robot cannot stand), and the bandwidth:
     how often a second it could turn its joint by ``STEP`` and back, everything behind it at rest."""
     from ..hal.simulated.mujoco_model import build_mujoco_model
     from ..hal.simulated.stance import joint_inertias, standing_torques
 
     model = build_mujoco_model(robot)
-    needed = standing_torques(robot, model) if robot.contacts else None
+    stands = robot.contacts and not off_its_feet(robot)
+    needed = standing_torques(robot, model) if stands else None
     inertia = joint_inertias(robot, model)
     peak, rows = robot.motors.peak_torque, []
     for k, motor in enumerate(robot.transmission.motors):
