@@ -105,7 +105,7 @@ class GuidedBody:
         self.model = built.model
         self.data = built.model.createData()
         self.soles = built.sole_frames
-        self.mass = robot.total_mass
+        self.name, self.mass = robot.name, robot.total_mass
         self._shapes = [foot_shape(robot, foot) for foot in range(len(robot.feet))]
         self._first = np.cumsum([6, *(ROWS_OF_FOOT[kind] for kind, _ in self._shapes)]).tolist()
         joints = [joint.name for joint in robot.joints]
@@ -181,7 +181,13 @@ class GuidedBody:
             wanted[row : row + 3] = motion.foot_velocity[foot]
             wanted[row + 3 : end] = 0.0
         if matrix.shape[0] == matrix.shape[1]:
-            return np.linalg.solve(matrix, wanted)
+            try:
+                return np.linalg.solve(matrix, wanted)
+            except np.linalg.LinAlgError:
+                raise BlockError(
+                    f"{self.name}: in this pose its legs cannot move its centre of mass and base in all "
+                    "directions; give it another standing pose, with no leg stretched"
+                ) from None
         choice = self._choice
         choice[6:] = _RETURN_RATE * (self._stance - q[7:])
         found = np.linalg.lstsq(matrix, wanted - matrix @ choice)[0]

@@ -96,6 +96,14 @@ def test_a_robot_with_too_few_joints_is_refused():
         GuidedBody(build_pinocchio_model(held), held)
 
 
+def test_stretched_legs_are_refused():
+    robot = quadruped()
+    body = GuidedBody(build_pinocchio_model(robot), robot)
+    up = motion(com_velocity=np.array([0.0, 0.0, 0.1]), foot_velocity=np.zeros((4, 3)))
+    with pytest.raises(BlockError, match="quadruped: in this pose its legs cannot move its centre"):
+        body.velocity(body.standing(np.zeros(len(robot.joints))), up)
+
+
 @pytest.mark.parametrize(
     "robot", [quadruped(), humanoid(), humanoid(SEVEN_JOINTS)], ids=["four", "two", "redundant"]
 )
