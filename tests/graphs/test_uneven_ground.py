@@ -61,7 +61,7 @@ def test_soles_across_an_edge_stand_by_their_load(tmp_path: Path) -> None:
                 "load.flat_height": 0.0,
                 "wbc.stand.torso_feedforward": 0.0,
             },
-        ),  # fmt: skip
+        ),
     ],
 )
 def test_without_that_the_robot_falls(
