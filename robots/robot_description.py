@@ -376,6 +376,10 @@ class RobotDescription(Part):
                 del vars(copy)[name]
         return copy
 
+    def content(self) -> dict[str, Any]:
+        """All that is computed with, also by a simulator, as plain data from which the robot can be read again."""
+        return self.model_dump(mode="json", context={"simulated": True})
+
     @cached_property
     def motors(self) -> Motors:
         """The values of every motor in the profile in use, one element for each motor."""

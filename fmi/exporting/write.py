@@ -110,7 +110,7 @@ def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
         and graph.robot is not None
         and str(yaml.safe_load(found["name"])).endswith(ROBOT_FILES)
     ):
-        data = yaml.safe_dump(graph.robot.model_dump(mode="json"), sort_keys=False)
+        data = yaml.safe_dump(graph.robot.content(), sort_keys=False)
         (folder / "robot.yaml").write_text(data, encoding="utf-8")
         text = _ROBOT.sub("robot: robot.yaml", text, count=1)
     overrides: dict[str, Any] = {}

@@ -16,7 +16,6 @@ from hashlib import sha256
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 import yaml
@@ -88,7 +87,7 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
     robot = header.robot
     if robot is not None and _ROBOT.search(text) and not _is_present(robot, text, graph_folder):
         place = folder / f"{robot.name}.yaml"
-        _write(place, yaml.safe_dump(_values(robot), sort_keys=False).encode())
+        _write(place, yaml.safe_dump(robot.content(), sort_keys=False).encode())
         text = _ROBOT.sub(lambda _: f"robot: {place}", text, count=1)
         said.append(
             f"the description of the robot {robot.name} is not the recorded one any more, or is "
@@ -121,12 +120,7 @@ def _is_present(robot: RobotDescription, text: str, folder: Path) -> bool:
         return False
     if robot.profile in now.profiles:
         now = now.with_profile(robot.profile)
-    return _values(now) == _values(robot)
-
-
-def _values(robot: RobotDescription) -> dict[str, Any]:
-    """All that is computed with, also by a simulator."""
-    return robot.model_dump(mode="json", context={"simulated": True})
+    return now.content() == robot.content()
 
 
 @dataclass(frozen=True)

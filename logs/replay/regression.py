@@ -134,7 +134,7 @@ def _setting(recorded: Replayable, spec: BlockSpec, first: int, last: int) -> Se
     prefix = f"{spec.path}."
     return Setting(
         graph.base_rate, spec.period_ticks, dict(spec.dimensions), tuple(spec.wires),
-        graph.robot.model_dump(mode="json", context={"simulated": True}) if graph.robot else None,
+        graph.robot.content() if graph.robot else None,
         tuple(
             (change.tick, change.path.removeprefix(prefix), change.new)
             for change in recorded.changes

@@ -70,7 +70,7 @@ def test_what_came_later_changes_no_content() -> None:
     assert not {"base_joint", "profile", "sensors", "held"} & set(data)
     assert "kind" not in data["joints"][0] and "motors" not in data["profiles"]["koala"]
     assert "supply" not in data and "gear_play" not in data["profiles"]["koala"]
-    whole = find_robot("bruce").model_dump(mode="json", context={"simulated": True})
+    whole = find_robot("bruce").content()
     assert whole["supply"]["rated_voltage"] == 14.8
     assert RobotDescription.model_validate(whole) == find_robot("bruce")
 
