@@ -21,18 +21,20 @@ export = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+GraphPart = Annotated[
+    str, typer.Argument(help="The graph file, and behind a colon the sub-graph or block.")
+]
+Outputs = Annotated[
+    list[str] | None,
+    typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
+]
 
 
 @export.command("fmu")
 def fmu(
-    graph: Annotated[
-        str, typer.Argument(help="The graph file, and behind a colon the sub-graph or block.")
-    ],
+    graph: GraphPart,
     to: Annotated[Path, typer.Option("--to", help="The file to write, such as controller.fmu.")],
-    output: Annotated[
-        list[str] | None,
-        typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
-    ] = None,
+    output: Outputs = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -74,9 +76,7 @@ def fmu(
 
 @export.command("c")
 def c(
-    graph: Annotated[
-        str, typer.Argument(help="The graph file, and behind a colon the sub-graph or block.")
-    ],
+    graph: GraphPart,
     to: Annotated[
         Path, typer.Option("--to", help="The folder to write; its name is the library's.")
     ],
@@ -87,10 +87,7 @@ def c(
         Path | None,
         typer.Option("--check", help="A recording of the graph, of which every byte is compared."),
     ] = None,
-    output: Annotated[
-        list[str] | None,
-        typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
-    ] = None,
+    output: Outputs = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:

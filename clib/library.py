@@ -106,21 +106,27 @@ class Library:
         Raises:
             AloftError: there is none of that name, or the value is outside its bounds.
         """
+        number = self._number(parameter)
+        if self._function("set")(self._self, number, ctypes.c_double(value)):
+            raise AloftError(f"{parameter} cannot be {value!r}")
+
+    def get(self, parameter: str) -> float:
+        """The present value of a live parameter.
+
+        Raises:
+            AloftError: there is none of that name.
+        """
+        function = self._code[f"{self.about['name']}_get"]
+        function.restype = ctypes.c_double
+        return float(function(self._self, self._number(parameter)))
+
+    def _number(self, parameter: str) -> ctypes.c_int32:
         names = [each["name"] for each in self.about["parameters"]]
         if parameter not in names:
             raise AloftError(
                 f"no live parameter {parameter!r}; there is {', '.join(names) or 'none'}"
             )
-        number = ctypes.c_int32(names.index(parameter))
-        if self._function("set")(self._self, number, ctypes.c_double(value)):
-            raise AloftError(f"{parameter} cannot be {value!r}")
-
-    def get(self, parameter: str) -> float:
-        """The present value of a live parameter."""
-        names = [each["name"] for each in self.about["parameters"]]
-        function = self._code[f"{self.about['name']}_get"]
-        function.restype = ctypes.c_double
-        return float(function(self._self, ctypes.c_int32(names.index(parameter))))
+        return ctypes.c_int32(names.index(parameter))
 
 
 def views(

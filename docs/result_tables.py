@@ -286,11 +286,12 @@ def tasks_table(summary: Row) -> str:
 
 def every_robot_table(rows: Sequence[Row]) -> str:
     """One row a file: its joints, and what became of it."""
-    joints = (row["value"] for row in rows)
-    cells = zip(rows, joints, strict=True)
     return table(
         ("file", "joints", "what became of it"),
-        ((row["name"], "" if n is None else f"{n:.0f}", row["note"]) for row, n in cells),
+        (
+            (row["name"], "" if row["value"] is None else f"{row['value']:.0f}", row["note"])
+            for row in rows
+        ),
     )
 
 

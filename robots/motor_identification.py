@@ -306,9 +306,7 @@ def _equations(
         jacobian = np.vstack(
             [pin.getFrameJacobian(model, data, f, world)[:3] for f in built.contact_frames]
         )
-        _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
-        used = directions[sizes > 1e-6 * sizes[0]]
-        free = np.eye(6 + n) - used.T @ used
+        free = free_projection(jacobian)
         all_rows.append(free @ rows)
         all_right.append(free @ right)
         all_free.append(free)
@@ -319,6 +317,14 @@ def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Arr
     """The joints' angles without the play of their gears."""
     width = np.array([each.value for each in sensors.play.values()])
     return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
+
+
+def free_projection(jacobian: Array) -> Array:
+    """What takes the contact forces out of the equations of motion, (n_velocities, n_velocities): the projection
+    onto what a Jacobian of contact points (rows, n_velocities) maps to zero."""
+    _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
+    used = directions[sizes > 1e-6 * sizes[0]]
+    return np.asarray(np.eye(jacobian.shape[1]) - used.T @ used)
 
 
 def filtered_motion(

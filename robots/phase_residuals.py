@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..mathematics.arrays import Array
 from .calibration import Calibration, Value
 from .identification import Estimate, MeasuredRun
-from .motor_identification import SOFT_SPEED, filtered_motion
+from .motor_identification import SOFT_SPEED, filtered_motion, free_projection
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
 from .sensor_identification import EDGE, IdentifiedSensors
@@ -108,9 +108,7 @@ def _errors(
             pin.computeJointJacobians(model, data, q)
             pin.updateFramePlacements(model, data)
             jacobian = np.vstack([pin.getFrameJacobian(model, data, f, world)[:3] for f in frames])
-            _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
-            used = directions[sizes > 1e-6 * sizes[0]]
-            error -= used.T @ (used @ error)
+            error = free_projection(jacobian) @ error
         errors.append(error)
     return np.array(errors)
 

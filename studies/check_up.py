@@ -157,22 +157,16 @@ def _sides(robot: RobotDescription) -> Iterator[Remark]:
 
 def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Remark]:
     """Motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
-    held = {joint.name for joint in robot.joints if joint.name in robot.held}
     for row in rows:
         share = row["standing_share"]
-        if share is not None and share > 1.0:
-            yield Remark(f"motor {row['motor']}", f"standing takes {share:.3g} times its peak torque",
+        if share is not None and share > 0.5:
+            taken = f"{share:.3g} times" if share > 1.0 else f"{share:.0%} of"
+            yield Remark(f"motor {row['motor']}", f"standing takes {taken} its peak torque",
                          "less than half")  # fmt: skip
-        elif share is not None and share > 0.5:
-            yield Remark(
-                f"motor {row['motor']}",
-                f"standing takes {share:.0%} of its peak torque",
-                "less than half",
-            )
         if (
             row["bandwidth_hz"] is not None
             and row["bandwidth_hz"] < SLOW
-            and row["motor"] not in held
+            and row["motor"] not in robot.held
         ):
             yield Remark(f"motor {row['motor']}", f"a bandwidth of {row['bandwidth_hz']:.2g} Hz",
                          f"{SLOW:g} Hz or more")  # fmt: skip

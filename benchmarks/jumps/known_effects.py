@@ -20,15 +20,13 @@ from ...runtime.language.errors import AloftError
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import Cell, cells, load_cell
 from ...studies.reading import read_study
-from ...studies.summary import wilson_interval
 from ..rows import Row
-from .real_robot import FOLDER, calibrated, chosen, with_margin
+from .real_robot import FOLDER, MISSED_GOAL, calibrated, chosen, missed_row, with_margin
 
 SEEDS = range(96200, 96220)
 """The robots; nothing is tuned on them."""
-MISSED_GOAL = 0.05
 LARGER_MISSED_GOAL = 0.2
-"""The largest good share of robots that do not land, and that for the larger of two sizes of an effect."""
+"""The largest good share of robots that do not land with the larger of two sizes of an effect."""
 LARGER = (
     "gyroscope 2 ms late", "IMU filter 100 Hz", "velocity filter 2 ms", "encoders before 10 mrad of play",
     "saturation 10 %", "gears of 1000 N m/rad", "links longer or shorter by up to 1 %", "friction at rest twice",
@@ -77,7 +75,13 @@ def known_effects(
             rows = sorted(counts.values(), key=lambda row: effects.index(row["effect"]))
             text = json.dumps({"rows": rows}, indent=1)
             (FOLDER / "effects.json").write_text(text + "\n", encoding="utf-8")
-    return [_row(row) for row in rows]
+    return [
+        missed_row(
+            f"{row['task']}, {row['effect']}, calibrated", row["successes"], row["n"],
+            LARGER_MISSED_GOAL if row["effect"] in LARGER else MISSED_GOAL,
+        )
+        for row in rows
+    ]  # fmt: skip
 
 
 def cells_by_effect() -> Mapping[str, Sequence[Cell]]:
@@ -90,15 +94,14 @@ def cells_by_effect() -> Mapping[str, Sequence[Cell]]:
 
 def landed(job: EffectJob) -> dict[str, str]:
     """Why each jump failed, by its name; empty where it landed."""
-    graphs, found = shipped_folder(), {}
-    jumps = cells_by_effect()[job.effect]
+    graphs, effects, found = shipped_folder(), cells_by_effect(), {}
+    jumps, name = effects[job.effect], f"effect_{[*effects].index(job.effect)}"
     effect = {k: v for k, v in jumps[0].overrides.items() if k.startswith("robot.")}
-    number = tuple(cells_by_effect()).index(job.effect)
-    sway = FOLDER.absolute() / f"effect_{number}.yaml"
+    sway = FOLDER.absolute() / f"{name}.yaml"
     include = [str(graphs / "sway.yaml"), *(str(file) for file in jumps[0].include)]
     sway.parent.mkdir(parents=True, exist_ok=True)
     sway.write_text(yaml.safe_dump({"include": include, "set": effect}), encoding="utf-8")
-    fragment = calibrated(sway, job.seed, f"effect_{number}")
+    fragment = calibrated(sway, job.seed, name)
     for cell in jumps:
         sets = {
             **cell.overrides,
@@ -109,14 +112,3 @@ def landed(job: EffectJob) -> dict[str, str]:
         result = load_cell(cell.graph, files, sets, graphs / "bench.yaml").run(log=False)
         found[cell.task] = "" if result.success else result.reason
     return found
-
-
-def _row(row: Mapping[str, Any]) -> Row:
-    low, high = wilson_interval(row["successes"], row["n"])
-    return Row(
-        f"do not land {row['task']}, {row['effect']}, calibrated",
-        1.0 - row["successes"] / row["n"],
-        "",
-        goal=LARGER_MISSED_GOAL if row["effect"] in LARGER else MISSED_GOAL,
-        note=f"{row['successes']} of {row['n']} robots, 95 % interval {low:.2f} to {high:.2f}",
-    )

@@ -191,10 +191,15 @@ def _planned(task: frozenset[tuple[str, Any]]) -> PlannedJump:
 
 
 def _row(what: str, robots: Sequence[Sequence[Mapping[str, Any]]]) -> Row:
-    last = [runs[-1]["success"] for runs in robots]
-    low, high = wilson_interval(sum(last), len(last))
     times = [sum(run[k]["success"] for run in robots) for k in range(len(robots[0]))]
-    told = f"{sum(last)} of {len(last)} robots, 95 % interval {low:.2f} to {high:.2f}, trial real"
+    more = ", trial real"
     if len(times) > 1:
-        told += f"; jumps 1 to {len(times)}: {', '.join(map(str, times))}"
-    return Row(f"do not land {what}", 1.0 - sum(last) / len(last), "", goal=MISSED_GOAL, note=told)
+        more += f"; jumps 1 to {len(times)}: {', '.join(map(str, times))}"
+    return missed_row(what, times[-1], len(robots), MISSED_GOAL, more)
+
+
+def missed_row(what: str, landed: int, n: int, goal: float, more: str = "") -> Row:
+    """The share of n robots that do not land, of which ``landed`` do; ``more`` ends the note."""
+    low, high = wilson_interval(landed, n)
+    note = f"{landed} of {n} robots, 95 % interval {low:.2f} to {high:.2f}{more}"
+    return Row(f"do not land {what}", 1.0 - landed / n, "", goal=goal, note=note)

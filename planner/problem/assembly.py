@@ -159,8 +159,7 @@ class Assembly:
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.constraints)
         cost: Any = ca.MX(0)
-        value_rows, gradient, jacobian_rows = [], [], []
-        jacobian_values, hessian_values, slopes = [], [], []
+        value_rows, gradient, hessian_values, slopes = [], [], [], []
         jacobian_cost_rows: list[Indices] = []
         padded = ca.vertcat(lam_g, 0.0)
         for name, users in self.users.items():
@@ -170,10 +169,7 @@ class Assembly:
             costs, rows = piece.value.map(count)(z, w)
             cost = cost + ca.sum2(costs)
             value_rows.append(ca.vec(rows))
-            rows, slope, jacobian = piece.jacobian.map(count)(z, w)
-            jacobian_rows.append(ca.vec(rows))
-            gradient.append(ca.vec(slope))
-            jacobian_values.append(_nonzeros(jacobian))
+            gradient.append(ca.vec(piece.jacobian.map(count)(z, w)[1]))
             jacobian_cost_rows.append(self._columns[name].ravel())
             index = np.where(self._rows[name] < 0, self.constraints, self._rows[name])
             multipliers = _gather(padded, index.ravel(), (-1, count))
@@ -181,10 +177,8 @@ class Assembly:
             slopes.append(ca.vec(slope))
             hessian_values.append(_nonzeros(hessian))
         g = self._sum_rows(x, value_rows)
-        g_again = self._sum_rows(x, jacobian_rows)
         columns = np.concatenate(jacobian_cost_rows)
         grad = _scatter(ca.vertcat(*gradient), columns, self.variables)
-        jac = self._jacobian(jacobian_values)
         whole, *triangle = self._hessian(hessian_values, upper)
         linear_rows, linear_columns, signs = self._linear
         pushed = _gather(lam_g, linear_rows, (-1, 1)) * ca.DM(signs)
@@ -199,8 +193,7 @@ class Assembly:
             "nlp_g": ca.Function("nlp_g", [x, p], [g], names, ["g"]),
             "nlp_grad_f": ca.Function("nlp_grad_f", [x, p], [grad], names, ["grad_f_x"]),
             "grad_f": ca.Function("nlp_grad_f", [x, p], [cost, grad], names, ["f", "grad_f_x"]),
-            "nlp_jac_g": ca.Function(
-                "nlp_jac_g", [x, p], [g_again, jac], names, ["g", "jac_g_x"]),
+            "nlp_jac_g": self.jacobian(),
             "nlp_hess_l": ca.Function(
                 "nlp_hess_l", [x, p, lam_f, lam_g], [slope, whole], lagrangian,
                 ["grad_gamma_x", "hess_gamma_x_x"]),

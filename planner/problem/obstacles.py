@@ -107,18 +107,19 @@ class ObstacleRows:
         self.feet = len(self._of_kind["foot"])
         self.count = len(kinds)
         self._knees_fold = bool(ball_feet(model.robot))
-        self._low = np.union1d(self._of_kind["calf"], self._of_kind["body"])
+        self._folding = np.sort(
+            np.concatenate([self._of_kind[kind] for kind in ("calf", "shin", "body")])
+        )
 
     def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
         """The rows of a jump's knot; ``first`` says that it is the flight's first."""
         turns = bool(hop.rotation)
         if self._knees_fold and not stretch.flies and not turns:
-            return np.union1d(self._low, self._of_kind["shin"])
+            # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
+            return self._folding
         landed = not stretch.flies and stretch.place > 0 and bool(hop.landing_height)
         if edge is None and not turns:
-            # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
-            low = self._knees_fold and not stretch.flies
-            return self._low if low else np.zeros(0, np.int64)
+            return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
         kinds = ["calf"] if turns else ["calf", "shin"]
         kinds += ["body"] if turns or landed else []

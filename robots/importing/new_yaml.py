@@ -139,11 +139,11 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
             is_ball = np.linalg.norm(shape.end - shape.start) < 0.1 * shape.radius
             if is_ball and frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
                 balls.append((name, frame, 0.5 * (shape.start + shape.end), shape.radius))
-    sole = None if balls else _sole(model, built, link, bottom)
-    if sole is not None:
-        return sole
     if not balls:
         name = min(bodies, key=lambda body: float(bodies[body].position[2]))
+        points = _sole(model, built, link, bottom, bodies[name])
+        if points:
+            return {"name": name, "at": name, "radius": SOLE_RADIUS, "points": points}
         return {"name": name, "at": name, "radius": RADIUS}
     name, _, centre, radius = balls[0]
     if len(balls) == 1:
@@ -157,9 +157,11 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
     return {"name": name, "at": name, "points": points, "radius": round(radius, 6)}
 
 
-def _sole(model: RawModel, built: LinkTree, link: str, bottom: float) -> dict[str, Any] | None:
-    """The foot as four corners around what of its shapes is near the ground, where a leg of so many joints
-    has an ankle and the shapes are wide; else ``None``."""
+def _sole(
+    model: RawModel, built: LinkTree, link: str, bottom: float, foot: BodyFrame
+) -> list[list[float]]:
+    """Four corners [m, body of the foot] around what of a link's shapes is near the ground, where a leg of so
+    many joints has an ankle and the shapes are wide; else none."""
     carrier = {joint["child"]: joint["parent"] for joint in built.joints}
     count, above = 0, link
     while above in carrier:
@@ -172,19 +174,14 @@ def _sole(model: RawModel, built: LinkTree, link: str, bottom: float) -> dict[st
                     middle = frame.rotation @ end + frame.position
                     found.append([*(middle[:2] - shape.radius), *(middle[:2] + shape.radius)])
     if not found or count < JOINTS_WITH_ANKLE:
-        return None
+        return []
     each = np.array(found)
     low, high = each[:, :2].min(axis=0), each[:, 2:].max(axis=0)
     if (high - low).min() < NARROW:
-        return None
-    name = min(_bodies(built, link), key=lambda body: float(_bodies(built, link)[body].position[2]))
-    frame = built.frames[name]
+        return []
     corners = [[x, y, bottom] for x in (high[0], low[0]) for y in (high[1], low[1])]
-    points = [frame.rotation.T @ (np.array(corner) - frame.position) for corner in corners]
-    return {
-        "name": name, "at": name, "radius": SOLE_RADIUS,
-        "points": [[float(value) for value in np.round(point, 6) + 0.0] for point in points],
-    }  # fmt: skip
+    points = [foot.rotation.T @ (np.array(corner) - foot.position) for corner in corners]
+    return [[float(value) for value in np.round(point, 6) + 0.0] for point in points]
 
 
 def yaml_text(

@@ -336,25 +336,23 @@ def _move(
 ) -> bool:
     """Move a place down (1) or up (-1) to where the fewest nets cross; whether that is elsewhere."""
 
-    def swap(number: int) -> None:
-        other = column[number + step]
-        column[number], column[number + step] = other, place
-        where[other], where[place] = number, number + step
+    def swap(number: int, way: int) -> None:
+        other = column[number + way]
+        column[number], column[number + way] = other, place
+        where[other], where[place] = number, number + way
 
     begin = at = best = where[place]
     gain = most = 0
     while 0 <= at + step < len(column):
         other = column[at + step]
         gain += among(place, other)
-        swap(at)
+        swap(at, step)
         gain -= among(place, other)
         at += step
         if gain > most:
             best, most = at, gain
     for number in range(at, best, -step):  # back to the best
-        other = column[number - step]
-        column[number], column[number - step] = other, place
-        where[other], where[place] = number, number - step
+        swap(number, -step)
     return best != begin
 
 
