@@ -29,7 +29,7 @@ from ...runtime.language.errors import AloftError
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell
 from ...studies.jump_learning import lesson_of
-from ...studies.oracle import CALIBRATED, told_values
+from ...studies.oracle import CALIBRATED, oracle_values
 from ...studies.robot_calibration import calibrated_fragment
 from ...studies.summary import wilson_interval
 from ..rows import Row
@@ -159,7 +159,7 @@ def graph_of(
         sets["plan.learnt"] = str(learnt)
     graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml")
     if told == "draws":
-        return graph.changed(told_values(graph, CALIBRATED, seed=seed))
+        return graph.changed(oracle_values(graph, CALIBRATED, seed=seed))
     return graph
 
 

@@ -33,7 +33,7 @@ from aloft.robots.sensor_identification import (
     standing_span,
     vertical,
 )
-from aloft.studies.oracle import reading_ages, told_values
+from aloft.studies.oracle import oracle_values, reading_ages
 from aloft.studies.robot_calibration import calibration_from, swayed
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
@@ -50,7 +50,7 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
         "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
-        "constants": list(told_values(graph)["robot.motor_model.torque_constant"].values()),
+        "constants": list(oracle_values(graph)["robot.motor_model.torque_constant"].values()),
         "resistance": pack.resistance, "voltage": pack.open_voltage,
     }  # fmt: skip
 
