@@ -31,7 +31,7 @@ from ...runtime.language.errors import AloftError
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell
 from ...studies.jump_learning import lesson_of
-from ...studies.oracle import CALIBRATED, told_values
+from ...studies.oracle import CALIBRATED, oracle_values
 from ...studies.summary import wilson_interval
 from ..rows import Row
 from .real_tasks import ALONE, EFFORT, EVERY, AskedJump, asked_of
@@ -160,7 +160,7 @@ def graph_of(
         sets["plan.learnt"] = str(learnt)
     graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml")
     if told == "draws":
-        return graph.changed(told_values(graph, CALIBRATED, seed=seed))
+        return graph.changed(oracle_values(graph, CALIBRATED, seed=seed))
     return graph
 
 

@@ -29,7 +29,7 @@ from aloft.robots.sensor_identification import (
 )
 from aloft.runtime.graph import Graph
 from aloft.runtime.running.run_result import RunResult
-from aloft.studies.oracle import reading_ages, told_values
+from aloft.studies.oracle import oracle_values, reading_ages
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
 ROBOT = find_robot("bruce")
@@ -62,7 +62,7 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
         "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
-        "constants": list(told_values(graph)["robot.motor_model.torque_constant"].values()),
+        "constants": list(oracle_values(graph)["robot.motor_model.torque_constant"].values()),
         "resistance": pack.resistance, "voltage": pack.open_voltage,
     }  # fmt: skip
 
