@@ -14,6 +14,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import expm1
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
@@ -112,7 +113,7 @@ class Battery:
         """Feeds the motors in a physics step, and sets what they can do in the next one."""
         p, motors = self._supply, limits.motors
         pack = Pack(
-            p.open_voltage, p.resistance, -math.expm1(-self._timestep / self._recovery_time),
+            p.open_voltage, p.resistance, -expm1(-self._timestep / self._recovery_time),
             p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage,
             self._timestep, np.array(motors.slope), np.array(motors.no_load), self._heating,
         )  # fmt: skip
