@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.language.errors import ExitCode
 from .options import JsonBesideTables, Workers
 from .output import console, errors_reported, print_json, say, table
 
@@ -35,26 +35,20 @@ def reach(
     from ...robots.description import path_of, read
     from ...runtime.graph import load
     from ...studies.batch.seeds import parse_seeds
-    from ...studies.check_up import obstacles_to_jumping
     from ...studies.reach.charts import reach_chart
     from ...studies.reach.reach import SEEDS, bruce_reach
     from ...studies.reach.reach import reach as find_reach
     from ...studies.reach.search import JumpGraph
     from ...studies.rehearsal import trial_settings
-    from .rehearsal import graph_of
+    from .robot_trials import about_robot, graph_of
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
         chosen = parse_seeds(seeds) if seeds else SEEDS
         path, own = graph_of(name)
-        found = read(path_of(name))
-        robot = found.description
-        for note in found.notes:
-            say(screen, f"  - {note}")
-        wrong = obstacles_to_jumping(robot)
-        if wrong:
-            raise AloftError(f"{robot.name} cannot jump: {'; '.join(wrong)}")
-        named = str(path_of(name).resolve())
+        about_robot(name, "jump", screen)
+        file = path_of(name).resolve()
+        robot, named = read(file).description, str(file)
         settings = {"robot": named, **trial_settings("robust")} if own else trial_settings("robust")
         graph = JumpGraph(named, path, settings)
         load(path, settings)

@@ -211,9 +211,8 @@ def values_towards(task: JumpTask, parameter: str) -> list[float]:
     return [*(round(modest + sign * k * axis.step, 9) for k in range(count)), asked]
 
 
-def quick_solver(near: bool, solve: Solver | None = None) -> Solver:
-    """The planner, which gives up soon; with ``near`` it does not try from nothing what it has not found
-    from a near plan. ``solve`` takes the planner's place."""
+def _quick(solve: Solver | None, near: bool) -> Solver:
+    """The planner, which gives up soon. From a near plan, too, it tries from nothing by itself."""
     from ..solving.solve import solve_jump
 
     def make(
@@ -312,7 +311,7 @@ class _FeasibleSearch:
         self._progress(", ".join(f"{name}: {AXES[name].text(x)}" for name, x in values.items()))
         self._solves += 1
         task = self._task.model_copy(update=dict(values))
-        make = quick_solver(start is not None, self._solve)
+        make = _quick(self._solve, start is not None)
         try:
             return solve_and_check(task, self._robot, start, make, refine=False)
         except (PlanError, InvalidPlanError, JumpTaskError):

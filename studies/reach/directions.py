@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from ...planner.task.read_task import contradictions
 from ...planner.task.task import JumpTask, make_task
-from ...robots.kinematics import standing_contacts
 from ...robots.robot_description import RobotDescription
 
 GOALS = {
@@ -30,8 +30,10 @@ GOALS = {
 LOOSEST: Mapping[str, Any] = {"effort": 1.0, "margins": None, "foot_clearance": 0.02}
 """What a task says besides for the theoretical bound: all of the motors' torque and speed, no
 margins but the 5 mrad at the joints without which no plan is valid, and feet that rise by 2 cm."""
-ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""The lengths that are taken for steps and distances, times a power of ten."""
+ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""The lengths that are taken for steps, times a power of ten."""
+LONGEST = 2.0
+"""m, of a jump onto or off a step."""
 
 
 @dataclass(frozen=True)
@@ -160,16 +162,25 @@ def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -
     """The lengths for a robot that can be planned to rise by ``highest`` [m] and no higher.
 
     Jumps rise as far as BRUCE's for their legs, but no further than half of ``highest``. Jumps onto and off a step
-    go over as much ground beyond the feet's own length as BRUCE's do.
+    are so much longer that the robot stands wholly on either side of the edge.
     """
-    scale = leg_length(robot) / leg_length(bruce)
     usual = JumpSizes()
-    beyond = _foot_span(robot) - scale * _foot_span(bruce)
-    return JumpSizes(
-        scale,
-        round_length(min(scale * usual.rise, 0.5 * highest)),
-        *(_upwards(scale * length + beyond) for length in (usual.onto, usual.off)),
-    )
+    scale = leg_length(robot) / leg_length(bruce)
+    rise = round(min(scale * usual.rise, 0.5 * highest), 2)
+    beside = robot.name if robot.name != bruce.name else ""
+
+    def over(length: float, number: int) -> float:
+        """The length, or a greater one [m], with which the direction of that number is consistent where it begins."""
+        length = _whole_steps(scale * length)
+        while length < LONGEST:
+            sizes = JumpSizes(scale, rise, length, length)
+            way = single_directions(sizes, beside)[number]
+            if not contradictions(way.task(way.start), robot):
+                break
+            length = _whole_steps(length + 0.05)
+        return length
+
+    return JumpSizes(scale, rise, over(usual.onto, -2), over(usual.off, -1))
 
 
 def leg_length(robot: RobotDescription) -> float:
@@ -194,11 +205,6 @@ def leg_length(robot: RobotDescription) -> float:
     return float(np.mean(lengths))
 
 
-def _foot_span(robot: RobotDescription) -> float:
-    """From the rearmost to the foremost contact point of the standing robot [m]."""
-    return float(np.ptp(standing_contacts(robot)[:, 0]))
-
-
-def _upwards(length: float) -> float:
-    """The length in whole steps of 5 cm, at least as long [m]."""
-    return round(0.05 * math.ceil(length / 0.05 - 1e-6), 9)
+def _whole_steps(length: float) -> float:
+    """The length in whole steps of 5 cm [m]."""
+    return round(0.05 * round(length / 0.05), 9)

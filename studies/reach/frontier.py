@@ -174,7 +174,7 @@ def frontier(
             for name in list(waiting):
                 while name in waiting:
                     tries, ask = walks[name], waiting[name]
-                    job = job_for(graph, tries.direction, ask, seeds, folder, effort, journal, keys)
+                    job = job_for(graph, tries.direction, ask, seeds, folder, journal, keys)
                     if job is not None:
                         names.append(name)
                         jobs.append(job)
@@ -237,7 +237,7 @@ def _known(way: Direction, ask: Ask, seeds: Sequence[int], journal: Journal,
     return found
 
 
-def job_for(graph: JumpGraph, way: Direction, ask: Ask, seeds: Sequence[int], folder: Path, effort: Effort,
+def job_for(graph: JumpGraph, way: Direction, ask: Ask, seeds: Sequence[int], folder: Path,
             journal: Journal, keys: _Keys) -> PlanJob | RunJob | None:  # fmt: skip
     """What is still to be done for a try; ``None`` if all of it is kept."""
     plans = folder / "plans"
@@ -245,7 +245,7 @@ def job_for(graph: JumpGraph, way: Direction, ask: Ask, seeds: Sequence[int], fo
         if keys(way, ask) in journal.outcomes:
             return None
         task = way.loosest(ask.rung) if ask.kind == "loosest" else way.task(ask.rung)
-        return PlanJob(graph.robot, task, plans, ask.near, effort.quick)
+        return PlanJob(graph.robot, task, plans, ask.near)
     known = _known(way, ask, seeds, journal, keys)
     done, failed = len(known), sum(not each.success for each in known)
     if enough(done, failed, len(seeds)):

@@ -9,7 +9,7 @@ processor time (``PLANNED_CPU``, ``THEORY_CPU``) and few runs, so what is told i
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ PLANNED_CPU, THEORY_CPU = 40.0, 20.0
 QUARTER_TURN = 90.0
 """deg; counts as one length of a leg."""
 BRUCE = Path(__file__).with_name("bruce.json")
-"""What ``aloft robot reach bruce --json`` has found."""
+"""Written by ``docs/refresh.py frontier``, with the table in docs/frontier.md."""
 
 
 def reach(
@@ -60,10 +60,7 @@ def reach(
     if highest:
         found += along(single_directions(sizes_of(robot, bruce, highest), name)[1:])
     for each in found:
-        unit = QUARTER_TURN if each["unit"] == "deg" else 100.0 * legs
-        each["in_legs"] = {
-            key: round(each[key] / unit, 4) for key in ("reached", "planned", "theory")
-        }
+        each["in_legs"] = in_legs(each, legs)
     return {
         "robot": robot.name,
         "mass_kg": robot.total_mass,
@@ -74,7 +71,25 @@ def reach(
     }
 
 
+def in_legs(each: Mapping[str, Any], legs: float) -> dict[str, float]:
+    """A direction's ends in lengths of the ``legs`` [m], or in turns of 90 degrees."""
+    unit = QUARTER_TURN if each["unit"] == "deg" else 100.0 * legs
+    return {key: round(each[key] / unit, 4) for key in ("reached", "planned", "theory")}
+
+
+def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
+    """What the benchmark ``frontier`` has found of a robot's single directions, as ``bruce_reach`` gives it."""
+    singles = {way.name for way in single_directions()}
+    legs = leg_length(robot)
+    rows = [
+        {"name": each["name"], "in_legs": in_legs(each, legs)}
+        for each in found["directions"]
+        if each["name"] in singles
+    ]
+    return {"robot": robot.name, "directions": rows}
+
+
 def bruce_reach() -> dict[str, Any]:
-    """BRUCE's reach, found by the same search."""
+    """BRUCE's reach: what the benchmark ``frontier`` has found with 20 seeds, for jumps of the same sizes."""
     found: dict[str, Any] = json.loads(BRUCE.read_text(encoding="utf-8"))
     return found

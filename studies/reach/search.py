@@ -16,8 +16,7 @@ from typing import Any
 
 from ...planner.checking.plan_tests import active_limits
 from ...planner.checking.validity import InvalidPlanError, why_not
-from ...planner.library.library import PlanLibrary, Solver, solve_and_check
-from ...planner.library.nearest_feasible import quick_solver
+from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import JumpTaskError, PlanError
 from ...planner.task.task import JumpTask
@@ -88,8 +87,8 @@ class Effort:
         runs: of a rung.
         planned_cpu, theory_cpu: s; after so much processor time no further solve is begun in the search
             for what is planned, and for the theoretical bound.
-        quick: whether the ladder is climbed from low down, with solves that give up soon, and what lands
-            is looked for by bisection, not rung by rung.
+        quick: whether the ladder is climbed from further down, as nobody knows where it ends, and what
+            lands is looked for by bisection, not rung by rung.
     """
 
     runs: int
@@ -123,7 +122,6 @@ class PlanJob:
     task: JumpTask
     folder: Path
     near: JumpTask | None = None
-    quick: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,8 +162,7 @@ def make_plan(job: PlanJob) -> Outcome:
     started = cpu_time()
     try:
         near = None if job.near is None else library.find(job.near)
-        solve: Solver | None = quick_solver(True) if job.quick and near is not None else None
-        plan = solve_and_check(job.task, robot, near, solve)
+        plan = solve_and_check(job.task, robot, near)
     except (InvalidPlanError, PlanError, JumpTaskError) as error:
         return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
@@ -220,15 +217,12 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
     """The tries along one direction, one after the other; what each found is in ``tries`` before
     the next is asked for."""
     way = tries.direction
-    search = furthest(max(1, way.start // 3) if effort.quick else way.start, way.most)
+    search = furthest(max(1, way.start // 2) if effort.quick else way.start, way.most)
     rung = next(search)
-    near: JumpTask | None = None
     try:
         while _spent(tries.recipe) < effort.planned_cpu:
-            yield Ask("recipe", rung, near)
+            yield Ask("recipe", rung)
             tries.planned = max([k for k, v in tries.recipe.items() if v.success], default=0)
-            if effort.quick and tries.planned:
-                near = way.task(tries.planned)
             rung = search.send(tries.recipe[rung].success)
         tries.planned_ended = False
     except StopIteration as end:
@@ -240,7 +234,7 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
         try:
             while True:
                 if rung not in tries.recipe:
-                    yield Ask("recipe", rung, near)
+                    yield Ask("recipe", rung)
                 good = False
                 if tries.recipe[rung].success:
                     yield Ask("run", rung)
