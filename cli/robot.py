@@ -438,7 +438,7 @@ def graph_values(
     weight, joint_pd = path("MassEstimator", "weight"), path("JointPD", "joint_pd")
     waiting = path("DelayEstimator", "delay")
     usual = run.header.parameters.get(f"{waiting}.usual", 0.001)
-    told = max(0.0, delay.delay.value - float(usual))
+    nominal = max(0.0, delay.delay.value - float(usual))
     index = {joint.name: k for k, joint in enumerate(robot.joints)}
     further = {
         name: max(0.0, value.value - float(robot.motors.friction[index[name]]))
@@ -455,7 +455,7 @@ def graph_values(
         + ", ".join(f"{1e3 * value.std:.1f}" for value in body.com_offset)
         + " mm",
         f"  {weight}.com_spread: {max(value.std for value in body.com_offset):.4f} m",
-        f"  {waiting}.told: {1e3 * told:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
+        f"  {waiting}.nominal: {1e3 * nominal:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
         f"  {joint_pd}.friction:  # beyond the description's [N m]",
         '    "*": 0',
         *(

@@ -25,6 +25,7 @@ from pydantic import (
 )
 
 from ..mathematics.arrays import Array
+from ..mathematics.constants import GRAVITY
 from ..mathematics.linear_algebra import inverse, product
 
 Vector3 = tuple[float, float, float]
@@ -450,6 +451,11 @@ class RobotDescription(Part):
     def total_mass(self) -> float:
         """The robot's mass [kg]."""
         return sum(link.mass for link in self.links)
+
+    @property
+    def weight(self) -> float:
+        """The robot's weight [N]."""
+        return self.total_mass * GRAVITY
 
     def link(self, name: str) -> Link:
         """The link of that name."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.whole_body_qp import (
     JOINT_LIMITS,
@@ -248,7 +247,7 @@ class WholeBodyController(KernelBlock):
 
     def setup(self) -> None:
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
-        self._weight = robot.total_mass * GRAVITY
+        self._weight = robot.weight
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
         self._weights = ProgramWeights(*(np.zeros(1) for _ in ProgramWeights._fields))
         by_motor = p.limits == "motor"
