@@ -227,8 +227,11 @@ def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
         step = hop.landing_height or 0.0
         for where, place, higher in (("start", start, step), ("landing", end, -step)):
             # Who stands beside higher ground must be away from it with all that is below its height.
-            for name, points, radii in (("the feet", feet, 0.0), *_low_links(robot, higher)):
-                x = place.x + product(points[:, :2], _onward(place.heading))
+            for name, points, radii in (
+                ("the feet", feet, np.zeros(len(feet))),
+                *_low_links(robot, higher),
+            ):
+                x: Array = place.x + product(points[:, :2], _onward(place.heading))
                 back, front = float(np.min(x - radii)), float(np.max(x + radii))
                 if back < edge < front:
                     yield (
