@@ -35,6 +35,7 @@ from ...runtime.language.steps import PythonCall, signal_call
 from ..signals import (
     DynamicsTerms,
     JointState,
+    MotorCondition,
     Phase,
     PhaseState,
     WholeBodyCommand,
@@ -100,7 +101,8 @@ class WholeBodyController(KernelBlock):
     **Limits** on torque are those of the robot's actuator profile in use. ``none``, as in the
     paper, sets no limits. ``joint`` bounds each joint's torque by the peak torque of the motor with
     the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
-    torque-speed curve at its present speed, which is exact also for differential joints.
+    torque-speed curve at its present speed, which is exact also for differential joints; with
+    ``follow_motors`` by the shares of torque and speeds that the input ``motors`` says are left of them.
 
     **Solution.** Accelerations are eliminated exactly (``mathematics/whole_body_reduction``), and ``solver``
     finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
@@ -147,6 +149,10 @@ class WholeBodyController(KernelBlock):
             PerJoint(1.0), gt=0.0,
             text="factor on the peak torque of each motor, by the name of its joint",
         )  # fmt: skip
+        follow_motors: bool = parameter(
+            False,
+            text="whether the limits follow how motors and pack are now, by an input `motors`",
+        )
         friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction cones")
         force_min: float = live_parameter(
             0.0, unit="N", ge=0.0, text="least normal force of a point"
@@ -243,10 +249,15 @@ class WholeBodyController(KernelBlock):
         except TaskChoiceError:
             return cls
         inputs = [(each.kind, own, name) for each in chosen for own, name in each.inputs.items()]
-        return _class_with(tuple(inputs)) if inputs else cls
+        found = _class_with(tuple(inputs)) if inputs else cls
+        return _following_motors(found) if params.follow_motors else found
 
     def setup(self) -> None:
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
+        now: MotorCondition | None = getattr(self, "motors", None)
+        shares = (
+            (now.torque_constant, now.corner_speed, now.no_load_speed) if now is not None else ()
+        )
         self._weight = robot.weight
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
         self._weights = ProgramWeights(*(np.zeros(1) for _ in ProgramWeights._fields))
@@ -259,6 +270,7 @@ class WholeBodyController(KernelBlock):
             kinds[p.limits], robot.joint_to_motor,
             robot.torque_to_motor if by_motor else np.eye(n_joints),
             np.zeros(n_joints), motors.corner_speed, motors.no_load_speed,
+            *(shares or np.ones((3, n_joints))),
             *(np.zeros(n_joints) for _ in range(3)),
         )  # fmt: skip
         self._model = RigidBodyTerms(
@@ -374,6 +386,14 @@ def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBo
         port = kind.inputs[own]
         body[name] = Input(port.signal, text=port.text, default=port.default)
     return type(WholeBodyController.__name__, (WholeBodyController,), body)
+
+
+@cache
+def _following_motors(kind: type[WholeBodyController]) -> type[WholeBodyController]:
+    """The controller with an input for the motors as they are now."""
+    port = Input(MotorCondition, text="what is left of the motors' torque constants and speeds")
+    body = {"__doc__": kind.__doc__, "__module__": kind.__module__, "motors": port}
+    return type(kind.__name__, (kind,), body)
 
 
 class ActiveCalls(NamedTuple):
