@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array1D
+from ...mathematics.constants import COPPER, MAGNETS
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Metric, Output, State
 from ...runtime.language.parameters import Parameters, parameter
@@ -22,10 +23,10 @@ class DriftParameters(Parameters):
         text="of the windings when torque constants and speeds were found [deg C]",
     )  # fmt: skip
     magnets: float = parameter(
-        0.0012, unit="1/K", ge=0.0, le=0.01, text="share of a torque constant that is lost"
+        MAGNETS, unit="1/K", ge=0.0, le=0.01, text="share of a torque constant that is lost"
     )
     copper: float = parameter(
-        0.0039, unit="1/K", ge=0.0, le=0.01, text="share of a winding's resistance that is gained"
+        COPPER, unit="1/K", ge=0.0, le=0.01, text="share of a winding's resistance that is gained"
     )
     pack_resistance: float = parameter(
         0.04, unit="ohm", ge=0.0, text="of the pack and its leads, at first"

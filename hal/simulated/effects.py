@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from ...mathematics.arrays import Array
+from ...mathematics.constants import COPPER, MAGNETS
 from ...robots.robot_description import PowerSupply, RobotDescription
 from ...runtime.language.parameters import Parameters, ThreeNumbers, TwoNumbers, parameter
 
@@ -267,14 +268,14 @@ class WindingParameters(Parameters):
     )
     ambient: float = parameter(25.0, ge=-40.0, le=100.0, text="of what cools them [deg C]")
     magnets: float = parameter(
-        0.0012,
+        MAGNETS,
         unit="1/K",
         ge=0.0,
         le=0.01,
         text="share of the torque constant at 25 deg C that is lost",
     )
     copper: float = parameter(
-        0.0039,
+        COPPER,
         unit="1/K",
         ge=0.0,
         le=0.01,
