@@ -249,8 +249,9 @@ class WholeBodyController(KernelBlock):
         except TaskChoiceError:
             return cls
         inputs = [(each.kind, own, name) for each in chosen for own, name in each.inputs.items()]
-        found = _class_with(tuple(inputs)) if inputs else cls
-        return _following_motors(found) if params.follow_motors else found
+        if not inputs and not params.follow_motors:
+            return cls
+        return _class_with(tuple(inputs), params.follow_motors)
 
     def setup(self) -> None:
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
@@ -376,8 +377,10 @@ class WholeBodyController(KernelBlock):
 
 
 @cache
-def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBodyController]:
-    """The controller with inputs for tasks, each given by the task, its name there and here."""
+def _class_with(
+    inputs: tuple[tuple[type[Task], str, str], ...], follow_motors: bool
+) -> type[WholeBodyController]:
+    """The controller with inputs for tasks, each given by the task, its name there and here, and for motors."""
     body: dict[str, Any] = {
         "__doc__": WholeBodyController.__doc__,
         "__module__": WholeBodyController.__module__,
@@ -385,15 +388,10 @@ def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBo
     for kind, own, name in inputs:
         port = kind.inputs[own]
         body[name] = Input(port.signal, text=port.text, default=port.default)
+    if follow_motors:
+        text = "what is left of the motors' torque constants and speeds"
+        body["motors"] = Input(MotorCondition, text=text)
     return type(WholeBodyController.__name__, (WholeBodyController,), body)
-
-
-@cache
-def _following_motors(kind: type[WholeBodyController]) -> type[WholeBodyController]:
-    """The controller with an input for the motors as they are now."""
-    port = Input(MotorCondition, text="what is left of the motors' torque constants and speeds")
-    body = {"__doc__": kind.__doc__, "__module__": kind.__module__, "motors": port}
-    return type(kind.__name__, (kind,), body)
 
 
 class ActiveCalls(NamedTuple):

@@ -561,7 +561,7 @@ class Plant:
         """The temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
         if self.windings is None:
             return NOMINAL
-        return self.physics.winding_temperature.item(motor)
+        return float(self.physics.winding_temperature[motor])
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed."""
