@@ -105,13 +105,13 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
 
 def _show_effects(name: str, as_json: bool) -> None:
     """Print the effects that a simulated robot can have."""
-    from .shared.simulated_effects import effect_rows, simulated_effects
+    from .shared.simulated_effects import TRIAL, effect_rows, simulated_effects
 
     found = simulated_effects()
     if as_json:
-        print_json({"success": True, "name": name, "trial": "real", "effects": found})
+        print_json({"success": True, "name": name, "trial": TRIAL, "effects": found})
         return
-    columns = ("robot.", "unit", ">default", ">trial real", "source")
+    columns = ("robot.", "unit", ">default", f">trial {TRIAL}", "source")
     title = f"{name}: what can be simulated of a real robot"
     console().print(table(title, columns, list(effect_rows(found))))
 
