@@ -31,6 +31,7 @@ def test_robots_sway_as_far_as_their_size_allows() -> None:
     assert wide.shift[0] > 3.0 * 0.004
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["go2", "g1", "solo12", "a1", "anymal_c", "hyq", "talos"])
 def test_no_robot_passes_its_limits(name: str) -> None:
     robot = find_robot(name)
