@@ -35,10 +35,15 @@ class FootLoadMemory(Signal):
     force = Field(("n_contacts", 3), unit="N", frame="world", text="of each point, filtered")
     loaded = Field("n_feet", dtype="bool", text="whether each foot carries load")
     touched = Field(
-        "n_contacts", dtype="bool", text="whether each point has touched while its foot stands"
+        "n_contacts",
+        dtype="bool",
+        text="whether each point has touched, or rested, while its foot stands",
     )
     ground = Field(
-        "n_contacts", unit="m", frame="world", text="the lowest height it has had since then"
+        "n_contacts",
+        unit="m",
+        frame="world",
+        text="where it rested last, or the lowest height at which it has touched since",
     )
     still = Field("n_contacts", unit="s", text="how long each point has neither risen nor sunk")
 
@@ -80,10 +85,14 @@ class FootLoadEstimator(Block):
     **Contacts.** After a touchdown a loaded foot may stand on an edge between its points. Load anywhere
     between toe and heel is a sum of loads at both, so then the points count as in contact that are less than
     ``flat_height`` above where they have touched since the foot came down, or, before they have, above where
-    its other points have. If none has touched, all count: the foot has come down on the edge. A point whose
-    contact is only held, its switch being open, counts no longer once it has risen by ``flat_height`` from where it
-    touched: on a sole that tips over an edge an end is 2 cm up before a hold of 30 ms ends. All other
-    points in ``switches`` stay in contact, and before the touchdown only they are.
+    its other points have. A point has touched where its switch has closed, and where it has been still for ``still_time``: a
+    sole that rests on its heel and across an edge has its toe in the air, and the edge carries what the program
+    puts on the toe; with more load there the sole turns about the edge until the toe touches. If no point has touched, all
+    count: the foot has come down on the edge.
+
+    A contact that is only held, its switch being open, ends where the point has risen by ``flat_height``: on a sole
+    that tips over an edge an end is 2 cm up before a hold of 30 ms is over. All other points in ``switches``
+    stay in contact, and before the touchdown only they are.
 
     The joints' accelerations and friction are left out, so the force is wrong for some milliseconds after
     an impact, and by what friction holds. A leg that is stretched straight shows no load along itself. The block
@@ -105,7 +114,10 @@ class FootLoadEstimator(Block):
             text="height above where it has touched up to which a point of a loaded foot is in contact",
         )  # fmt: skip
         still_time: float = live_parameter(
-            0.01, unit="s", gt=0.0, text="a point of a loaded foot that is still for so long is in contact"
+            0.01,
+            unit="s",
+            gt=0.0,
+            text="a point of a loaded foot that is still for so long has touched",
         )
 
     Constants = FootLoadConstants
