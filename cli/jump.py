@@ -70,7 +70,7 @@ class TrialOptions:
     trial: Annotated[
         str,
         typer.Option(
-            help="nominal, standard, robust, real or uneven; by default as the graph says."
+            help="nominal, standard, robust, real, warm or uneven; by default as the graph says."
         ),
     ] = ""
     seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0

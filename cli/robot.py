@@ -103,13 +103,13 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
 
 def _show_effects(name: str, as_json: bool) -> None:
     """Print the effects that a simulated robot can have."""
-    from .shared.simulated_effects import effect_rows, simulated_effects
+    from .shared.simulated_effects import TRIAL, effect_rows, simulated_effects
 
     found = simulated_effects()
     if as_json:
-        print_json({"success": True, "name": name, "trial": "real", "effects": found})
+        print_json({"success": True, "name": name, "trial": TRIAL, "effects": found})
         return
-    columns = ("robot.", "unit", ">default", ">trial real", "source")
+    columns = ("robot.", "unit", ">default", f">trial {TRIAL}", "source")
     title = f"{name}: what can be simulated of a real robot"
     console().print(table(title, columns, list(effect_rows(found))))
 
@@ -436,7 +436,7 @@ def graph_values(
     weight, joint_pd = path("MassEstimator", "weight"), path("JointPD", "joint_pd")
     waiting = path("DelayEstimator", "delay")
     usual = run.header.parameters.get(f"{waiting}.usual", 0.001)
-    told = max(0.0, delay.delay.value - float(usual))
+    nominal = max(0.0, delay.delay.value - float(usual))
     index = {joint.name: k for k, joint in enumerate(robot.joints)}
     further = {
         name: max(0.0, value.value - float(robot.motors.friction[index[name]]))
@@ -453,7 +453,7 @@ def graph_values(
         + ", ".join(f"{1e3 * value.std:.1f}" for value in body.com_offset)
         + " mm",
         f"  {weight}.com_spread: {max(value.std for value in body.com_offset):.4f} m",
-        f"  {waiting}.told: {1e3 * told:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
+        f"  {waiting}.nominal: {1e3 * nominal:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
         f"  {joint_pd}.friction:  # beyond the description's [N m]",
         '    "*": 0',
         *(

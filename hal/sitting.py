@@ -19,7 +19,6 @@ from ..blocks.signals import (
     JointState,
 )
 from ..mathematics.arrays import Array
-from ..mathematics.constants import GRAVITY
 from ..robots.kinematics import contact_centres, link_poses
 from ..robots.robot_description import RobotDescription
 
@@ -150,7 +149,7 @@ class SitDown:
         self._start = np.array(joints.position)
         self._torque = np.array(joints.torque)
         height = -float(_places(robot, path.pose[:1])[0, :, 2].min())
-        weight = GRAVITY * robot.total_mass / max(1, len(robot.feet))
+        weight = robot.weight / max(1, len(robot.feet))
         self._stiffness = weight * height / _SINKING
         self._last = self._start.copy()
 

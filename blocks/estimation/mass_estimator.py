@@ -215,7 +215,7 @@ class MassEstimator(Block):
 
     def prepare(self) -> None:
         p, constants, period = self.params, self.constants, self.period
-        weight = self.robot.total_mass * GRAVITY
+        weight = self.robot.weight
         interval = max(1, round(p.interval / period))
         share = min(1.0, period / p.filter_time)
         constants.interval = interval

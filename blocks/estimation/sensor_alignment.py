@@ -79,7 +79,7 @@ class SensorAlignment(Block):
     Sensors measure, filter and send, each at its own pace: a reading that comes in tick t is of the time
     ``t - age``. All readings are brought to the time of the oldest, by linear interpolation between the
     samples before and after it, and ``StatePredictor`` predicts from there to the present: it must be told a
-    delay that is longer by the oldest age, by ``delay.told`` with ``delay.follow: told``. A filter counts with its
+    delay that is longer by the oldest age, by ``delay.nominal`` with ``delay.follow: nominal``. A filter counts with its
     delay of slow signals: its time constant, or d / (pi f) for one of second order with cutoff f and damping d.
 
     The IMU's readings are turned to the base's axes and brought to the base's origin, from r, where it is::

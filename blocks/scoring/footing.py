@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D, Vector3
-from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
 from ...robots.description import RobotDescription
@@ -57,7 +56,7 @@ class Footing:
 
     def __init__(self, robot: RobotDescription) -> None:
         self.foot_of_point = np.array(robot.foot_of_contact(), np.int64)
-        self.weight = float(robot.total_mass * GRAVITY)
+        self.weight = robot.weight
         self.standing_height = -float(standing_heights(robot).min())
         self._robot = robot
 

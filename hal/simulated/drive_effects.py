@@ -28,8 +28,9 @@ from ...robots.transmission import PLAY_TIME, PLAY_TORQUE, SLIDING_SPEED
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
-from .effects import EncoderEffects, MotorEffects
+from .effects import EncoderEffects, MotorEffects, WindingParameters
 from .state import PhysicsState
+from .windings import Windings
 
 
 class EncoderModel(NamedTuple):
@@ -154,17 +155,18 @@ class DriveEffects:
         encoders, motors: the sizes of the effects.
         seed: draws what differs from motor to motor.
         timestep: of the physics [s].
-        memory: of late readings, filters and current loops.
+        memory: of late readings, filters, current loops and windings.
+        windings: that warm; none: they do not.
     """
 
     def __init__(
         self, robot: RobotDescription, encoders: EncoderEffects, motors: MotorEffects, seed: int,
-        timestep: float, memory: PhysicsState,
+        timestep: float, memory: PhysicsState, windings: WindingParameters | None = None,
     ) -> None:  # fmt: skip
         n = len(robot.joints)
         self._memory, self._count = memory, n
         self.has_encoders = encoders != EncoderEffects()
-        self.has_motors = motors != MotorEffects()
+        self.has_motors = motors != MotorEffects() or windings is not None
         time = encoders.velocity_filter
         turn = 2.0 * math.pi
         self._encoders = EncoderModel(
@@ -177,14 +179,18 @@ class DriveEffects:
         self.torque_constant = motors.torque_constant * (
             1.0 + motors.torque_constant_spread * draws
         )
-        """The factor on the torque constant of every motor, (n,)."""
+        """The factor on the torque constant of every motor at its nominal temperature, (n,)."""
+        self.windings = None
+        if windings is not None:
+            self.windings = Windings(windings, robot, self.torque_constant, timestep, memory)
+        constant = self.torque_constant if self.windings is None else self.windings.warm.constant
         band = motors.current_bandwidth
         self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
         """By how much [s] a drive's loop is late beside that of an ideal drive."""
         limit = math.inf if motors.torque_limit is None else motors.torque_limit
         self._motors = DrawnMotors(
             np.ascontiguousarray(robot.joint_to_motor),
-            np.ascontiguousarray(robot.joint_to_motor.T), self.torque_constant,
+            np.ascontiguousarray(robot.joint_to_motor.T), constant,
             motors.saturation, np.array(robot.motors.peak_torque),
             -math.expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
             motors.ripple * robot.motors.peak_torque, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
@@ -194,7 +200,11 @@ class DriveEffects:
 
     @staticmethod
     def dimensions(
-        robot: RobotDescription, encoders: EncoderEffects, motors: MotorEffects, timestep: float
+        robot: RobotDescription,
+        encoders: EncoderEffects,
+        motors: MotorEffects,
+        timestep: float,
+        windings: WindingParameters | None = None,
     ) -> Mapping[str, int]:
         """The sizes of what is kept in ``PhysicsState``."""
         n = len(robot.joints)
@@ -202,7 +212,8 @@ class DriveEffects:
         return {
             "n_sensed_joints": n if sensed else 0,
             "n_encoder_slots": round(encoders.delay / timestep) + 1 if sensed else 0,
-            "n_real_motors": n if motors != MotorEffects() else 0,
+            "n_real_motors": n if motors != MotorEffects() or windings is not None else 0,
+            "n_windings": n if windings is not None else 0,
         }
 
     def sensing(self, position: Array, velocity: Array, torque: Array) -> KernelCall:

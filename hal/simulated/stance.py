@@ -474,7 +474,7 @@ def holding_gains(model: MjModel, robot: RobotDescription, lag: float = 0.0) -> 
         for foot in robot.feet:
             legs |= joints_above(robot, foot.link)
         height = float(standing_com(robot)[2] - standing_heights(robot).min())
-        needed = _two_digits(GRAVITY_SHARE * robot.total_mass * GRAVITY * max(height, 0.01))
+        needed = _two_digits(GRAVITY_SHARE * robot.weight * max(height, 0.01))
         stiffness[legs], damping[legs] = needed, DAMPING_TIME * needed
     step = float(model.opt.timestep) + lag
     return np.minimum(stiffness, 0.25 * free / step**2), np.minimum(damping, free / step)

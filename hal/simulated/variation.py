@@ -89,8 +89,7 @@ def draw_pull(
     cable: CableParameters, seed: int, robot: RobotDescription
 ) -> tuple[float, float, float]:
     """The force of a cable [N, world]."""
-    weight = robot.total_mass * GRAVITY
-    pull, hanging = cable.pull * weight, cable.weight * weight
+    pull, hanging = cable.pull * robot.weight, cable.weight * robot.weight
     heading = 2.0 * math.pi * float(stream(seed, Purpose.CABLE).random())
     return pull * math.cos(heading), pull * math.sin(heading), -hanging
 
