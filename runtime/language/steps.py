@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping
-from functools import partial
+from functools import cache, partial
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -246,6 +246,7 @@ def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
     )
 
 
+@cache
 def names_used(function: FunctionType) -> frozenset[str]:
     """All attributes that a kernel and those that it calls name."""
     marked = {id(each) for each in kernels().values()}
