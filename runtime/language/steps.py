@@ -239,7 +239,7 @@ def call_of(block: Block, function: Callable[..., object]) -> KernelCall | Pytho
 
 def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
     """The call of a kernel with these arguments, in their order; it gets of signals what it reads."""
-    used = names_used(function)  # type: ignore[arg-type]
+    used = names_used(function)
     return KernelCall(
         function,
         *(as_record(each, used) if isinstance(each, Signal) else each for each in arguments),
