@@ -16,6 +16,7 @@ from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
 from .shared.robot_bench import add_bench_verbs
 from .shared.robot_calibration import calibrate
+from .shared.robot_reach import reach
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,6 +36,7 @@ robot = typer.Typer(
 add_bench_verbs(robot)
 robot.command("calibrate")(calibrate)
 robot.command("bring-up")(bring_up)
+robot.command("reach")(reach)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
