@@ -34,12 +34,14 @@ class AskedJump:
         task: changes of that graph's task.
         times: how often it is made by a robot that learns.
         sets: further parameters of the graph.
+        behind: a shipped file that the graph includes behind all others.
     """
 
     task: Mapping[str, Any]
     graph: str = ALONE
     times: int = TIMES
     sets: Mapping[str, Any] = field(default_factory=dict)
+    behind: str = ""
     robot: str = "bruce"
 
     @property
@@ -64,7 +66,8 @@ ASKED: Mapping[str, AskedJump] = {
 }
 """The jumps of every robot, in their order."""
 RANDOM, PUSH, TEN = "random task", "pushed in flight", "ten in a row"
-EVERY = (*ASKED, RANDOM, PUSH, TEN)
+SEEN = "ten in a row, place measured"
+EVERY = (*ASKED, RANDOM, PUSH, TEN, SEEN)
 """All that is asked for, in the order in which a robot does it."""
 
 
@@ -91,11 +94,13 @@ def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
     if robot != "bruce":
         return ASKED_OF_OTHERS[robot]
     angle = math.radians(PUSHES[seed % len(PUSHES)])
+    ten: dict[str, Any] = {"rise": 0.06, "repeat": 10}
     return {
         **ASKED,
         RANDOM: AskedJump(random_task(seed), times=4),
         PUSH: AskedJump({"rise": 0.12}, "push_12cm.yaml", 1, {"push.angle": angle}),
-        TEN: AskedJump({"rise": 0.06, "repeat": 10}, "hops.yaml", 1),
+        TEN: AskedJump(ten, "hops.yaml", 1),
+        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/place_sensor.yaml"),
     }
 
 
