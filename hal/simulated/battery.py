@@ -14,6 +14,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import expm1
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
@@ -109,7 +110,7 @@ class Battery:
         if warm is not None:
             curves = (warm.slope, warm.no_load, warm.heating)
         self._pack = Pack(
-            p.open_voltage, p.resistance, -math.expm1(-timestep / params.recovery_time),
+            p.open_voltage, p.resistance, -expm1(-timestep / params.recovery_time),
             p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage, timestep,
             *curves,
         )  # fmt: skip

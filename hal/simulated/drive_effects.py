@@ -21,6 +21,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Array1D, Array2D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import expm1, sin, tanh
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
@@ -67,10 +68,10 @@ def sense_joints(
     """
     for k in range(position.shape[0]):
         reading = position[k] + model.compliance * torque[k]
-        end = model.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
+        end = model.play[k] * tanh(torque[k] / PLAY_TORQUE)
         memory.encoder_play[k] += model.crossing * (end - memory.encoder_play[k])
         reading += memory.encoder_play[k]
-        reading += model.eccentricity * math.sin(position[k] + model.phase[k])
+        reading += model.eccentricity * sin(position[k] + model.phase[k])
         scratch.position[k] = reading
     scratch.counts[0] = memory.encoder_taken[0]
     delay_sample(
@@ -137,11 +138,11 @@ def produce_torque(
         if model.peak[k] > 0.0:
             load = min(abs(given) / model.peak[k], 1.0)
         given *= model.constant[k] * (1.0 - model.saturation * load * load)
-        given -= model.friction * abs(given) * math.tanh(scratch.speed[k] / SLIDING_SPEED)
+        given -= model.friction * abs(given) * tanh(scratch.speed[k] / SLIDING_SPEED)
         turned = model.periods * scratch.angle[k] + model.phase[k]
-        given += model.ripple[k] * math.sin(turned)
+        given += model.ripple[k] * sin(turned)
         turned = model.teeth * scratch.angle[k] + model.at_tooth[k]
-        given += model.cogging[k] * math.sin(turned)
+        given += model.cogging[k] * sin(turned)
         scratch.gained[k] = given - requested[k]
     multiply_vector(model.to_joint, scratch.gained, scratch.joint)
     torque[:] += scratch.joint
@@ -171,9 +172,9 @@ class DriveEffects:
         turn = 2.0 * math.pi
         self._encoders = EncoderModel(
             np.full(n, round(encoders.delay / timestep)),
-            -math.expm1(-timestep / time) if time > 0.0 else 1.0,
+            -expm1(-timestep / time) if time > 0.0 else 1.0,
             encoders.eccentricity, turn * stream(seed, Purpose.ECCENTRICITY).random(n),
-            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -math.expm1(-timestep / PLAY_TIME),
+            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -expm1(-timestep / PLAY_TIME),
         )  # fmt: skip
         draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
         self.torque_constant = motors.torque_constant * (
@@ -192,7 +193,7 @@ class DriveEffects:
             np.ascontiguousarray(robot.joint_to_motor),
             np.ascontiguousarray(robot.joint_to_motor.T), constant,
             motors.saturation, np.array(robot.motors.peak_torque),
-            -math.expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
+            -expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
             motors.ripple * robot.motors.peak_torque, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
             motors.load_friction, motors.cogging * robot.motors.peak_torque, motors.cogging_periods,
             turn * stream(seed, Purpose.COGGING).random(n),
