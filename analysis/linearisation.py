@@ -15,7 +15,6 @@ is named in ``Linearisation.held`` and ``Linearisation.uncertain``.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -30,9 +29,10 @@ from ..mathematics.arrays import Array, Flags
 from ..runtime.background.background_block import BackgroundBlock
 from ..runtime.graph import Graph, load
 from ..runtime.language.errors import AloftError
-from ..runtime.running.memory import BoundGraph, Region
+from ..runtime.running.memory import Region
 from ..runtime.running.stepping import SteppedRun
 from .coordinates import Coordinates, bus_coordinates, signal_coordinates, state_coordinates
+from .instant import bound_graph, go_to
 from .period import Period
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ TOLERANCE = 1e-6
 """The relative error of a column at which no other step is tried."""
 KINK = 1e-2
 """The relative difference of the slopes ahead and behind at which a column is called uncertain."""
-_CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<value>\S+)\s*$")
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ def linearise(
     """
     if isinstance(graph, SteppedRun):
         run = graph
-        _go(run, at, when)
+        go_to(run, at, when)
         before = run.snapshot()
         try:
             return _linearise(run, _texts(inputs), _texts(outputs), opened)
@@ -227,75 +226,6 @@ def linearise(
 
 def _texts(names: str | Sequence[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
-
-
-def _go(run: SteppedRun, at: float | None, when: str) -> None:
-    """Step to the instant. Raises ``AloftError`` where the run does not come to it."""
-    if at is not None:
-        ticks = round(at * run.graph.base_rate) - run.tick
-        if ticks < 0:
-            raise AloftError(f"the run is at {run.time:g} s already, beyond {at:g} s")
-        if ticks and run.step(ticks) < ticks:
-            raise AloftError(f"the run ended at {run.time:g} s, before {at:g} s: {run.reason}")
-    if when:
-        holds = _condition(run, when)
-        if run.tick == 0:
-            run.step()
-        while not holds():
-            if not run.step():
-                raise AloftError(
-                    f"{when!r} never held: the run ended at {run.time:g} s: {run.reason}"
-                )
-    if run.tick == 0:
-        run.step()  # before the first tick no signal has a value
-
-
-def _condition(run: SteppedRun, text: str) -> Any:
-    """A function that says whether a condition holds. Raises ``AloftError`` if it cannot be read."""
-    match = _CONDITION.match(text)
-    bound = bound_graph(run)
-    fields = {field.name: field for field in recorded_signals(bound)}
-    if match is None:
-        raise AloftError(f"{text!r} is no condition; write block.port.field == value")
-    name, sign, value = match["name"], match["sign"], match["value"]
-    base, _, index = name.partition("[")
-    if base not in fields:
-        same = [each for each in fields if each.rpartition(".")[0] == base]
-        named = [each for each in fields if each.startswith(f"{base.rpartition('.')[0]}.") and each.endswith(f".{base.rpartition('.')[2]}")]  # fmt: skip
-        found = same if len(same) == 1 else named
-        if len(found) != 1:
-            from difflib import get_close_matches
-
-            near = ", ".join(found or get_close_matches(base, fields, 3, 0.0))
-            raise AloftError(f"there is no one signal {base!r}; there is {near}")
-        base = found[0]
-    declared = fields[base]
-    numbers = {each: number for number, each in declared.values.items()}
-    known: dict[str, float] = {"true": 1.0, "false": 0.0, **numbers}
-    try:
-        wanted = known[value.lower()] if value.lower() in known else float(value)
-    except ValueError:
-        raise AloftError(
-            f"{value!r} is no value of {base}; it has {', '.join(numbers) or 'numbers'}"
-        ) from None
-    from ..runtime.loading.reading.selection import Selection, select
-
-    try:
-        indices = (index.removesuffix("]"),) if index else ()
-        place = select(Selection("", indices), declared.shape).reshape(-1)
-    except ValueError as error:
-        raise AloftError(f"{name}: {error}") from error
-    if len(place) != 1:
-        raise AloftError(f"{base} has {len(place)} elements; say which, as {base}[0]")
-    flat = bound.memory.bus.field(base, writable=False).reshape(-1)
-    compare = {"==": np.equal, "!=": np.not_equal, "<": np.less, "<=": np.less_equal,
-               ">": np.greater, ">=": np.greater_equal}[sign]  # fmt: skip
-    return lambda: bool(compare(flat[place[0]], wanted))
-
-
-def bound_graph(run: SteppedRun) -> BoundGraph:
-    """The bound graph of a run that is stepped."""
-    return run._bound
 
 
 def _linearise(

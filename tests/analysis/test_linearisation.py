@@ -9,7 +9,7 @@ import pytest
 import aloft
 from aloft.analysis import linearise
 from aloft.analysis.coordinates import signal_coordinates
-from aloft.analysis.linearisation import bound_graph
+from aloft.analysis.instant import bound_graph
 from aloft.analysis.period import Period
 from aloft.logs.file.header import recorded_signals
 
