@@ -18,7 +18,7 @@ from .background import background
 from .courses import courses
 from .driver import driver
 from .every_robot import every_robot
-from .frontier.frontier import frontier
+from .frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.jumps import jumps
 from .jumps.known_effects import known_effects

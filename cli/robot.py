@@ -16,6 +16,7 @@ from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
 from .shared.robot_bench import add_bench_verbs
 from .shared.robot_calibration import calibrate
+from .shared.robot_reach import reach
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,6 +36,7 @@ robot = typer.Typer(
 add_bench_verbs(robot)
 robot.command("calibrate")(calibrate)
 robot.command("bring-up")(bring_up)
+robot.command("reach")(reach)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
@@ -103,13 +105,13 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
 
 def _show_effects(name: str, as_json: bool) -> None:
     """Print the effects that a simulated robot can have."""
-    from .shared.simulated_effects import effect_rows, simulated_effects
+    from .shared.simulated_effects import TRIAL, effect_rows, simulated_effects
 
     found = simulated_effects()
     if as_json:
-        print_json({"success": True, "name": name, "trial": "real", "effects": found})
+        print_json({"success": True, "name": name, "trial": TRIAL, "effects": found})
         return
-    columns = ("robot.", "unit", ">default", ">trial real", "source")
+    columns = ("robot.", "unit", ">default", f">trial {TRIAL}", "source")
     title = f"{name}: what can be simulated of a real robot"
     console().print(table(title, columns, list(effect_rows(found))))
 
@@ -436,7 +438,7 @@ def graph_values(
     weight, joint_pd = path("MassEstimator", "weight"), path("JointPD", "joint_pd")
     waiting = path("DelayEstimator", "delay")
     usual = run.header.parameters.get(f"{waiting}.usual", 0.001)
-    told = max(0.0, delay.delay.value - float(usual))
+    nominal = max(0.0, delay.delay.value - float(usual))
     index = {joint.name: k for k, joint in enumerate(robot.joints)}
     further = {
         name: max(0.0, value.value - float(robot.motors.friction[index[name]]))
@@ -453,7 +455,7 @@ def graph_values(
         + ", ".join(f"{1e3 * value.std:.1f}" for value in body.com_offset)
         + " mm",
         f"  {weight}.com_spread: {max(value.std for value in body.com_offset):.4f} m",
-        f"  {waiting}.told: {1e3 * told:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
+        f"  {waiting}.nominal: {1e3 * nominal:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
         f"  {joint_pd}.friction:  # beyond the description's [N m]",
         '    "*": 0',
         *(

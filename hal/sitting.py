@@ -19,7 +19,7 @@ from ..blocks.signals import (
     JointState,
 )
 from ..mathematics.arrays import Array
-from ..mathematics.constants import GRAVITY
+from ..mathematics.elementary import cos
 from ..robots.kinematics import contact_centres, link_poses
 from ..robots.robot_description import RobotDescription
 
@@ -150,13 +150,13 @@ class SitDown:
         self._start = np.array(joints.position)
         self._torque = np.array(joints.torque)
         height = -float(_places(robot, path.pose[:1])[0, :, 2].min())
-        weight = GRAVITY * robot.total_mass / max(1, len(robot.feet))
+        weight = robot.weight / max(1, len(robot.feet))
         self._stiffness = weight * height / _SINKING
         self._last = self._start.copy()
 
     def command(self, tick: int, command: JointCommand) -> None:
         """Write the command of a tick, from 1 to ``ticks``."""
-        share = 0.5 - 0.5 * math.cos(math.pi * tick / self.ticks)
+        share = 0.5 - 0.5 * cos(math.pi * tick / self.ticks)
         depths, poses = self._path
         depth = share * depths[-1]
         k = max(1, int(np.searchsorted(depths, depth)))

@@ -158,7 +158,7 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
         f"  timing.velocity: {age(found.velocity_age)}",
         f"  timing.imu_position: {triple(found.imu_position, 'mm', 1e3)}",
         f"  timing.imu_rotation: {triple(found.imu_rotation, 'mrad', 1e3)}",
-        f"  delay.told: {1e3 * (delay + oldest):.3f} ms",
+        f"  delay.nominal: {1e3 * (delay + oldest):.3f} ms",
         "  timing.play:  # [rad]",
         *_rows(found.play, {name: bounded(v, 0.0) for name, v in found.play.items()}),
         "  robot.motor_model.torque_constant:",

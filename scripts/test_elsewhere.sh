@@ -48,7 +48,7 @@ for text in told["project"]["dependencies"]:
     name, oldest = re.match(r"([\w.-]+)>=([\d.]+)", text).groups()
     exact = f"{name}~={oldest}.0" if oldest.count(".") == 1 else f"{name}=={oldest}"
     print(exact if sys.argv[1] == "oldest" else text)
-for_tests = "pytest", "pytest-xdist", "hypothesis", "jsonschema", "quadprog", "scipy"
+for_tests = "pytest", "pytest-xdist", "hypothesis", "mpmath", "jsonschema", "quadprog", "scipy"
 for_tests += "setuptools", "example-robot-data"
 for text in told["dependency-groups"]["dev"]:
     if text.partition(">=")[0] in for_tests:

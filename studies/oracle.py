@@ -39,7 +39,7 @@ CALIBRATED = CalibrationErrors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
 """What the calibration is meant to reach."""
 
 
-def told_values(
+def oracle_values(
     graph: Graph, errors: CalibrationErrors = EXACT, block: str = "robot", seed: int = 0
 ) -> dict[str, Any]:
     """The parameters of the controller, as overrides of the graph.
@@ -113,7 +113,7 @@ def _ages(
     loop = 0.0 if band is None else 1.0 / (2.0 * math.pi * band)
     told = zip(ReadingAges._fields, ages, strict=True)
     return {f"timing.{name}": float(age) for name, age in told} | {
-        "delay.told": float(params.latency + loop + ages.max())
+        "delay.nominal": float(params.latency + loop + ages.max())
     }
 
 

@@ -3,7 +3,7 @@
 In virtual time (``runtime/testing/spread``): both parts tick at 500 Hz at phases drawn from the
 seed. Every message takes the same time; or, with jitter, up to so much longer, so that messages may
 overtake each other; and, with loss, a share of them never comes. All of that is drawn from the
-seed, for each link by itself. The controller is told what it has to expect: the robot's own delay,
+seed, for each link by itself. Its ``nominal`` delay is what it has to expect: the robot's own delay,
 the links' both ways with half of the jitter, and half a period of waiting at each end.
 """
 
@@ -26,12 +26,12 @@ GOAL = 5.0
 ROBOT_DELAY, PERIOD = 0.002, 0.002
 SETTINGS = (
     "links.mode=free", "links.max_age=50 ms", "links.late=hold", "clock.kind=paced",
-    "delay.follow=told",
+    "delay.follow=nominal",
 )  # fmt: skip
 
 
-def told(delay: float, jitter: float = 0.0) -> float:
-    """The delay [s] that the controller is told, for links that take from ``delay`` to
+def expected_delay(delay: float, jitter: float = 0.0) -> float:
+    """The delay [s] that the controller expects, for links that take from ``delay`` to
     ``delay + jitter`` each way [s]."""
     return ROBOT_DELAY + 2.0 * delay + jitter + PERIOD
 
@@ -39,7 +39,7 @@ def told(delay: float, jitter: float = 0.0) -> float:
 def jump(delay: float, seed: int, jitter: float = 0.0, loss: float = 0.0) -> VirtualRun:
     """One jump with links that take from ``delay`` to ``delay + jitter`` each way [s], and lose the
     share ``loss`` of their messages."""
-    settings = [*SETTINGS, f"robot.seed={seed}", f"delay.told={told(delay, jitter)!r}"]
+    settings = [*SETTINGS, f"robot.seed={seed}", f"delay.nominal={expected_delay(delay, jitter)!r}"]
     graph = load(GRAPH, settings)
     phase = float(np.random.default_rng(seed).random())
     return run_virtual(graph, travel(delay, jitter, loss, seed), {"ground": phase})
@@ -82,7 +82,7 @@ def link_delays(
             if not run.success:
                 failed.append(f"{seed}: {run.reason}")
         succeeded = f"{len(seeds) - len(failed)} of {len(seeds)} succeed"
-        note = f"{succeeded}, told {told(delay, jitter) * 1e3:g} ms"
+        note = f"{succeeded}, nominally {expected_delay(delay, jitter) * 1e3:g} ms"
         longest = f" to {(delay + jitter) * 1e3:g}" if jitter else ""
         rows.append(
             Row(f"jumps that fail, links of {delay * 1e3:g}{longest} ms each way{beside}",

@@ -37,8 +37,12 @@ class DelayMemory(Signal):
 class DelayEstimatorParameters(Parameters):
     """The parameters of ``DelayEstimator``."""
 
-    told: float = parameter(0.002, unit="s", ge=0.0, le=0.02, text="the delay that the graph says")
-    follow: Literal["measured", "told"] = parameter("measured", text="which of both is the output")
+    nominal: float = parameter(
+        0.002, unit="s", ge=0.0, le=0.02, text="the delay by what the graph says"
+    )
+    follow: Literal["measured", "nominal"] = parameter(
+        "measured", text="which of both is the output"
+    )
     duration: float = parameter(
         0.6, unit="s", gt=0.0, text="the first part of a run, in which it is measured"
     )
@@ -90,10 +94,10 @@ class DelayEstimator(Block):
     change of the commands explains at least ``least_match`` of the change of the torques, so only
     while the drives get torques and no joint feedback.
 
-    ``told`` is what the graph says: ``{from: robot.delay}`` is what the robot's driver or the
+    ``nominal`` is what the graph says: ``{from: robot.delay}`` is what the robot's driver or the
     simulator says. With ``follow: measured`` the output is the measured delay as soon as it counts,
-    less ``usual``, by which it is longer than what is told where that is right, and at first and
-    otherwise what is told. With ``follow: told`` it is always that. The result of a run has a
+    less ``usual``, by which it is longer than the nominal one where that is right, and at first and
+    otherwise the nominal one. With ``follow: nominal`` it is always that. The result of a run has a
     warning where both differ by more than ``tolerance``.
 
     **Ahead.** Feedback bears a short delay, a long one takes its phase margin. Of a task with the gains
@@ -136,7 +140,7 @@ class DelayEstimator(Block):
     ) -> None:
         estimate.measured = max(memory.delay, 0.0)
         estimate.known = memory.delay >= 0.0
-        estimate.delay = params.told
+        estimate.delay = params.nominal
         if estimate.known and params.follow == "measured":
             estimate.delay = max(memory.delay - params.usual, 0.0)
         estimate.ahead = max(estimate.delay - params.tolerated, 0.0)
@@ -169,22 +173,22 @@ class DelayEstimator(Block):
             solve_delay(memory, params, period)
 
     def metrics(self) -> Mapping[str, Metric]:
-        """What was told and measured."""
-        values: dict[str, Metric] = {"delay_told_ms": 1e3 * self.params.told}
+        """The nominal and the measured delay."""
+        values: dict[str, Metric] = {"delay_nominal_ms": 1e3 * self.params.nominal}
         if self.memory.delay >= 0.0:
             values["delay_measured_ms"] = 1e3 * float(self.memory.delay)
         return values
 
     def warnings(self) -> Sequence[str]:
-        """Say where the measured delay is not the one that was told."""
+        """Say where the measured delay is not the nominal one."""
         p, measured = self.params, float(self.memory.delay)
-        if measured < 0.0 or abs(measured - p.usual - p.told) <= p.tolerance:
+        if measured < 0.0 or abs(measured - p.usual - p.nominal) <= p.tolerance:
             return ()
         followed = "is compensated" if p.follow == "measured" else "is not compensated"
         return (
             (
                 f"the delay from sensing to torque is {1e3 * measured:.1f} ms as measured, which "
-                f"{followed}, and {1e3 * p.told:g} ms as told; correct `told` or the robot's delay"
+                f"{followed}, and {1e3 * p.nominal:g} ms nominally; correct `nominal` or the robot's delay"
             ),
         )
 

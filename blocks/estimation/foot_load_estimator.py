@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 
 from ...mathematics.arrays import Array1D, Indices1D
-from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import solve_positive
 from ...robots.description import RobotDescription
@@ -122,7 +121,7 @@ class FootLoadEstimator(Block):
         constants.leg_joints[:] = leg_joints(robot)
 
     def prepare(self) -> None:
-        p, weight = self.params, self.robot.total_mass * GRAVITY
+        p, weight = self.params, self.robot.weight
         self.constants.following = min(1.0, self.period / p.filter_time)
         self.constants.least[:] = min(p.end, p.begin) * weight, p.begin * weight
 

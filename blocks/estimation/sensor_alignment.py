@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D
 from ...mathematics.compiling.expressions import cross
+from ...mathematics.elementary import expm1, tanh
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import exponential, rotate
 from ...robots.transmission import PLAY_TIME, PLAY_TORQUE
@@ -79,7 +78,7 @@ class SensorAlignment(Block):
     Sensors measure, filter and send, each at its own pace: a reading that comes in tick t is of the time
     ``t - age``. All readings are brought to the time of the oldest, by linear interpolation between the
     samples before and after it, and ``StatePredictor`` predicts from there to the present: it must be told a
-    delay that is longer by the oldest age, by ``delay.told`` with ``delay.follow: told``. A filter counts with its
+    delay that is longer by the oldest age, by ``delay.nominal`` with ``delay.follow: nominal``. A filter counts with its
     delay of slow signals: its time constant, or d / (pi f) for one of second order with cutoff f and damping d.
 
     The IMU's readings are turned to the base's axes and brought to the base's origin, from r, where it is::
@@ -180,9 +179,9 @@ def take_off_play(
     period: float,
 ) -> None:
     """Take off joint angles [rad] what the gears' play adds to them, by the torques that were measured with them."""
-    share = -math.expm1(-period / PLAY_TIME)
+    share = -expm1(-period / PLAY_TIME)
     for k in range(position.shape[0]):
-        end = constants.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
+        end = constants.play[k] * tanh(torque[k] / PLAY_TORQUE)
         memory.play[k] += share * (end - memory.play[k])
         position[k] -= memory.play[k]
 

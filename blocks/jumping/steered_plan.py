@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
+from ...mathematics.elementary import atan2, cos, sin, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, turn_about_vertical
 from ...planner.library.jump_table import (
@@ -272,11 +272,11 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     memory.requests += 1
     memory.waits = True
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
-    cosine, sine = math.cos(heading), math.sin(heading)
+    sine, cosine = sincos(heading)
     turn = memory.goal_heading - heading
     memory.asked[0] = cosine * x + sine * y
     memory.asked[1] = cosine * y - sine * x
-    memory.asked[2] = math.atan2(math.sin(turn), math.cos(turn))
+    memory.asked[2] = atan2(sin(turn), cos(turn))
 
 
 @kernel
@@ -291,7 +291,7 @@ def tell_request(memory: SteeringState, request: PlanRequest) -> None:
 @kernel
 def move(memory: SteeringState, ahead: float, aside: float, turn: float) -> None:
     """Move the goal by a jump."""
-    cosine, sine = math.cos(memory.goal_heading), math.sin(memory.goal_heading)
+    sine, cosine = sincos(memory.goal_heading)
     memory.goal[0] += cosine * ahead - sine * aside
     memory.goal[1] += sine * ahead + cosine * aside
     memory.goal_heading += turn
@@ -347,7 +347,7 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
 def tell_goal(memory: SteeringState, outcome: int, goal: CourseGoal) -> None:
     """The goal from where the robot stood at the start."""
     x, y = memory.goal[0] - memory.start[0], memory.goal[1] - memory.start[1]
-    cosine, sine = math.cos(memory.start_heading), math.sin(memory.start_heading)
+    sine, cosine = sincos(memory.start_heading)
     goal.position[0] = cosine * x + sine * y
     goal.position[1] = cosine * y - sine * x
     goal.heading = memory.goal_heading - memory.start_heading

@@ -12,7 +12,6 @@ from ...blocks.signals import ImuReading, JointState
 from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indices1D, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...robots.robot_description import MountedSensorPart
@@ -184,7 +183,7 @@ class SimulatedSensors:
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
         limits, points = params.switch_threshold, max(1, len(robot.contacts))
         if params.switches.threshold is not None:
-            load = robot.total_mass * GRAVITY / points
+            load = robot.weight / points
             limits = [load * share for share in params.switches.threshold]
         self.switch_threshold = SwitchSensors.draw_thresholds(
             limits, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
 from .drawing import ChangedRows, Moments, ScenePart, ThinnedRows
@@ -37,7 +36,7 @@ ABOVE_GROUND = 0.001
 
 def force_scale(robot: RobotDescription) -> float:
     """The length of a force arrow for each newton [m/N]: small robots have small forces."""
-    return WEIGHT_ARROW * reach_of(robot) / (GRAVITY * robot.total_mass)
+    return WEIGHT_ARROW * reach_of(robot) / robot.weight
 
 
 def force_arrows(robot: RobotDescription, force: Array) -> Array:
@@ -164,11 +163,6 @@ AFTER_TOUCHDOWN = 0.1
 """How long after a touchdown its peak is looked for [s]."""
 
 
-def weight_of(robot: RobotDescription) -> float:
-    """The robot's weight [N]."""
-    return GRAVITY * robot.total_mass
-
-
 def loads_on_feet(robot: RobotDescription, force: Array) -> Array:
     """The vertical force on each foot [N], (n, n_feet), of forces on contacts (n, n_contacts, 3)."""
     foot = np.array(robot.foot_of_contact())
@@ -215,7 +209,7 @@ class FootForces:
             ticks, loads = self._picker.pick(ticks, loads)
         self._send(FOOT_FORCE, ticks, loads)
         ends = batch.ticks[[0, -1]] if len(batch.ticks) > 1 else batch.ticks
-        self._send(WEIGHT, ends, np.full((len(ends), 1), weight_of(self._robot)))
+        self._send(WEIGHT, ends, np.full((len(ends), 1), self._robot.weight))
 
     def write_rest(self) -> None:
         """Write the last loads, if they were constant in the end."""
@@ -258,7 +252,7 @@ class LandingPeaks:
                 self._left -= 1
                 if not self._left and self._peak[2]:
                     force_, when, foot = self._peak
-                    weights = force_ / weight_of(self._robot)
+                    weights = force_ / self._robot.weight
                     text = f"landing: {force_:.0f} N on {foot}, {weights:.1f} times the weight"
                     events.append((when, text))
         return events

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..file.format import LIMITS, SIGNALS, Header, RecordedField, entity_of
-from .contacts import FOOT_FORCE, RANGE, WEIGHT, weight_of
+from .contacts import FOOT_FORCE, RANGE, WEIGHT
 from .scene_ports import ScenePorts, block_of, ports_of
 from .signal_names import AXES, element_names, unit_of
 
@@ -151,7 +151,7 @@ def feet_plot(header: Header, shown: Sequence[ShownRun]) -> Any:
     import rerun.blueprint as rrb
 
     assert header.robot is not None
-    names, weight = [foot.name for foot in header.robot.feet], weight_of(header.robot)
+    names, weight = [foot.name for foot in header.robot.feet], header.robot.weight
     overrides = {}
     for run in shown[1:]:
         thin = rr.SeriesLines(

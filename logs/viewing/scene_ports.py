@@ -43,7 +43,7 @@ IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
     "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
-    "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate",
+    "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
     "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SwitchHealth",
     "WholeBodyTarget",
 )  # fmt: skip

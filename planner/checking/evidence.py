@@ -222,11 +222,6 @@ class Evidence:
         planner's model is the robot made the same left and right."""
         return nearly if self.asymmetric else exact
 
-    @property
-    def weight(self) -> float:
-        """The robot's weight [N]."""
-        return GRAVITY * self.robot.total_mass
-
     @cached_property
     def motor_torque(self) -> Array:
         """Motor torques at the samples [N m], by exact dynamics, (n, n_joints)."""

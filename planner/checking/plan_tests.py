@@ -89,7 +89,7 @@ def discretisation(e: Evidence) -> Iterator[PlanTestResult]:
         (
             "force_balance",
             wrench,
-            e.model_error(1e-3, 1e-3 * e.weight),
+            e.model_error(1e-3, 1e-3 * e.robot.weight),
             "N or N m",
             "what forces miss in an interval's middle",
         ),

@@ -36,7 +36,7 @@ def ballistic_guess(problem: FullProblem) -> Array:
     stands again; the weight is shared equally by the contact points."""
     coordinates, assembly = problem.coordinates, problem.assembly
     n = coordinates.size
-    weight = problem.model.robot.total_mass * GRAVITY / len(problem.model.robot.contacts)
+    weight = problem.model.robot.weight / len(problem.model.robot.contacts)
     every = len(coordinates.axes)
     falling = coordinates.reduce(np.where(np.arange(problem.model.size) == 2, -GRAVITY, 0.0))
     guess = np.zeros(assembly.variables)

@@ -326,6 +326,6 @@ class PaperProblemBuilder:
             self.fill.guess[control + 3 : control + 6] = turn[[4, 3, 5]]
             self.fill.guess[control + self.nv + 2] = -GRAVITY
             return
-        share = self.model.robot.total_mass * GRAVITY * 3.0 / self.forces
+        share = self.model.robot.weight * 3.0 / self.forces
         begin = control + self.nv + 3
         self.fill.guess[begin + 2 : begin + self.forces : 3] = share

@@ -342,7 +342,7 @@ class ProblemBuilder:
 
     def _fill_obstacle(self, k: int) -> None:
         hop, place, edge = self.structure.hop_at(k)
-        stretch, obstacles = self.of_knot[k], self.structure.obstacles
+        stretch, obstacles = self.structure.phase_at(k), self.structure.obstacles
         share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
         end = self.structure.places[min(stretch.place + 1, len(self.hops))]
         self._set("obstacle", k, **step_parameters(hop, edge, place, end, share, self.leans))

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ...hal.simulated.scenes import flat
 from ...logs.file.reader import RecordedRun
+from ...logs.viewing.contacts import force_scale
 from ...logs.viewing.scene_ports import scene_ports
 from ...mathematics.arrays import Array
-from ...mathematics.constants import GRAVITY
 from ...robots.kinematics import link_poses
 from ...runtime.language.errors import AloftError
 from .offscreen import Offscreen, Pixels, View
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".mp4", ".png")
-WEIGHT_ARROW = 0.5
-"""The arrow of a force as large as the robot's weight, as a share of the distance at which the robot stands."""
 FRAMING = 3.0
 """The camera's distance, in sizes of the robot: the largest extent of its links' origins at the start."""
 FOLLOW_WINDOW = 0.5
@@ -86,7 +84,7 @@ class Take:
         if camera.forces and ports.push:
             self._push = run[f"{ports.push}.point"], run[f"{ports.push}.force"]
         standing = max(float(self.base[0, 2]), 0.3)
-        self._arrow = WEIGHT_ARROW * standing / (robot.total_mass * GRAVITY)
+        self._arrow = force_scale(robot)
         self._phases = _named_phase(run)
         self._camera = camera
         self._middle = _smoothed(self.base, self.time) if camera.follow else None

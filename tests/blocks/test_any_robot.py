@@ -32,7 +32,7 @@ def standing_terms(robot):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_whole_body_controller_carries_any_robot_on_any_of_its_points(name):
     robot = find_robot(name)
-    terms, weight = standing_terms(robot), robot.total_mass * GRAVITY
+    terms, weight = standing_terms(robot), robot.weight
     bench = BlockBench(WholeBodyController, {"limits": "none"}, robot=robot)
     bench.set("terms", **terms)
     bench.set("joints", position=robot.standing_position)

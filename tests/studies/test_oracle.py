@@ -9,7 +9,7 @@ import pytest
 
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import load_text
-from aloft.studies.oracle import CALIBRATED, CONSUMER, CalibrationErrors, told_values
+from aloft.studies.oracle import CALIBRATED, CONSUMER, CalibrationErrors, oracle_values
 
 GRAPHS = Path(__file__).parents[2] / "graphs"
 
@@ -22,7 +22,7 @@ def graph_of(overrides, trial="real"):
 
 @pytest.fixture(scope="module")
 def told():
-    return told_values(graph_of({}))
+    return oracle_values(graph_of({}))
 
 
 def test_ages_are_those_of_filter_packet_and_drive(told):
@@ -32,11 +32,11 @@ def test_ages_are_those_of_filter_packet_and_drive(told):
     assert told["timing.rate"] == told["timing.force"]
     assert told["timing.velocity"] == pytest.approx(0.001, abs=3e-5)
     assert told["timing.position"] == 0.0
-    assert told["delay.told"] == pytest.approx(0.002 + 1 / (640 * math.pi) + told["timing.rate"])
+    assert told["delay.nominal"] == pytest.approx(0.002 + 1 / (640 * math.pi) + told["timing.rate"])
 
 
 def test_a_nominal_robot_has_nothing_to_tell():
-    told = told_values(graph_of({}, trial="robust"))
+    told = oracle_values(graph_of({}, trial="robust"))
     assert told["timing.imu_position"] == told["timing.imu_rotation"] == [0.0] * 3
     assert set(told["robot.motor_model.torque_constant"].values()) == {1.0}
     assert set(told["joint_pd.friction"].values()) <= {0.0}
@@ -53,7 +53,7 @@ def test_values_stay_within_what_is_drawn(told):
 
 def test_errors_are_drawn_by_their_seed(told):
     graph = graph_of({})
-    first, again, other = (told_values(graph, CALIBRATED, seed=n) for n in (1, 1, 2))
+    first, again, other = (oracle_values(graph, CALIBRATED, seed=n) for n in (1, 1, 2))
     assert first == again != other
-    assert told_values(graph, CalibrationErrors()) == told
+    assert oracle_values(graph, CalibrationErrors()) == told
     graph_of(first)

@@ -1,20 +1,22 @@
-"""The benchmark of link delays lets BRUCE jump with a controller that is told of the delay."""
+"""The benchmark of link delays lets BRUCE jump with a controller that knows the delay."""
 
 import pytest
 
-from aloft.benchmarks.links.link_delays import jump, link_delays, told, travel
+from aloft.benchmarks.links.link_delays import expected_delay, jump, link_delays, travel
 from aloft.runtime.links.free_link import LatestReceiver
 
 from ...cli.conftest import run_for_json
 
 
-def test_what_the_controller_is_told() -> None:
-    assert told(0.2e-3) == pytest.approx(4.4e-3) and told(3e-3) == pytest.approx(10e-3)
+def test_what_the_controller_expects() -> None:
+    assert expected_delay(0.2e-3) == pytest.approx(4.4e-3) and expected_delay(
+        3e-3
+    ) == pytest.approx(10e-3)
     assert travel(0.2e-3)("data/a/b/c", 5) == 200_000
 
 
 def test_jitter_and_loss_are_drawn_for_each_link_from_the_seed() -> None:
-    assert told(1e-3, 0.5e-3) == pytest.approx(6.5e-3)
+    assert expected_delay(1e-3, 0.5e-3) == pytest.approx(6.5e-3)
     first, again, other = (travel(1e-3, 0.5e-3, 0.1, seed) for seed in (3, 3, 4))
     times = [first("a", k) for k in range(2000)]
     alone = [again("a", k) for k in range(1000)]
@@ -31,7 +33,7 @@ def test_jitter_and_loss_are_drawn_for_each_link_from_the_seed() -> None:
 def test_a_jump_with_jitter_and_loss() -> None:
     (row,) = link_delays([1e-3], [9100], 0.5e-3, 0.02)
     assert row.name == "jumps that fail, links of 1 to 1.5 ms each way, 2 % lost"
-    assert row.note.startswith("1 of 1 succeed, told 6.5 ms")
+    assert row.note.startswith("1 of 1 succeed, nominally 6.5 ms")
     run = jump(1e-3, 9100, 0.5e-3, 0.02)
     boxes = [box for part in run.parts.values() for box in part.receivers]
     lost = sum(box.lost for box in boxes if isinstance(box, LatestReceiver))
@@ -55,7 +57,7 @@ def test_options_that_make_no_sense(arguments: list[str], reason: str) -> None:
 @pytest.mark.long
 def test_a_jump_with_short_links() -> None:
     (row,) = link_delays([0.2e-3], [1000])
-    assert row.value == 0.0 and row.met and row.note == "1 of 1 succeed, told 4.4 ms"
+    assert row.value == 0.0 and row.met and row.note == "1 of 1 succeed, nominally 4.4 ms"
     run = jump(0.2e-3, 1000)
     assert run.success and float(run.metrics["apex_above_standing_m"]) > 0.1  # type: ignore[arg-type]
     boxes = [box for part in run.parts.values() for box in part.receivers]

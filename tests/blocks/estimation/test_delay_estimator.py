@@ -1,4 +1,4 @@
-"""The delay is found to a tenth of a period, is told until then, and is complained about if wrong."""
+"""The delay is found to a tenth of a period, is nominal until then, and is complained about if wrong."""
 
 from __future__ import annotations
 
@@ -46,33 +46,33 @@ def test_noise_of_the_measured_torques_hardly_matters():
 
 
 def test_until_it_counts_it_is_what_the_graph_says():
-    out = drive(0.006, ticks=40, told=0.003).get("estimate")
+    out = drive(0.006, ticks=40, nominal=0.003).get("estimate")
     assert not bool(out.known)
     assert float(out.delay) == 0.003
 
 
 def test_torques_that_do_not_follow_the_commands_tell_nothing():
-    bench = drive(0.004, noise=2.0, told=0.001)
+    bench = drive(0.004, noise=2.0, nominal=0.001)
     assert not bool(bench.get("estimate").known)
     assert float(bench.get("estimate").delay) == 0.001
     assert bench.block.warnings() == ()
 
 
-def test_told_is_followed_if_the_graph_says_so():
-    out = drive(0.006, told=0.003, follow="told").get("estimate")
+def test_the_nominal_one_is_followed_if_the_graph_says_so():
+    out = drive(0.006, nominal=0.003, follow="nominal").get("estimate")
     assert float(out.delay) == 0.003
     assert float(out.measured) == pytest.approx(0.006, abs=1e-5)
 
 
-@pytest.mark.parametrize("follow", ["measured", "told"])
+@pytest.mark.parametrize("follow", ["measured", "nominal"])
 def test_a_wrong_delay_is_reported(follow):
-    (text,) = drive(0.005, told=0.002, follow=follow).block.warnings()
+    (text,) = drive(0.005, nominal=0.002, follow=follow).block.warnings()
     done = "is compensated" if follow == "measured" else "is not compensated"
     assert text == (
-        f"the delay from sensing to torque is 5.0 ms as measured, which {done}, and 2 ms as told; "
-        "correct `told` or the robot's delay"
+        f"the delay from sensing to torque is 5.0 ms as measured, which {done}, and 2 ms nominally; "
+        "correct `nominal` or the robot's delay"
     )
-    assert drive(0.0032, told=0.002).block.warnings() == ()
+    assert drive(0.0032, nominal=0.002).block.warnings() == ()
 
 
 def test_the_measurement_ends_in_time():
@@ -85,14 +85,14 @@ def test_the_measurement_ends_in_time():
 
 
 def test_metrics():
-    metrics = drive(0.004, told=0.002).block.metrics()
-    assert metrics["delay_told_ms"] == 2.0
+    metrics = drive(0.004, nominal=0.002).block.metrics()
+    assert metrics["delay_nominal_ms"] == 2.0
     assert metrics["delay_measured_ms"] == pytest.approx(4.0, abs=0.01)
 
 
 @pytest.mark.parametrize(("delay", "ahead"), [(0.0015, 0.0), (0.00475, 0.002), (0.00875, 0.006)])
 def test_what_is_not_tolerated_is_worked_ahead(delay, ahead):
-    out = drive(delay, told=delay, tolerated=0.002).get("estimate")
+    out = drive(delay, nominal=delay, tolerated=0.002).get("estimate")
     assert float(out.ahead) == pytest.approx(ahead, abs=1e-5)
 
 

@@ -8,7 +8,6 @@ import pytest
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.estimation.foot_load_estimator import FootLoadEstimator
 from aloft.blocks.signals import Phase
-from aloft.mathematics.constants import GRAVITY
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
 
@@ -53,7 +52,7 @@ def test_a_load_between_toe_and_heel_is_found_with_its_place(share):
 @pytest.mark.parametrize("name", ["go2", "g1", "solo12"])
 def test_the_weight_of_other_robots_is_found(name):
     robot = find_robot(name)
-    weight, points = robot.total_mass * GRAVITY, len(robot.contacts)
+    weight, points = robot.weight, len(robot.contacts)
     forces = np.tile([0.0, 0.0, weight / points], (points, 1))
     _, load, _ = estimate(robot, forces)
     assert load.force.sum() == pytest.approx(weight, rel=0.02)
@@ -62,7 +61,7 @@ def test_the_weight_of_other_robots_is_found(name):
 
 def test_a_foot_is_loaded_from_one_force_until_another():
     robot = find_robot("bruce")
-    weight, seen = robot.total_mass * GRAVITY, []
+    weight, seen = robot.weight, []
     bench, load, _ = estimate(robot, np.zeros((4, 3)), begin=0.3, end=0.1)
     terms = terms_of(robot)
     jacobian = terms["contact_jacobian"].reshape(12, -1)

@@ -46,7 +46,7 @@ def test_the_forces_of_a_standing_robot_are_its_weight() -> None:
     robot = bench()
     hold(robot)
     robot.step(200)
-    weight = robot.block.robot.total_mass * GRAVITY
+    weight = robot.block.robot.weight
     assert vertical(robot) == pytest.approx(weight, rel=1e-3)
     for side in ("right", "left"):
         wrench = robot.get(f"{side}_sole")
@@ -102,7 +102,7 @@ def test_errors_are_those_that_the_description_declares() -> None:
         limit = 4 * noise["noise"] / np.sqrt(600)
         np.testing.assert_allclose(errors.mean(axis=0), sensor.bias(field), atol=limit)
         assert 0.0 < np.abs(sensor.bias(field)).max() <= noise["bias"]
-    weight = robot.block.robot.total_mass * GRAVITY
+    weight = robot.block.robot.weight
     assert vertical(robot) == pytest.approx(weight, abs=2 * (1.0 + 4 * 0.5))
 
 
@@ -150,7 +150,7 @@ def test_the_impulse_of_a_hop_is_the_change_of_momentum(noise: Any) -> None:
 def test_the_twin_reads_the_same_weight_from_its_packets() -> None:
     robot = bench(TwinRobot)
     hold(robot, 3.5, 0.1)
-    weight = robot.block.robot.total_mass * GRAVITY
+    weight = robot.block.robot.weight
     assert vertical(robot) == pytest.approx(weight, rel=0.02)
     sample = robot.block.driver.board.samples["left_sole"].force
     assert sample.astype(np.float32).tolist() == sample.tolist()

@@ -104,7 +104,7 @@ def test_task_seed_trial_and_score_are_no_part_of_the_controller() -> None:
         assert controller(setting) == own, setting
     for setting in (
         "plan.by=clock", "wbc.thrust.linear_weight=[1, 1, 1]", "targets.place_gain=0.5",
-        "estimator.use=blocks.InvariantKalmanFilter", "landing.law=paper", "delay.told=3ms",
+        "estimator.use=blocks.InvariantKalmanFilter", "landing.law=paper", "delay.nominal=3ms",
     ):  # fmt: skip
         assert controller(setting) != own, setting
 
