@@ -44,13 +44,24 @@ from .robot import (
     RobotHealth,
     RobotTruth,
 )
-from .steering import CourseGoal, JumpCommand, JumpFrame, PlanOutcome, PlanPart, PlanRequest
+from .steering import (
+    BodyTwist,
+    CourseGoal,
+    FootholdPose,
+    JumpCommand,
+    JumpFrame,
+    PlanOutcome,
+    PlanPart,
+    PlanRequest,
+    SeenStones,
+)
 
 __all__ = [
     "BaseState",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
+    "BodyTwist",
     "CourseGoal",
     "DelayEstimate",
     "DrivePhase",
@@ -58,6 +69,7 @@ __all__ = [
     "EstimatorHealth",
     "ExternalForce",
     "FootLoad",
+    "FootholdPose",
     "FootTarget",
     "ImuReading",
     "JointCommand",
@@ -77,6 +89,7 @@ __all__ = [
     "PointTarget",
     "RobotHealth",
     "RobotTruth",
+    "SeenStones",
     "SwitchFault",
     "SwitchHealth",
     "WholeBodyCommand",
