@@ -36,7 +36,9 @@ def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
         n, lost = len(found), [one for one in found if not passed(one)]
         low, high = wilson_interval(len(lost), n)
         worst = [float(one["worst_place_error_m"]) for one in found if one.get("jumps")]
-        why = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+        why = "; ".join(
+            f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"]
+        )
         rows += [
             Row(f"{name}: courses lost", len(lost) / n, "", goal=MISSED_GOAL,
                 note=f"{n} courses of {JUMPS} jumps, 95 % interval {low:.2f} to {high:.2f}"),

@@ -10,11 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.language.errors import AloftError, ExitCode, UnitError
+from ..runtime.language.errors import AloftError, ExitCode
 from .shared.learning import LearningOptions, PlannedGraph, Prepare, learn_jumps
-from .shared.options import JsonBesideTables, NoRecord, Overrides, Quiet, expand_option_groups
+from .shared.options import JsonBesideTables, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
-from .shared.rehearsal import REHEARSE_HELP, graph_of, rehearsal
+from .shared.rehearsal import REHEARSE_HELP, rehearsal
+from .shared.robot_trials import (
+    RecordOptions,
+    TrialOptions,
+    about_robot,
+    graph_of,
+    quantity,
+    require_one_or_many,
+    trial_settings_of,
+)
 from .shared.run_graph import OneRunOptions, run_many, run_once
 
 if TYPE_CHECKING:
@@ -58,39 +67,6 @@ class JumpOptions:
 
 
 @dataclass(frozen=True)
-class TrialOptions:
-    """Which graph runs, in which trial."""
-
-    robot: Annotated[
-        str, typer.Option(help="Which robot jumps: its name, or a URDF, MJCF or YAML file.")
-    ] = "bruce"
-    graph: Annotated[
-        Path | None, typer.Option(help="The graph; by default the robot's shipped jump.")
-    ] = None
-    trial: Annotated[
-        str,
-        typer.Option(
-            help="nominal, standard, robust, real or uneven; by default as the graph says."
-        ),
-    ] = ""
-    seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0
-    seeds: Annotated[
-        str, typer.Option(help="Run once a seed instead: 0:20 or 1,5,7; nothing is recorded.")
-    ] = ""
-    overrides: Overrides = None
-
-
-@dataclass(frozen=True)
-class RecordOptions:
-    """Whether the run is recorded, and where."""
-
-    record: Annotated[
-        Path | None, typer.Option(help="Where the recording goes; by default recordings/jump.rrd.")
-    ] = None
-    no_record: NoRecord = False
-
-
-@dataclass(frozen=True)
 class PlanningOptions:
     """What is done beside planning the jump."""
 
@@ -119,15 +95,12 @@ def jump(
     seeds, seed = running.seeds, running.seed
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
-        if seeds and (recording.record is not None or seed):
-            raise AloftError(
-                "--seeds runs many seeds and records nothing: leave out --seed, --record"
-            )
+        require_one_or_many(running, recording)
         path, own = (running.graph, []) if running.graph else graph_of(running.robot)
         lengths = {name: getattr(asked, name) for name in FIELDS}
-        about = about_robot(running.robot, out) if own else {}
+        about = about_robot(running.robot, "jump", out) if own else {}
         changes = task_changes(lengths, asked.rise, asked.turn, path, own)
-        chosen = [*settings_for(changes, running.trial), *(running.overrides or [])]
+        chosen = settings_for(changes, running)
         settings = [*own, *chosen]
         many = parse_seeds(seeds) if seeds else []
         if learning.learn is not None:
@@ -137,7 +110,8 @@ def jump(
                     "--seeds, --no-record and --rehearse"
                 )
             corrected_parameters(flatten(path, settings))  # refuses a graph without them
-            record = recording.record or Path("recordings") / "jump.rrd"
+            record = recording.place("jump")
+            assert record is not None
             rise = changes.get("rise") or usual_rise(path, own) or 0.0
             prepare = planner_of(path, own, running, planning.nearest, console(quiet=True))
             raise typer.Exit(
@@ -161,29 +135,9 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            default = Path("recordings") / "jump.rrd"
-            place = None if recording.no_record else recording.record or default
-            options = OneRunOptions(record=place, as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.place("jump"), as_json=as_json, times=False)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
-
-
-def about_robot(name: str, out: Console) -> dict[str, Any]:
-    """Say what was guessed of a robot whose file says little, and return it for the JSON object.
-
-    Raises:
-        AloftError: the robot cannot jump whatever is asked for; the message says why.
-    """
-    from ..robots.description import path_of, read
-    from ..studies.check_up import obstacles_to_jumping
-
-    found = read(path_of(name))
-    for note in found.notes:
-        say(out, f"  - {note}")
-    wrong = obstacles_to_jumping(found.description)
-    if wrong:
-        raise AloftError(f"{found.description.name} cannot jump: {'; '.join(wrong)}")
-    return {"guessed": list(found.notes)}
 
 
 def stronger_motors(task: JumpTask, graph: Graph, out: Console) -> dict[str, Any]:
@@ -203,7 +157,7 @@ def planner_of(
     """What plans a task and loads its graph, with the trial and settings of the command line."""
 
     def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
-        chosen = [*settings_for(changes, running.trial), *(running.overrides or [])]
+        chosen = settings_for(changes, running)
         settings = [*own, *chosen, *further]
         loaded = load_jump(path, settings, None)
         task = task_of(loaded)
@@ -251,26 +205,6 @@ def task_changes(
     return found
 
 
-def quantity(name: str, text: str, unit: str, example: str) -> float:
-    """A quantity of the command line in ``unit``; it must say its own."""
-    from ..runtime.language.units import parse_quantity
-
-    try:
-        float(text)
-    except ValueError:
-        pass
-    else:
-        raise AloftError(
-            f"--{name} {text}: the unit is missing; expected such as --{name} {example}"
-        )
-    try:
-        return parse_quantity(text, unit)
-    except UnitError as error:
-        raise AloftError(
-            f"--{name} {text}: {error}; expected such as --{name} {example}"
-        ) from error
-
-
 def check_limits(name: str, text: str, field: str, value: float, unit: str) -> None:
     """Raise ``AloftError`` for a quantity that is beyond the limits of the task's parameter."""
     from ..planner.task.task import JumpTask
@@ -290,15 +224,10 @@ def usual_rise(path: Path, own: Sequence[str]) -> float | None:
     return task_of(load_jump(path, [*own], None)).rise
 
 
-def settings_for(asked: Mapping[str, float], trial: str) -> list[str]:
-    """The overrides of a graph for what was asked."""
-    from ..files.nodes import text_of
-    from ..studies.rehearsal import trial_settings
-
-    return [
-        *(f"{key}={text_of(value)}" for key, value in trial_settings(trial).items()),
-        *(f"plan.task.{key}={value!r}" for key, value in asked.items()),
-    ]
+def settings_for(asked: Mapping[str, float], running: TrialOptions) -> list[str]:
+    """The overrides of a graph for the task, the trial and what else is asked for."""
+    task = [f"plan.task.{key}={value!r}" for key, value in asked.items()]
+    return [*trial_settings_of(running), *task, *(running.overrides or [])]
 
 
 def load_jump(path: Path, settings: list[str], seed: int | None) -> Graph:

@@ -16,6 +16,7 @@ from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
 from .shared.robot_bench import add_bench_verbs
 from .shared.robot_calibration import calibrate
+from .shared.robot_reach import reach
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,6 +36,7 @@ robot = typer.Typer(
 add_bench_verbs(robot)
 robot.command("calibrate")(calibrate)
 robot.command("bring-up")(bring_up)
+robot.command("reach")(reach)
 
 Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
@@ -103,13 +105,13 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
 
 def _show_effects(name: str, as_json: bool) -> None:
     """Print the effects that a simulated robot can have."""
-    from .shared.simulated_effects import effect_rows, simulated_effects
+    from .shared.simulated_effects import TRIAL, effect_rows, simulated_effects
 
     found = simulated_effects()
     if as_json:
-        print_json({"success": True, "name": name, "trial": "real", "effects": found})
+        print_json({"success": True, "name": name, "trial": TRIAL, "effects": found})
         return
-    columns = ("robot.", "unit", ">default", ">trial real", "source")
+    columns = ("robot.", "unit", ">default", f">trial {TRIAL}", "source")
     title = f"{name}: what can be simulated of a real robot"
     console().print(table(title, columns, list(effect_rows(found))))
 

@@ -49,9 +49,11 @@ from aloft.benchmarks.tick.chart import tick_chart
 from aloft.planner.task.margins import Margins
 from aloft.planner.task.sequence import Hop, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
+from aloft.robots.description import find_robot
 from aloft.robots.importing.urdf_text import find_file
 from aloft.runtime.language.parameters import Parameters
 from aloft.studies.batch.seeds import run_seeds
+from aloft.studies.reach.reach import BRUCE, beside
 
 ROOT = Path(__file__).parent.parent
 DOCS, README = ROOT / "docs", ROOT / "README.md"
@@ -118,8 +120,11 @@ def write_excerpts() -> None:
 
 
 def write_frontier(folder: Path) -> None:
-    """How far jumps reach, and the picture of it."""
-    refresh(DOCS / "frontier.md", "frontier", frontier_table(read_json(folder / "frontier.json")))
+    """How far jumps reach, the picture of it, and what other robots' reach is drawn beside."""
+    found = read_json(folder / "frontier.json")
+    refresh(DOCS / "frontier.md", "frontier", frontier_table(found))
+    text = json.dumps(beside(found, find_robot("bruce")), indent=1) + "\n"
+    BRUCE.write_text(text, encoding="utf-8")
     shutil.copyfile(folder / FRONTIER_PICTURE, DOCS / FRONTIER_PICTURE)
 
 

@@ -27,7 +27,6 @@ in ``kappa`` and runs at the rate of the bus instead.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from typing import Literal, NamedTuple
@@ -37,6 +36,7 @@ import numpy as np
 from ..blocks.signals import JointCommand
 from ..mathematics.arrays import Array, Array1D, Array2D
 from ..mathematics.compiling.kernel_call import KernelCall
+from ..mathematics.elementary import tanh
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_vector, product
 from ..robots.robot_description import RobotDescription
@@ -246,7 +246,7 @@ class Gears(NamedTuple):
 def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> float:
     """The torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
     constant, peak = gears.constant[motor], gears.peak[motor]
-    lost = gears.load_friction * math.tanh(speed / SLIDING_SPEED)
+    lost = gears.load_friction * tanh(speed / SLIDING_SPEED)
     asked: float = torque / constant
     if gears.saturation > 0.0 or gears.load_friction > 0.0:
         for _ in range(_ROUNDS):
@@ -263,7 +263,7 @@ def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
     peak = gears.peak[motor]
     load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
     given: float = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
-    return given - gears.load_friction * abs(asked) * math.tanh(speed / SLIDING_SPEED)
+    return given - gears.load_friction * abs(asked) * tanh(speed / SLIDING_SPEED)
 
 
 class TorqueScratch(NamedTuple):

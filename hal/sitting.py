@@ -19,6 +19,7 @@ from ..blocks.signals import (
     JointState,
 )
 from ..mathematics.arrays import Array
+from ..mathematics.elementary import cos
 from ..robots.kinematics import contact_centres, link_poses
 from ..robots.robot_description import RobotDescription
 
@@ -155,7 +156,7 @@ class SitDown:
 
     def command(self, tick: int, command: JointCommand) -> None:
         """Write the command of a tick, from 1 to ``ticks``."""
-        share = 0.5 - 0.5 * math.cos(math.pi * tick / self.ticks)
+        share = 0.5 - 0.5 * cos(math.pi * tick / self.ticks)
         depths, poses = self._path
         depth = share * depths[-1]
         k = max(1, int(np.searchsorted(depths, depth)))

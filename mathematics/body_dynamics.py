@@ -9,7 +9,6 @@ Algorithms, 2008, chapters 2 and 4 to 6).
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from .arrays import (
     Rows3,
     Vector3,
 )
+from .elementary import sincos
 from .kernel import kernel
 from .rotations import rotate_about_axis
 
@@ -98,7 +98,7 @@ def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
                 place[row] = place[row] + joint[row] * angle
                 joint[3 + row] = 0.0
             continue
-        cosine, sine = math.cos(angle), math.sin(angle)
+        sine, cosine = sincos(angle)
         rotate_about_axis(rotation, tree.axis[k], cosine, sine, motion.rotation[k + 1])
         x, y, z = place[0], place[1], place[2]
         u, v, w = joint[3], joint[4], joint[5]

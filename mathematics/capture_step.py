@@ -17,6 +17,7 @@ import math
 
 from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .constants import GRAVITY
+from .elementary import hypot, sincos
 from .kernel import kernel
 
 
@@ -73,7 +74,7 @@ def nearest_in_foot(
             if square > 1e-12:
                 share = min(max(((x - ax) * dx + (y - ay) * dy) / square, 0.0), 1.0)
             px, py = ax + share * dx, ay + share * dy
-            distance = math.hypot(x - px, y - py)
+            distance = hypot(x - px, y - py)
             if distance < least:
                 least = distance
                 out[0], out[1] = px, py
@@ -116,7 +117,7 @@ def limit_foothold(
         nearest, farthest: the range of its distance to that side [m].
         out: the foothold, (3,), changed.
     """
-    cosine, sine = math.cos(heading), math.sin(heading)
+    sine, cosine = sincos(heading)
     dx, dy = out[0] - stance[0], out[1] - stance[1]
     along = min(max(cosine * dx + sine * dy, -ahead), ahead)
     across = cosine * dy - sine * dx

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 from .arrays import Array1D, Array2D, Rows3, Vector3
+from .elementary import cos, sin
 from .kernel import kernel
 from .rotations import exponential as rotation_exponential
 from .rotations import logarithm as rotation_logarithm
@@ -36,8 +37,8 @@ def left_jacobian_so3(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     if angle < _SMALL:
         first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
     else:
-        half = math.sin(0.5 * angle) / angle
-        first, second = 2.0 * half * half, (angle - math.sin(angle)) / (angle * square)
+        half = sin(0.5 * angle) / angle
+        first, second = 2.0 * half * half, (angle - sin(angle)) / (angle * square)
     tx, ty, tz = y * c - z * b, z * a - x * c, x * b - y * a
     out[0] = a + first * tx + second * (y * tz - z * ty)
     out[1] = b + first * ty + second * (z * tx - x * tz)
@@ -59,7 +60,7 @@ def inv_left_jacobian_so3(phi: Array1D, vector: Array1D, out: Array1D) -> None:
     else:
         # (1 + cos a) / sin a = cot(a / 2), which has no pole at pi.
         half = 0.5 * angle
-        second = (1.0 - half * math.cos(half) / math.sin(half)) / square
+        second = (1.0 - half * cos(half) / sin(half)) / square
     tx, ty, tz = y * c - z * b, z * a - x * c, x * b - y * a
     out[0] = a - 0.5 * tx + second * (y * tz - z * ty)
     out[1] = b - 0.5 * ty + second * (z * tx - x * tz)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from .arrays import Array1D, Array2D, Flags1D, Rows3, Vector3
 from .constants import GRAVITY
+from .elementary import atan2
 from .kernel import kernel
 from .rotations import integrate, normalise, rotate
 
@@ -140,7 +141,7 @@ def misalignment(
     out[0] = (xy * xz - xx * yz) / determinant
     out[1] = (yy * xz - xy * yz) / determinant
     rotate(orientation, forward, place)
-    out[2] = -math.atan2(place[1], place[0])
+    out[2] = -atan2(place[1], place[0])
     return True
 
 

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Array1D, Array2D, Array3D, Matrix3, Rows3, Vector2, Vector3, Vector4
+from .elementary import sincos
 from .kernel import kernel
 from .linear_algebra import multiply_matrices, solve_positive, solve_rows
 
@@ -87,7 +88,7 @@ def pull_to_place(goal: Array1D, miss: Array1D, gain: float, width: float) -> No
 @kernel
 def turn_places(places: Array2D, angle: float, out: Array2D) -> None:
     """Rotate places (n, 3) about the vertical by ``angle`` [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    sine, cosine = sincos(angle)
     for i in range(places.shape[0]):
         x, y = places[i, 0], places[i, 1]
         out[i, 0], out[i, 1], out[i, 2] = cosine * x - sine * y, sine * x + cosine * y, places[i, 2]
@@ -159,7 +160,7 @@ def retraction(left: float, speed: float, duration: float) -> tuple[float, float
 @kernel
 def heading_matrix(angle: float, out: Array2D) -> None:
     """The rotation about the vertical by ``angle`` [rad], (3, 3)."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    sine, cosine = sincos(angle)
     out[:, :] = 0.0
     out[0, 0] = out[1, 1] = cosine
     out[0, 1], out[1, 0], out[2, 2] = -sine, sine, 1.0

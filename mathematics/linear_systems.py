@@ -18,6 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .arrays import Array, Array1D, Array2D
+from .elementary import sincos
 from .kernel import kernel
 from .linear_algebra import multiply_matrices
 
@@ -99,12 +100,19 @@ def controllable_form(
 
 
 @kernel
+def _prewarped(frequency: float, period: float) -> float:
+    """tan(pi f T), by which the bilinear transform keeps the frequency f [Hz] (prewarping)."""
+    sine, cosine = sincos(math.pi * frequency * period)
+    return sine / cosine
+
+
+@kernel
 def first_order(cutoff: float, period: float, high: bool, out: Array1D) -> None:
     """Coefficients (5) of the low-pass 1 / (1 + s / w), or the high-pass (s / w) / (1 + s / w).
 
     ``cutoff`` is w / (2 pi) [Hz], below half of the sampling rate; there the gain is 1 / sqrt(2).
     """
-    k = math.tan(math.pi * cutoff * period)
+    k = _prewarped(cutoff, period)
     scale = 1.0 / (1.0 + k)
     out[0] = scale if high else k * scale
     out[1] = -scale if high else k * scale
@@ -120,7 +128,7 @@ def second_order(cutoff: float, damping: float, period: float, high: bool, out: 
     ``cutoff`` is w / (2 pi) [Hz], below half of the sampling rate; with a damping d of 1 / sqrt(2)
     it is a Butterworth filter.
     """
-    k = math.tan(math.pi * cutoff * period)
+    k = _prewarped(cutoff, period)
     scale = 1.0 / (1.0 + 2.0 * damping * k + k * k)
     out[0] = scale if high else k * k * scale
     out[1] = -2.0 * scale if high else 2.0 * k * k * scale
@@ -135,7 +143,7 @@ def band_stop(centre: float, width: float, period: float, out: Array1D) -> None:
 
     ``centre`` is w / (2 pi) [Hz], below half of the sampling rate; ``width`` is v / (2 pi) [Hz].
     """
-    k = math.tan(math.pi * centre * period)
+    k = _prewarped(centre, period)
     q = width / centre * k
     scale = 1.0 / (1.0 + q + k * k)
     out[0] = (1.0 + k * k) * scale

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Array1D, Array2D, Array3D, Matrix3, Vector3
+from .elementary import atan2, cos, sin, sincos
 from .kernel import kernel
 from .linear_algebra import product
 
@@ -155,9 +156,9 @@ def exponential(vector: Array1D, out: Array1D) -> None:
     """The unit quaternion of a rotation vector [rad]: axis times angle."""
     x, y, z = vector[0], vector[1], vector[2]
     angle = math.sqrt(x * x + y * y + z * z)
-    scale = 0.5 if angle < _SMALL else math.sin(0.5 * angle) / angle
+    scale = 0.5 if angle < _SMALL else sin(0.5 * angle) / angle
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
-    out[3] = math.cos(0.5 * angle)
+    out[3] = cos(0.5 * angle)
 
 
 @kernel
@@ -167,7 +168,7 @@ def logarithm(quaternion: Array1D, out: Array1D) -> None:
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
     sine = math.sqrt(x * x + y * y + z * z)
-    scale = 2.0 / w if sine < _SMALL else 2.0 * math.atan2(sine, w) / sine
+    scale = 2.0 / w if sine < _SMALL else 2.0 * atan2(sine, w) / sine
     out[0], out[1], out[2] = scale * x, scale * y, scale * z
 
 
@@ -179,8 +180,8 @@ def integrate(
     wx, wy, wz = angular_velocity[0], angular_velocity[1], angular_velocity[2]
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     half = 0.5 * rate * duration
-    scale = 0.5 * duration if abs(half) < _SMALL else math.sin(half) / rate
-    bx, by, bz, bw = scale * wx, scale * wy, scale * wz, math.cos(half)
+    scale = 0.5 * duration if abs(half) < _SMALL else sin(half) / rate
+    bx, by, bz, bw = scale * wx, scale * wy, scale * wz, cos(half)
     ax, ay, az, aw = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0] = aw * bx + ax * bw + ay * bz - az * by
     out[1] = aw * by - ax * bz + ay * bw + az * bx
@@ -193,14 +194,14 @@ def integrate(
 def yaw(quaternion: Array1D) -> float:
     """The heading [rad]: the angle about the world's z axis from its x axis to the body's."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
 def pitch_angle(quaternion: Array1D) -> float:
     """The angle [rad] about the world's y axis from its x axis to the body's, seen in the x-z plane."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    return math.atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
+    return atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
@@ -208,7 +209,7 @@ def tilt(quaternion: Array1D) -> float:
     """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     # Computed from half angles, as the arc cosine of R_zz would lose half the digits at zero.
-    return 2.0 * math.atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
+    return 2.0 * atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
 
 
 @kernel
@@ -225,13 +226,13 @@ def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
         if counted[i]:
             x += rotations[i, 0, 0]
             y += rotations[i, 1, 0]
-    return math.atan2(y, x)
+    return atan2(y, x)
 
 
 @kernel
 def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
     """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
-    cosine, sine = math.cos(angle), math.sin(angle)
+    sine, cosine = sincos(angle)
     x, y = vector[0], vector[1]
     out[0], out[1], out[2] = cosine * x - sine * y, sine * x + cosine * y, vector[2]
 
@@ -257,7 +258,7 @@ def from_euler(angles: Array1D, out: Array1D) -> None:
     """The unit quaternion (4) of roll, pitch and yaw [rad]."""
     r, p, y = 0.5 * angles[0], 0.5 * angles[1], 0.5 * angles[2]
     cr, sr, cp, sp, cy, sy = (
-        math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y),
+        cos(r), sin(r), cos(p), sin(p), cos(y), sin(y),
     )  # fmt: skip
     out[0] = sr * cp * cy - cr * sp * sy
     out[1] = cr * sp * cy + sr * cp * sy
@@ -276,10 +277,10 @@ def to_euler(quaternion: Array1D, out: Array1D) -> None:
     sine = 2.0 * (w * y - z * x)
     side = 2.0 * (x * y + w * z)
     front = 1.0 - 2.0 * (y * y + z * z)
-    out[0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    out[0] = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     # not the arc sine, which would lose half the digits near its end
-    out[1] = math.atan2(sine, math.sqrt(side * side + front * front))
-    out[2] = math.atan2(side, front)
+    out[1] = atan2(sine, math.sqrt(side * side + front * front))
+    out[2] = atan2(side, front)
 
 
 def axis_rotations(axis: Sequence[float], angles: Array) -> Array:

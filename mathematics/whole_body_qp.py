@@ -74,7 +74,7 @@ class TorqueLimits(NamedTuple):
 
     ``kind`` is NO_LIMITS, JOINT_LIMITS or MOTOR_LIMITS. A motor has its ``peak`` torque [N m] up to the
     ``corner`` speed [rad/s]; from there the torque falls linearly to zero at the ``no_load`` speed
-    [rad/s]. At the present ``speed`` the torques must be within ``lower`` and ``upper``. ``to_speed`` and
+    [rad/s]; of the three there are left the shares ``peak_share``, ``corner_share`` and ``no_load_share``. At the present ``speed`` the torques must be within ``lower`` and ``upper``. ``to_speed`` and
     ``to_torque`` T (n, n) are products with joint velocities and joint torques; ``to_torque`` is the
     identity where joints are limited.
     """
@@ -85,6 +85,9 @@ class TorqueLimits(NamedTuple):
     peak: Array1D
     corner: Array1D
     no_load: Array1D
+    peak_share: Array1D
+    corner_share: Array1D
+    no_load_share: Array1D
     speed: Array1D
     lower: Array1D
     upper: Array1D
@@ -193,8 +196,8 @@ def limit_torques(joint_velocity: Array1D, motors: TorqueLimits) -> None:
     """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
     for i in range(motors.speed.shape[0]):
         if motors.kind == JOINT_LIMITS:
-            motors.upper[i] = motors.peak[i]
-            motors.lower[i] = -motors.peak[i]
+            motors.upper[i] = motors.peak[i] * motors.peak_share[i]
+            motors.lower[i] = -motors.upper[i]
             continue
         total = 0.0
         for j in range(joint_velocity.shape[0]):
@@ -211,8 +214,9 @@ def motor_limits(motors: TorqueLimits) -> None:
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
     """
     for i in range(motors.speed.shape[0]):
-        value, peak = motors.speed[i], motors.peak[i]
-        corner, no_load = motors.corner[i], motors.no_load[i]
+        value, peak = motors.speed[i], motors.peak[i] * motors.peak_share[i]
+        corner = motors.corner[i] * motors.corner_share[i]
+        no_load = motors.no_load[i] * motors.no_load_share[i]
         share = (no_load - abs(value)) / max(no_load - corner, 1e-9)
         driving = peak * min(max(share, 0.0), 1.0)
         motors.upper[i] = driving if value > 0.0 else peak

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..mathematics.arrays import Array1D, Array2D, Indices1D, Matrix3, Vector3
+from ..mathematics.elementary import acos, atan2, cos, exp, sin, sincos
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import multiply_matrices, solve_damped
 from ..mathematics.rotations import unit, wrap
@@ -119,7 +120,7 @@ def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> 
     hip, plane = leg.hip, leg.plane
     a, b, c, k, n = _canonical(leg.signs, angles)
     _thigh_rotation(a, b, c, rotation)
-    cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
+    (sin_k, cos_k), (sin_f, cos_f) = sincos(k), sincos(k + n)
     calf_x, calf_z = plane[1, 0], plane[1, 1]
     sole_x, sole_z = plane[2, 0], plane[2, 1]
     x = plane[0, 0] + calf_x * cos_k - calf_z * sin_k + sole_x * cos_f - sole_z * sin_f
@@ -135,9 +136,9 @@ def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> 
 def jacobian(plane: Array2D, signs: Array1D, angles: Array1D, out: Array2D) -> None:
     """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
     a, b, c, k, n = _canonical(signs, angles)
-    cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-    cos_c, sin_c = math.cos(c), math.sin(c)
-    cos_k, sin_k, cos_f, sin_f = math.cos(k), math.sin(k), math.cos(k + n), math.sin(k + n)
+    (sin_a, cos_a), (sin_b, cos_b) = sincos(a), sincos(b)
+    sin_c, cos_c = sincos(c)
+    (sin_k, cos_k), (sin_f, cos_f) = sincos(k), sincos(k + n)
     calf_x, calf_z = plane[1, 0], plane[1, 1]
     sole_x, sole_z = plane[2, 0], plane[2, 1]
     # From the ankle, from the knee and from the hip to the sole, in the leg plane.
@@ -242,7 +243,7 @@ def inverse(
     if held != ankle:
         # The ankle keeps its angle, calf and foot become one link, the sole is the target.
         ankle, exact = held, False
-        cos_n, sin_n = math.cos(ankle), math.sin(ankle)
+        sin_n, cos_n = sincos(ankle)
         sole_x, sole_z = plane[2, 0], plane[2, 1]
         knee, thigh, share, near = _two_links(
             plane[0, 0], plane[0, 1],
@@ -250,24 +251,24 @@ def inverse(
             plane[1, 1] + sin_n * sole_x + cos_n * sole_z,
             x, z, signs[3], limits[3, 0], limits[3, 1], softness,
         )  # fmt: skip
-    cos_t, sin_t = math.cos(thigh), math.sin(thigh)
+    sin_t, cos_t = sincos(thigh)
     xx, xy, xz = cos_t * fx + sin_t * ux, cos_t * fy + sin_t * uy, cos_t * fz + sin_t * uz
     zx, zy = cos_t * ux - sin_t * fx, cos_t * uy - sin_t * fy
 
     # The thigh's axes are yaw, then pitch, then roll. Of the two answers for yaw the one with the
     # roll below a right angle; in gimbal lock the kept yaw, and roll takes up the rest.
     flat = math.sqrt(xx * xx + xy * xy)
-    yaw = math.atan2(xy, xx)
-    if ny * math.cos(yaw) - nx * math.sin(yaw) < 0.0:
+    yaw = atan2(xy, xx)
+    if ny * cos(yaw) - nx * sin(yaw) < 0.0:
         yaw = wrap(yaw + math.pi)
     share_of_yaw = yaw_share(flat, level)
     if share_of_yaw < 1.0:
         kept = wrap(kept_yaw * signs[0])
         yaw = kept + share_of_yaw * wrap(yaw - kept)
-    cos_y, sin_y = math.cos(yaw), math.sin(yaw)
+    sin_y, cos_y = sincos(yaw)
     out[0] = yaw
-    out[1] = math.atan2(xz, cos_y * xx + sin_y * xy)
-    out[2] = math.atan2(sin_y * zx - cos_y * zy, cos_y * ny - sin_y * nx)
+    out[1] = atan2(xz, cos_y * xx + sin_y * xy)
+    out[2] = atan2(sin_y * zx - cos_y * zy, cos_y * ny - sin_y * nx)
     out[3] = knee
     out[4] = ankle
     inside = exact and near
@@ -299,8 +300,8 @@ def _canonical(signs: Array1D, angles: Array1D) -> tuple[float, float, float, fl
 @kernel
 def _thigh_rotation(a: float, b: float, c: float, out: Array2D) -> None:
     """Yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
-    cos_a, sin_a, cos_b, sin_b = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-    cos_c, sin_c = math.cos(c), math.sin(c)
+    (sin_a, cos_a), (sin_b, cos_b) = sincos(a), sincos(b)
+    sin_c, cos_c = sincos(c)
     out[0, 0], out[1, 0], out[2, 0] = cos_a * cos_b, sin_a * cos_b, sin_b
     out[0, 1] = -sin_a * cos_c - cos_a * sin_b * sin_c
     out[1, 1] = cos_a * cos_c - sin_a * sin_b * sin_c
@@ -331,25 +332,25 @@ def _two_links(
     """
     first = math.sqrt(first_x * first_x + first_z * first_z)
     second = math.sqrt(second_x * second_x + second_z * second_z)
-    straight = wrap(math.atan2(first_z, first_x) - math.atan2(second_z, second_x))
+    straight = wrap(atan2(first_z, first_x) - atan2(second_z, second_x))
     straightest = min(max(straight * sign, lower), upper) * sign
-    bent = math.cos(straightest - straight)
+    bent = cos(straightest - straight)
     farthest = math.sqrt(first * first + second * second + 2.0 * first * second * bent)
     distance, share = math.sqrt(x * x + z * z), 1.0
     if softness > 0.0 and distance > farthest - softness:
-        share = math.exp((farthest - softness - distance) / softness)
+        share = exp((farthest - softness - distance) / softness)
         distance = farthest - softness * share
     elif distance > farthest:
         distance, share = farthest, 0.0
     cosine = (distance * distance - first * first - second * second) / (2.0 * first * second)
-    bend = math.acos(min(max(cosine, -1.0), 1.0))
+    bend = acos(min(max(cosine, -1.0), 1.0))
     knee = straight + bend if 0.5 * (lower + upper) * sign > straight else straight - bend
     held = min(max(knee * sign, lower), upper) * sign
     near = share == 1.0 and abs(held - knee) < 1e-9 and cosine <= 1.0
-    cos_k, sin_k = math.cos(held), math.sin(held)
+    sin_k, cos_k = sincos(held)
     end_x = first_x + cos_k * second_x - sin_k * second_z
     end_z = first_z + sin_k * second_x + cos_k * second_z
-    return held, math.atan2(z, x) - math.atan2(end_z, end_x), share, near
+    return held, atan2(z, x) - atan2(end_z, end_x), share, near
 
 
 _LEVEL = 0.3
@@ -365,7 +366,7 @@ _JUMP = 0.1
 @kernel
 def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
     """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
-    cosine, sine = math.cos(pitch), math.sin(pitch)
+    sine, cosine = sincos(pitch)
     out[:] = cosine * rotation[:, 0] - sine * rotation[:, 2]
 
 

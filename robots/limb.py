@@ -18,6 +18,7 @@ from enum import IntEnum
 import numpy as np
 
 from ..mathematics.arrays import Array, Array1D, Array2D, Indices2D, Matrix3, Rows3, Vector3
+from ..mathematics.elementary import atan2, sincos
 from ..mathematics.kernel import kernel
 from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import unit
@@ -175,7 +176,7 @@ def place_limb(
             pz += angle * bz
         else:
             # Every row r becomes c r + s (r x axis) + (1 - c) (r . axis) axis (Rodrigues).
-            c, s = math.cos(angle), math.sin(angle)
+            s, c = sincos(angle)
             d = 1.0 - c
             xx, xy, xz = (
                 c * xx + s * (xy * az - xz * ay) + d * bx * ax,
@@ -317,7 +318,7 @@ def foot_error(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, error
             tx, ty, tz = unit(tx, ty, tz, 1.0, 0.0, 0.0)
             sine = 1.0
             cosine = -1e9
-    scale = length if sine < 1e-7 else length * math.atan2(sine, cosine) / sine
+    scale = length if sine < 1e-7 else length * atan2(sine, cosine) / sine
     tx, ty, tz = scale * tx, scale * ty, scale * tz
     error[0], error[1], error[2], error[3], error[4], error[5] = ex, ey, ez, tx, ty, tz
     return float(ex * ex + ey * ey + ez * ez + tx * tx + ty * ty + tz * tz)
@@ -374,7 +375,7 @@ def turning(
         trace = target[1] @ last[1] + target[2] @ last[2]
         cosine = 0.5 * (trace + target[3] @ last[3] - 1.0)
     sine = math.sqrt(ax * ax + ay * ay + az * az)
-    angle = math.atan2(sine, cosine)
+    angle = atan2(sine, cosine)
     scale = 0.0
     if angle <= limit:
         scale = 1.0 / period if sine < 1e-7 else angle / (sine * period)

@@ -15,7 +15,7 @@ found from what is left, and fitted as long as that explains much. Without it th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +31,7 @@ from .sensor_identification import (
     CUTOFF,
     EDGE,
     IdentifiedSensors,
+    contact_jacobians,
     fit,
     play_positions,
     shifted,
@@ -138,11 +139,11 @@ def identify_motors(
     solution, covariance, _ = fit(with_mean, right, prior, step, CORRELATED)
     error, periods = right - with_mean @ solution, []
     ripple = np.tile(RIPPLE * np.asarray(known.peak_torque), 2)
+    waves = {float(often): waves_of(turned, float(often), motion.period) for often in PERIODS}
     for _ in range(MOST_PERIODS):
-        often = most_alike(error[:, 6:] @ robot.joint_to_motor.T, turned, motion.period)
+        often = most_alike(error[:, 6:] @ robot.joint_to_motor.T, waves)
         columns = np.zeros((*right.shape, 2 * n))
-        waves = _waves(turned, often, motion.period)
-        columns[:, 6:] = -np.hstack([robot.joint_to_motor.T] * 2) * waves[:, None, :]
+        columns[:, 6:] = -np.hstack([robot.joint_to_motor.T] * 2) * waves[often][:, None, :]
         wider = np.concatenate([with_mean, free @ columns], axis=2)
         more = fit(wider, right, np.concatenate([prior, ripple]), step, CORRELATED)
         left = right - wider @ more[0]
@@ -203,7 +204,7 @@ def _motor_angles(
     return _seated(motion, sensors, standing_span(robot, motion)) @ robot.joint_to_motor.T
 
 
-def _waves(turned: Array, periods: float, period: float) -> Array:
+def waves_of(turned: Array, periods: float, period: float) -> Array:
     """Sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the
     equations, (ticks, 2 n)."""
     edge = round(EDGE / period)
@@ -211,14 +212,14 @@ def _waves(turned: Array, periods: float, period: float) -> Array:
     return waves[edge : len(turned) - edge : EVERY]
 
 
-def most_alike(error: Array, turned: Array, period: float) -> float:
-    """Of ``PERIODS`` the one whose waves are most like the errors of the motors' torques."""
-    scores = []
-    for periods in PERIODS:
-        waves = _waves(turned, float(periods), period)
-        alike = np.tile(error, 2) * waves
-        scores.append(float((alike.sum(axis=0) ** 2 / (waves**2).sum(axis=0)).sum()))
-    return float(PERIODS[int(np.argmax(scores))])
+def most_alike(error: Array, waves: Mapping[float, Array]) -> float:
+    """Of the periods the one whose waves are most like the errors of the motors' torques."""
+    twice = np.tile(error, 2)
+    scores = {
+        often: float((((twice * wave).sum(axis=0)) ** 2 / (wave**2).sum(axis=0)).sum())
+        for often, wave in waves.items()
+    }
+    return max(scores, key=lambda often: scores[often])
 
 
 def _link_spread(robot: RobotDescription, spreads: Spreads) -> tuple[Array, Array]:
@@ -281,8 +282,9 @@ def _equations(
     edge = round(EDGE / motion.period)
     q, v, a = np.zeros(7 + n), np.zeros(6 + n), np.zeros(6 + n)
     q[6] = 1.0
-    all_rows, all_right, all_free = [], [], []
-    for k in range(edge, len(angles) - edge, EVERY):
+    all_rows, all_right = [], []
+    used = range(edge, len(angles) - edge, EVERY)
+    for k in used:
         q[7:], v[3:6], v[6:] = angles[k], turning[k], speeds[k]
         a[:3], a[3:6], a[6:] = force[k], turns[k], bends[k]
         regressor = pin.computeJointTorqueRegressor(model, data, q, v, a)
@@ -300,17 +302,10 @@ def _equations(
         rows[6:, by_link.shape[1] :] = of_joints
         right = -by_link @ nominal
         right[6:] += torque[k] - rotors @ bends[k] - coulomb * sign - viscous * speeds[k]
-        pin.computeJointJacobians(model, data, q)
-        pin.updateFramePlacements(model, data)
-        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = np.vstack(
-            [pin.getFrameJacobian(model, data, f, world)[:3] for f in built.contact_frames]
-        )
-        free = free_projection(jacobian)
-        all_rows.append(free @ rows)
-        all_right.append(free @ right)
-        all_free.append(free)
-    return np.array(all_rows), np.array(all_right), np.array(all_free)
+        all_rows.append(rows)
+        all_right.append(right)
+    free = free_projection(contact_jacobians(robot, angles[np.array(used)])[0])
+    return free @ np.array(all_rows), (free @ np.array(all_right)[..., None])[..., 0], free
 
 
 def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Array:
@@ -319,12 +314,12 @@ def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Arr
     return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
 
 
-def free_projection(jacobian: Array) -> Array:
-    """What takes the contact forces out of the equations of motion, (n_velocities, n_velocities): the projection
-    onto what a Jacobian of contact points (rows, n_velocities) maps to zero."""
-    _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
-    used = directions[sizes > 1e-6 * sizes[0]]
-    return np.asarray(np.eye(jacobian.shape[1]) - used.T @ used)
+def free_projection(jacobians: Array) -> Array:
+    """What takes the contact forces out of the equations of motion, (n, n_velocities, n_velocities): the projections
+    onto what Jacobians of contact points (n, rows, n_velocities) map to zero."""
+    _, sizes, directions = np.linalg.svd(jacobians, full_matrices=False)
+    used = directions * (sizes > 1e-6 * sizes[:, :1])[..., None]
+    return np.asarray(np.eye(jacobians.shape[2]) - used.transpose(0, 2, 1) @ used)
 
 
 def filtered_motion(

@@ -20,7 +20,7 @@ from .identification import Estimate, MeasuredRun
 from .motor_identification import SOFT_SPEED, filtered_motion, free_projection
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
-from .sensor_identification import EDGE, IdentifiedSensors
+from .sensor_identification import EDGE, IdentifiedSensors, contact_jacobians
 from .transmission import SLIDING_SPEED
 
 CUTOFF = 25.0
@@ -95,22 +95,17 @@ def _errors(
     friction = np.array([each.value for each in found.friction.values()])
     damping = np.array([each.value for each in found.damping.values()])
     needed = bends @ inertia.T + friction * np.tanh(speeds / SOFT_SPEED) + damping * speeds
-    n, world = len(robot.joints), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    q, v, a, errors = np.zeros(7 + n), np.zeros(6 + n), np.zeros(6 + n), []
-    q[6] = 1.0
+    n = len(robot.joints)
+    q, v, a = np.zeros(7 + n), np.zeros(6 + n), np.zeros(6 + n)
+    q[6], errors = 1.0, np.empty((len(angles), 6 + n))
     for k in range(len(angles)):
         q[7:], v[3:6], v[6:] = angles[k], turning[k], speeds[k]
         a[:3], a[3:6], a[6:] = force[k], turns[k], bends[k]
-        error = pin.rnea(model, data, q, v, a).copy()
-        error[6:] += needed[k] - given[k]
-        frames = [f for f, on in zip(built.contact_frames, loaded[k], strict=True) if on]
-        if frames:
-            pin.computeJointJacobians(model, data, q)
-            pin.updateFramePlacements(model, data)
-            jacobian = np.vstack([pin.getFrameJacobian(model, data, f, world)[:3] for f in frames])
-            error = free_projection(jacobian) @ error
-        errors.append(error)
-    return np.array(errors)
+        errors[k] = pin.rnea(model, data, q, v, a)
+    errors[:, 6:] += needed - given
+    # what carries nothing takes nothing out of the equations
+    jacobians = contact_jacobians(robot, angles)[0] * np.repeat(loaded, 3, axis=1)[..., None]
+    return np.asarray((free_projection(jacobians) @ errors[..., None])[..., 0])
 
 
 def _sensors(found: Calibration) -> IdentifiedSensors:

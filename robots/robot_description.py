@@ -231,6 +231,7 @@ class PowerSupply(Part):
     A pack of ``capacity`` [A s] loses ``fall`` [V] from full to empty. ``board_power`` [W] is what computer and boards
     draw. ``torque_constant`` [N m/A, at the output] and ``winding_resistance`` [ohm] are those of all motors; where
     they are not known, copper heat is that of a motor whose voltage alone ends its peak torque at the corner speed.
+    A winding takes ``winding_heat_capacity`` [J/K], and gives heat to what cools it through ``winding_thermal_resistance`` [K/W].
     """
 
     rated_voltage: float = Field(gt=0.0)
@@ -242,6 +243,8 @@ class PowerSupply(Part):
     board_power: float = Field(0.0, ge=0.0)
     torque_constant: float | None = Field(None, gt=0.0)
     winding_resistance: float | None = Field(None, ge=0.0)
+    winding_heat_capacity: float | None = Field(None, gt=0.0)
+    winding_thermal_resistance: float | None = Field(None, gt=0.0)
 
     def heating(self, motors: Motors) -> Array:
         """Copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""

@@ -31,6 +31,8 @@ from .transmission import PLAY_TIME, PLAY_TORQUE
 
 CUTOFF = 6.0
 """Of the filter that all signals pass [Hz]."""
+PADDING = 12
+"""Ticks by which columns go on at both ends while they are filtered."""
 EDGE = 0.3
 """The time at both ends that the filter spoils [s]."""
 ROUNDS = 2
@@ -84,11 +86,41 @@ class IdentifiedSensors:
 
 
 def smooth(values: Array, period: float, cutoff: float = CUTOFF) -> Array:
-    """Columns after a low-pass filter that goes forwards and backwards."""
-    from scipy.signal import butter, sosfiltfilt
+    """Columns after a Butterworth filter of the third order that goes forwards and backwards.
 
-    sections = butter(3, 2.0 * cutoff * period, output="sos")
-    return np.asarray(sosfiltfilt(sections, values, axis=0))
+    At both ends they go on as their reflection through the end, as in SciPy's ``sosfiltfilt``, whose package takes 2 s to
+    import. Each section is a banded system of equations in its outputs.
+    """
+    ends = 2.0 * values[0] - values[PADDING:0:-1], 2.0 * values[-1] - values[-2 : -PADDING - 2 : -1]
+    columns = np.asfortranarray(np.concatenate([ends[0], values, ends[1]]))
+    sections = _butterworth(math.tan(math.pi * cutoff * period))
+    for _ in range(2):
+        first = columns[0].copy()  # at rest at the first values
+        columns = columns - first
+        for numerator, denominator in sections:
+            columns = _filtered(numerator, denominator, columns)
+        columns = np.asfortranarray((columns + first)[::-1])
+    return np.ascontiguousarray(columns[PADDING:-PADDING])
+
+
+def _butterworth(wide: float) -> tuple[tuple[Array, Array], ...]:
+    """Numerators and denominators, in the powers of the shift, of a section of the first and one of the second
+    order, by the bilinear transform; ``wide`` is tan(pi cutoff period)."""
+    low = np.array([wide, wide]) / (1.0 + wide), np.array([1.0, (wide - 1.0) / (wide + 1.0)])
+    size = 1.0 + wide + wide**2
+    poles = np.array([size, 2.0 * (wide**2 - 1.0), 1.0 - wide + wide**2]) / size
+    return low, (np.array([1.0, 2.0, 1.0]) * wide**2 / size, poles)
+
+
+def _filtered(numerator: Array, denominator: Array, columns: Array) -> Array:
+    """Columns after a recursive filter that begins with zeros."""
+    from scipy.linalg.lapack import dtbtrs
+
+    right = numerator[0] * columns
+    for late, factor in enumerate(numerator[1:], 1):
+        right[late:] += factor * columns[:-late]
+    band = np.repeat(denominator[:, None], len(columns), axis=1)
+    return np.asarray(dtbtrs(band, right, uplo="L", overwrite_b=True)[0])
 
 
 def slope(values: Array, period: float) -> Array:
@@ -137,14 +169,14 @@ def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> Identified
     width = np.array([each.value for each in play.values()])
     position = motion.position[span] - 0.5 * width * ends
     period = motion.period
-    moves = base_motion(robot, position, motion.velocity[span])
-    base = smooth(moves, period)
+    late = slope(smooth(torque, period), period)
+    moves, yields, places = base_motion(robot, position, motion.velocity[span], late)
+    base = smooth(np.hstack([moves, places]), period)
     gyro, force = (
         smooth(motion.angular_velocity[span], period),
         smooth(motion.specific_force[span], period),
     )
-    yields = base_motion(robot, position, slope(smooth(torque, period), period))[:, 3:6]
-    turn, gyro_late, gyro_left, compliance = _gyroscope(base[:, 3:6], gyro, yields, period)
+    turn, gyro_late, gyro_left, compliance = _gyroscope(base[:, 3:6], gyro, yields[:, 3:], period)
     angle = np.array([each.value for each in turn])
     place, force_late, force_left = _accelerometer(
         base, gyro, force, angle, gyro_late.value, period
@@ -232,26 +264,41 @@ def _encoders(
     return play, Estimate(float(found[0]), math.hypot(std[0], LEAST_AGE)), left
 
 
-def base_motion(robot: RobotDescription, position: Array, velocity: Array) -> Array:
-    """The base's velocity over standing feet, linear and angular in its own frame, and the middle of
-    the contact points in it, (n, 9)."""
+def base_motion(robot: RobotDescription, position: Array, *velocities: Array) -> tuple[Array, ...]:
+    """The base over standing feet: for each of the joints' ``velocities`` (n, n_joints) its own, linear and angular in
+    its own frame, (n, 6); last the middle of the contact points in that frame, (n, 3)."""
+    jacobians, places = contact_jacobians(robot, position)
+    of_base, of_joints = jacobians[..., :6], jacobians[..., 6:]
+    across = of_base.transpose(0, 2, 1)
+    found = [
+        np.linalg.solve(across @ of_base, across @ (of_joints @ -each[..., None]))[..., 0]
+        for each in velocities
+    ]
+    return *found, places.mean(axis=1)
+
+
+def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, Array]:
+    """Jacobians of all contact points, (n, 3 n_contacts, n_velocities), and their places in the base's frame,
+    (n, n_contacts, 3), for the joints' angles (n, n_joints)."""
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
-    data: Any = built.model.createData()
-    q, out = np.zeros(built.model.nq), np.zeros((len(position), 9))
+    model: Any = built.model
+    data: Any = model.createData()
+    frames, count = built.contact_frames, 3 * len(built.contact_frames)
+    q, world = np.zeros(model.nq), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    jacobians = np.empty((len(position), count, model.nv))
+    places = np.empty((len(position), len(frames), 3))
     q[6] = 1.0
-    for k, (angles, speeds) in enumerate(zip(position, velocity, strict=True)):
+    for k, angles in enumerate(position):
         q[7:] = angles
-        pin.computeJointJacobians(built.model, data, q)
-        pin.updateFramePlacements(built.model, data)
-        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = np.vstack(
-            [pin.getFrameJacobian(built.model, data, f, world)[:3] for f in built.contact_frames]
-        )
-        out[k, :6] = np.linalg.lstsq(jacobian[:, :6], -jacobian[:, 6:] @ speeds, rcond=None)[0]
-        out[k, 6:] = np.mean([data.oMf[f].translation for f in built.contact_frames], axis=0)
-    return out
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        for row, frame in enumerate(frames):
+            jacobian = pin.getFrameJacobian(model, data, frame, world)
+            jacobians[k, 3 * row : 3 * row + 3] = jacobian[:3]
+            places[k, row] = data.oMf[frame].translation
+    return jacobians, places
 
 
 def _gyroscope(
@@ -290,7 +337,7 @@ def _accelerometer(
     turning = shifted(gyro, gyro_late / period)
     turning = turning - np.cross(turning, angle)
     turning = turning - (turning - base[:, 3:6])[_inner(len(base), period)].mean(axis=0)
-    up, tilts, drifts = _vertical(turning, period)
+    up, tilts, drifts = vertical(turning, period)
     bend = slope(turning, period)
     # The feet rock a little on the ground: the gyroscope sees it, and the joints do not.
     moving = base[:, :3] - np.cross(turning - base[:, 3:6], base[:, 6:])
@@ -317,22 +364,29 @@ def _accelerometer(
     return _three(place, std[:3]), Estimate(late, float(std[3])), left
 
 
-def _vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
+def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
     """The vertical in the base's frame by integration from level; how it changes with the tilt at first
     (n, 3, 2), and with biases of the gyroscope (n, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
     n = len(turning)
-    up, tilts, drifts = np.zeros((n, 3)), np.zeros((n, 3, 2)), np.zeros((n, 3, 3))
-    turned, drift = np.eye(3), np.zeros((3, 3))  # from the base's axes to the world's
-    for k in range(n):
-        up[k] = turned[2]
-        tilts[k] = (turned.T @ _cross(np.array([0.0, 0.0, 1.0])))[:, :2]
-        drifts[k] = turned.T @ _cross(np.array([0.0, 0.0, 1.0])) @ drift
-        drift = drift + turned * period
-        middle = turning[k] if k + 1 == n else 0.5 * (turning[k] + turning[k + 1])
-        turned = turned @ Rotation.from_rotvec(middle * period).as_matrix()
-    return up, tilts, drifts
+    middle = np.concatenate([0.5 * (turning[1:] + turning[:-1]), turning[-1:]]) * period
+    steps = np.eye(3) + _rotation_beyond(middle)
+    turned = np.empty((n, 3, 3))  # from the base's axes to the world's
+    turned[0] = np.eye(3)
+    for k in range(1, n):
+        np.matmul(turned[k - 1], steps[k - 1], out=turned[k])
+    drift = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(turned[:-1] * period, axis=0)])
+    leaning = turned.transpose(0, 2, 1) @ _cross(np.array([0.0, 0.0, 1.0]))
+    return turned[:, 2], leaning[..., :2], leaning @ drift
+
+
+def _rotation_beyond(vectors: Array) -> Array:
+    """The matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    safe = np.maximum(angle, 1e-9)
+    across = _cross(vectors)
+    return np.asarray(
+        np.sin(safe) / safe * across + 2.0 * (np.sin(0.5 * safe) / safe) ** 2 * (across @ across)
+    )
 
 
 def fit(
@@ -349,13 +403,13 @@ def fit(
     trust = np.ones(len(right))
     share = min(1.0, period / correlated)
     found = np.zeros(rows.shape[2])
-    inverse = np.diag(prior**2)
+    inverse: Array = np.diag(prior**2)
+    left = right
     for _ in range(ITERATIONS):
-        weighted = rows / weight[:, None]
-        normal = share * np.einsum("k,kra,krb->ab", trust, weighted, weighted, optimize=True)
-        inverse = np.linalg.inv(normal + np.diag(prior**-2.0))
-        projected = np.einsum("k,kra,kr->a", trust, weighted, right / weight, optimize=True)
-        found = inverse @ (share * projected)
+        size = np.sqrt(trust)[:, None] / weight
+        flat: Array = (rows * size[..., None]).reshape(-1, rows.shape[2])
+        inverse = np.asarray(np.linalg.inv(share * (flat.T @ flat) + np.diag(prior**-2.0)))
+        found = inverse @ (share * (flat.T @ (right * size).ravel()))
         left = right - rows @ found
         weight = np.maximum(TYPICAL * np.median(np.abs(left), axis=0), 1e-9)
         trust = 1.0 / (1.0 + ((left / weight) ** 2).mean(axis=1) / OUTLYING**2)

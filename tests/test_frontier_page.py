@@ -43,8 +43,28 @@ def test_the_criteria_come_before_the_table() -> None:
 
 
 def test_the_page_says_what_the_search_does() -> None:
-    from aloft.benchmarks.frontier.search import LEAST_RUNS, LOOSEST, MOST_CPU, RATE
+    from aloft.benchmarks.frontier import MOST_CPU
+    from aloft.studies.reach.directions import LOOSEST
+    from aloft.studies.reach.search import LEAST_RUNS, RATE
 
     assert LOOSEST == {"effort": 1.0, "margins": None, "foot_clearance": 0.02}
     assert "`effort: 1`" in PAGE and "`margins: null`" in PAGE and "`foot_clearance: 2 cm`" in PAGE
     assert (RATE, LEAST_RUNS) == (0.95, 4) and f"after {MOST_CPU:g} s of processor time" in PAGE
+
+
+def test_other_robots_are_drawn_beside_what_the_table_says() -> None:
+    from aloft.robots.description import find_robot
+    from aloft.studies.reach.directions import leg_length
+    from aloft.studies.reach.reach import bruce_reach, in_legs
+
+    legs = leg_length(find_robot("bruce"))
+    rows = {row.partition(":")[0].removeprefix("| "): row.split(" | ")
+            for row in PAGE.splitlines() if row.startswith("| ")}  # fmt: skip
+    found = bruce_reach()["directions"]
+    assert len(found) == 7
+    for each in found:
+        cells = [rows[each["name"]][k].split()[:2] for k in (1, 5, 6)]
+        ends = dict(
+            zip(("reached", "planned", "theory"), (float(c[0]) for c in cells), strict=True)
+        )
+        assert each["in_legs"] == in_legs({**ends, "unit": cells[0][1]}, legs)

@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError
+from ...planner.checking.validity import InvalidPlanError, why_not
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
 from ...planner.solving.solver_process import cpu_time
@@ -25,11 +24,12 @@ from ...planner.task.files import JumpTaskError, PlanError
 from ...planner.task.task import JumpTask
 from ...robots.description import RobotDescription, find_robot
 from ...studies.batch.jobs import job_results
-from ...studies.expansion import load_cell
 from ...studies.journal import Journal, Outcome, code_fingerprint
+from ...studies.reach.search import JumpGraph
+from ...studies.rehearsal import trial_settings
 from ...studies.summary import wilson_interval
 from ..rows import Row
-from .random_tasks import SEED, random_tasks, why_not
+from .random_tasks import SEED, random_tasks
 
 COUNT = 200
 RUNS = range(9000, 9004)
@@ -126,15 +126,12 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
 
 def run_once(job: JumpJob, seed: int) -> Outcome:
     """One run of a planned task in the robust trial."""
-    graphs = shipped_folder()
-    given = job.task.model_dump(mode="json", exclude_unset=True)
-    sets: dict[str, Any] = {
-        "plan.task": given, "plan.library": str(job.folder.absolute()), "robot.seed": seed,
-    }  # fmt: skip
-    trial = graphs / "trials" / "robust.yaml"
-    graph = load_cell(graphs / "jump.yaml", [trial], sets, graphs / "bench.yaml")
-    result = graph.run(log=False)
-    return Outcome(result.success, result.reason, result.run_hash, result.to_json()["metrics"])
+    return bruce_jumps().run(job.task, job.folder, seed)
+
+
+def bruce_jumps() -> JumpGraph:
+    """The graph in which BRUCE jumps, in the robust trial."""
+    return JumpGraph("bruce", shipped_folder() / "jump.yaml", trial_settings("robust"))
 
 
 def _plan_rows(tasks: Sequence[JumpTask], plans: Sequence[Outcome], seed: int) -> list[Row]:

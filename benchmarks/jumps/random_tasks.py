@@ -30,10 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError
+from ...planner.checking.validity import InvalidPlanError, why_not
 from ...planner.library.library import solve_and_check
 from ...planner.solving.solver_process import cpu_time
-from ...planner.task.files import JumpTaskError, PlanError
+from ...planner.task.files import PlanError
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import RobotDescription, find_robot
 from ..rows import Row
@@ -147,12 +147,3 @@ def plan_one(task: JumpTask, robot: RobotDescription) -> str:
     except (InvalidPlanError, PlanError) as error:
         return why_not(error)
     return ""
-
-
-def why_not(error: Exception) -> str:
-    """What binds where a task has no valid plan, in a few words, from what the planner raised."""
-    if isinstance(error, InvalidPlanError):
-        return ", ".join(t["name"] for t in error.plan.report["tests"] if not t["passed"])
-    if isinstance(error, JumpTaskError):
-        return "contradicts itself"
-    return getattr(error, "family", "") or "no plan"

@@ -12,8 +12,6 @@ Robots follow one another, and ``results/real_robot/results.json`` has all that 
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -26,12 +24,13 @@ from ...planner.library.library import PlanLibrary, shipped_folder
 from ...planner.task.plan import PlannedJump
 from ...planner.task.task import make_task
 from ...robots.description import find_robot
-from ...runtime.graph import Graph
+from ...runtime.graph import Graph, load
 from ...runtime.language.errors import AloftError
 from ...studies.batch.jobs import job_results
 from ...studies.expansion import load_cell
 from ...studies.jump_learning import lesson_of
 from ...studies.oracle import CALIBRATED, oracle_values
+from ...studies.robot_calibration import calibrated_fragment
 from ...studies.summary import wilson_interval
 from ..rows import Row
 from .real_tasks import ALONE, EFFORT, EVERY, AskedJump, asked_of
@@ -158,7 +157,8 @@ def graph_of(
     }  # fmt: skip
     if learnt is not None:
         sets["plan.learnt"] = str(learnt)
-    graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml")
+    behind = [graphs / asked.behind] if asked.behind else []
+    graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml", behind)
     if told == "draws":
         return graph.changed(oracle_values(graph, CALIBRATED, seed=seed))
     return graph
@@ -171,12 +171,12 @@ def with_margin(task: Mapping[str, Any]) -> dict[str, Any]:
 
 @cache
 def calibrated(graph: Path, seed: int, name: str) -> Path:
-    """The fragment that a calibration of a robot writes, which sways in a graph. Raises ``CalledProcessError``."""
+    """The fragment that a calibration of a robot writes, which sways in a graph. Raises ``AloftError``."""
     folder = FOLDER.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{name}_{seed}.yaml"
-    words = ["robot", "calibrate", str(graph), "--set", f"robot.seed={seed}", "--out", str(file)]
-    subprocess.run([sys.executable, "-m", "aloft", *words], check=True, capture_output=True)
+    text = calibrated_fragment(load(graph, [f"robot.seed={seed}"]), graph.name)
+    file.write_text(text, encoding="utf-8")
     return file
 
 

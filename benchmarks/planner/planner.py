@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError, check_plan
+from ...planner.checking.validity import InvalidPlanError, check_plan, why_not
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.problem.guess import ballistic_guess
 from ...planner.problem.problem import FullProblem
@@ -32,7 +32,7 @@ from ...planner.task.read_task import read_task
 from ...planner.task.task import JumpTask, make_task
 from ...robots.description import find_robot
 from ...runtime.loading.reading.files import FOLDER
-from ..jumps.random_tasks import random_rows, why_not
+from ..jumps.random_tasks import random_rows
 from ..rows import Row
 from .snopt import SnoptProgram, SnoptResult
 

@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Rows3, Vector3
+from ...mathematics.elementary import atan2, sincos
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import (
@@ -233,7 +234,7 @@ def measured_heading(
     if constants.heading_source == HeadingSource.FEET:
         return mean_heading(terms.foot_rotation, constants.counted)
     if constants.heading_source == HeadingSource.BASE:
-        return math.atan2(terms.base_rotation[1, 0], terms.base_rotation[0, 0])
+        return atan2(terms.base_rotation[1, 0], terms.base_rotation[0, 0])
     return planned + pattern_turn(
         reference.foot_position, scratch.planned_middle, terms.foot_position, scratch.middle
     )
@@ -243,7 +244,7 @@ def measured_heading(
 def set_heading(angle: float, quaternion: Array1D) -> None:
     """The unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
     quaternion[0], quaternion[1] = 0.0, 0.0
-    quaternion[2], quaternion[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    quaternion[2], quaternion[3] = sincos(0.5 * angle)
 
 
 @kernel
@@ -393,7 +394,7 @@ def pattern_turn(
         bx, by = points[i, 0] - middle[0], points[i, 1] - middle[1]
         sine += ax * by - ay * bx
         cosine += ax * bx + ay * by
-    return math.atan2(sine, cosine)
+    return atan2(sine, cosine)
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+from ...mathematics.elementary import sincos
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Clock, Output
@@ -51,7 +52,7 @@ class CircleTarget(Block):
         speed = params.radius * rate / params.growth
         growth = params.radius * second / (params.growth * params.growth)
         w = 2.0 * math.pi / params.turn_time
-        cosine, sine = math.cos(w * time), math.sin(w * time)
+        sine, cosine = sincos(w * time)
         target.position[:] = params.centre
         target.velocity[:] = 0.0
         target.acceleration[:] = 0.0

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from fnmatch import fnmatchcase
 from typing import Literal
 
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
+from ...mathematics.elementary import tanh
 from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import product
@@ -429,7 +429,7 @@ def add_friction(
     The first term is zero at rest and has three quarters of its full value at ``friction_speed``.
     """
     torque, speed = command.torque, params.friction_speed
-    torque[:] = torque + math.tanh(joints.velocity / speed) * constants.friction
+    torque[:] = torque + tanh(joints.velocity / speed) * constants.friction
     torque[:] = torque + joints.velocity * constants.viscous_friction
 
 

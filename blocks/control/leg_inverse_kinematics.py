@@ -9,6 +9,7 @@ from typing import Literal
 
 from ...mathematics.arrays import Array1D, Matrix3
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import atan2, cos, sin
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle
@@ -388,8 +389,8 @@ def excess_pitch(level: Matrix3, pitch: float) -> float:
     Args:
         level: the rotation of a level sole in the base's axes.
     """
-    error = math.atan2(level[2, 0], level[0, 0]) - pitch
-    return math.atan2(math.sin(error), math.cos(error))
+    error = atan2(level[2, 0], level[0, 0]) - pitch
+    return atan2(sin(error), cos(error))
 
 
 @kernel

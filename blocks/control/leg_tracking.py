@@ -6,7 +6,6 @@ A five-joint leg is solved in closed form (``robots/five_joint_leg``), any other
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from ...mathematics.arrays import (
     Rows3,
     Vector3,
 )
+from ...mathematics.elementary import cos
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...robots.five_joint_leg import (
@@ -175,7 +175,7 @@ def follow_foot(
     forward(leg, angles, scratch.sole, turn)
     jacobian(leg.plane, leg.signs, angles, scratch.jacobian)
     slow_stretch(leg, scratch.sole, turn, share, velocity)
-    yaw_held = 1.0 - yaw_share(math.cos(angles[1]), level)
+    yaw_held = 1.0 - yaw_share(cos(angles[1]), level)
     inverse_velocity(
         scratch.jacobian, turn, velocity, scratch.rate, settings.turn_length,
         settings.damping, yaw_held, yaw_rate, scratch.least_squares, speeds,

@@ -35,6 +35,7 @@ from ...runtime.language.steps import PythonCall, signal_call
 from ..signals import (
     DynamicsTerms,
     JointState,
+    MotorCondition,
     Phase,
     PhaseState,
     WholeBodyCommand,
@@ -100,7 +101,8 @@ class WholeBodyController(KernelBlock):
     **Limits** on torque are those of the robot's actuator profile in use. ``none``, as in the
     paper, sets no limits. ``joint`` bounds each joint's torque by the peak torque of the motor with
     the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
-    torque-speed curve at its present speed, which is exact also for differential joints.
+    torque-speed curve at its present speed, which is exact also for differential joints; with
+    ``follow_motors`` by the shares of torque and speeds that the input ``motors`` says are left of them.
 
     **Solution.** Accelerations are eliminated exactly (``mathematics/whole_body_reduction``), and ``solver``
     finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
@@ -147,6 +149,10 @@ class WholeBodyController(KernelBlock):
             PerJoint(1.0), gt=0.0,
             text="factor on the peak torque of each motor, by the name of its joint",
         )  # fmt: skip
+        follow_motors: bool = parameter(
+            False,
+            text="whether the limits follow how motors and pack are now, by an input `motors`",
+        )
         friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction cones")
         force_min: float = live_parameter(
             0.0, unit="N", ge=0.0, text="least normal force of a point"
@@ -243,10 +249,16 @@ class WholeBodyController(KernelBlock):
         except TaskChoiceError:
             return cls
         inputs = [(each.kind, own, name) for each in chosen for own, name in each.inputs.items()]
-        return _class_with(tuple(inputs)) if inputs else cls
+        if not inputs and not params.follow_motors:
+            return cls
+        return _class_with(tuple(inputs), params.follow_motors)
 
     def setup(self) -> None:
         robot, p, terms, command = self.robot, self.params, self.terms, self.command
+        now: MotorCondition | None = getattr(self, "motors", None)
+        shares = (
+            (now.torque_constant, now.corner_speed, now.no_load_speed) if now is not None else ()
+        )
         self._weight = robot.weight
         n_joints, n_contacts, n = len(robot.joints), len(robot.contacts), 6 + len(robot.joints)
         self._weights = ProgramWeights(*(np.zeros(1) for _ in ProgramWeights._fields))
@@ -259,6 +271,7 @@ class WholeBodyController(KernelBlock):
             kinds[p.limits], robot.joint_to_motor,
             robot.torque_to_motor if by_motor else np.eye(n_joints),
             np.zeros(n_joints), motors.corner_speed, motors.no_load_speed,
+            *(shares or np.ones((3, n_joints))),
             *(np.zeros(n_joints) for _ in range(3)),
         )  # fmt: skip
         self._model = RigidBodyTerms(
@@ -364,8 +377,10 @@ class WholeBodyController(KernelBlock):
 
 
 @cache
-def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBodyController]:
-    """The controller with inputs for tasks, each given by the task, its name there and here."""
+def _class_with(
+    inputs: tuple[tuple[type[Task], str, str], ...], follow_motors: bool
+) -> type[WholeBodyController]:
+    """The controller with inputs for tasks, each given by the task, its name there and here, and for motors."""
     body: dict[str, Any] = {
         "__doc__": WholeBodyController.__doc__,
         "__module__": WholeBodyController.__module__,
@@ -373,6 +388,9 @@ def _class_with(inputs: tuple[tuple[type[Task], str, str], ...]) -> type[WholeBo
     for kind, own, name in inputs:
         port = kind.inputs[own]
         body[name] = Input(port.signal, text=port.text, default=port.default)
+    if follow_motors:
+        text = "what is left of the motors' torque constants and speeds"
+        body["motors"] = Input(MotorCondition, text=text)
     return type(WholeBodyController.__name__, (WholeBodyController,), body)
 
 

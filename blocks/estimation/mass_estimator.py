@@ -21,6 +21,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import exp, tanh
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector, solve_rows
 from ...mathematics.rotations import skew
@@ -222,7 +223,7 @@ class MassEstimator(Block):
         constants.settling = math.ceil(p.settle_time / period - 1e-9)
         constants.filtering = share
         constants.following = min(1.0, period / p.smoothing) if p.smoothing else 1.0
-        constants.persistence = math.exp(-interval * period / p.friction_time)
+        constants.persistence = exp(-interval * period / p.friction_time)
         constants.noise[:3] = p.force_noise * weight
         constants.noise[3:] = p.moment_noise * weight
         # of the derivative of white noise behind a low-pass filter of the first order
@@ -394,7 +395,7 @@ def split_friction(
     """The part of the joints' friction that their speed tells, and what stays unknown."""
     for i in range(constants.friction.shape[0]):
         speed = memory.velocity[6 + i]
-        known_share = math.tanh(speed / params.friction_speed)
+        known_share = tanh(speed / params.friction_speed)
         scratch.friction[i] = constants.friction[i] * known_share + constants.damping[i] * speed
         unknown_share = 1.0 - (1.0 - params.friction_left) * abs(known_share)
         scratch.unknown_friction[i] = unknown_share * constants.friction[i]

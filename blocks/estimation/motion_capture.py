@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...mathematics.elementary import atan2, cos, sin, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import multiply, turn_about_vertical, yaw
 from ...runtime.language.block import Block, Input, Output, State
@@ -158,11 +159,11 @@ class PlaceCorrection(Block):
             error = place.heading - history.heading[then] - history.turn
             x, y = history.position[then, 0], history.position[then, 1]
             # The estimate of that time keeps its place while the world turns about it.
-            cosine, sine = math.cos(history.turn), math.sin(history.turn)
+            sine, cosine = sincos(history.turn)
             px = cosine * x - sine * y + history.offset[0]
             py = sine * x + cosine * y + history.offset[1]
-            history.turn += share * math.atan2(math.sin(error), math.cos(error))
-            cosine, sine = math.cos(history.turn), math.sin(history.turn)
+            history.turn += share * atan2(sin(error), cos(error))
+            sine, cosine = sincos(history.turn)
             history.offset[0] = px + share * (place.position[0] - px) - (cosine * x - sine * y)
             history.offset[1] = py + share * (place.position[1] - py) - (sine * x + cosine * y)
         turn_about_vertical(state.position, history.turn, base.position)
@@ -172,5 +173,5 @@ class PlaceCorrection(Block):
         base.angular_velocity[:] = state.angular_velocity
         turn = scratch.turn
         turn[0], turn[1] = 0.0, 0.0
-        turn[2], turn[3] = math.sin(0.5 * history.turn), math.cos(0.5 * history.turn)
+        turn[2], turn[3] = sincos(0.5 * history.turn)
         multiply(turn, state.orientation, base.orientation)

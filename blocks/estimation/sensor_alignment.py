@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D
 from ...mathematics.compiling.expressions import cross
+from ...mathematics.elementary import expm1, tanh
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import exponential, rotate
 from ...robots.transmission import PLAY_TIME, PLAY_TORQUE
@@ -180,9 +179,9 @@ def take_off_play(
     period: float,
 ) -> None:
     """Take off joint angles [rad] what the gears' play adds to them, by the torques that were measured with them."""
-    share = -math.expm1(-period / PLAY_TIME)
+    share = -expm1(-period / PLAY_TIME)
     for k in range(position.shape[0]):
-        end = constants.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
+        end = constants.play[k] * tanh(torque[k] / PLAY_TORQUE)
         memory.play[k] += share * (end - memory.play[k])
         position[k] -= memory.play[k]
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ...mathematics.elementary import exp
 from ...runtime.language.block import Block, Output, State
 from ...runtime.language.parameters import ScalarOrVector, live_parameter, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
@@ -121,7 +122,7 @@ class ColouredNoise(UnitFromParameters, Block):
         self._random = RandomStream(self, self.params.seed)
 
     def prepare(self) -> None:
-        decay = math.exp(-self.period / self.params.correlation_time)
+        decay = exp(-self.period / self.params.correlation_time)
         self.constants.decay = decay
         self.constants.share = math.sqrt(1.0 - decay * decay)
         self.constants.std[...] = self.params.std

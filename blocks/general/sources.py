@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from ...mathematics.elementary import expm1, sin
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Output
@@ -170,7 +171,7 @@ class SineWave(UnitFromParameters, Block):
     def step(y: Vector, params: Params, clock: Clock) -> None:
         time = clock.base_period * clock.tick
         angle = 2.0 * math.pi * params.frequency * time + params.phase
-        y.value[:] = params.offset + params.amplitude * math.sin(angle)
+        y.value[:] = params.offset + params.amplitude * sin(angle)
 
 
 class Chirp(UnitFromParameters, Block):
@@ -216,5 +217,5 @@ class Chirp(UnitFromParameters, Block):
         elif ratio == 0.0:
             cycles += start * inside
         else:
-            cycles += start * duration * math.expm1(ratio * inside / duration) / ratio
-        y.value[:] = params.offset + params.amplitude * math.sin(2.0 * math.pi * cycles)
+            cycles += start * duration * expm1(ratio * inside / duration) / ratio
+        y.value[:] = params.offset + params.amplitude * sin(2.0 * math.pi * cycles)

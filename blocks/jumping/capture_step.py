@@ -16,6 +16,7 @@ from ...mathematics.capture_step import (
     spread_to_feet,
     support_margin,
 )
+from ...mathematics.elementary import exp, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading
 from ...robots.kinematics import foot_sides, standing_feet
@@ -399,7 +400,7 @@ def choose_foothold(
         if distance < least:
             least = distance
             nearest[:] = other
-    grown = (1.0 + params.beyond) * math.exp(rate * left)
+    grown = (1.0 + params.beyond) * exp(rate * left)
     for k in range(2):
         out[k] = nearest[k] + grown * (capture[k] - nearest[k])
 
@@ -453,7 +454,7 @@ def swing_points(
     In the first half of the step the sole rises by ``height``. In the second it comes down as if the
     ground were lower by that, so it is still moving when it meets the ground.
     """
-    cosine, sine = math.cos(memory.heading), math.sin(memory.heading)
+    sine, cosine = sincos(memory.heading)
     elapsed, duration, height = memory.elapsed, params.duration, params.height
     left = max(duration - elapsed, _SHORTEST)
     rises = elapsed < 0.5 * duration

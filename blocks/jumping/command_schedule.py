@@ -23,9 +23,12 @@ class TimedCommand(Parameters):
     ahead: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far ahead it lands")
     aside: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far to the left")
     turn: float = parameter(0.0, unit="rad", ge=-3.2, le=3.2, text="turn to the left")
-    up: float = parameter(0.0, unit="m", ge=-10.0, le=10.0, text="how much higher the ground is there")
+    up: float = parameter(
+        0.0, unit="m", ge=-10.0, le=10.0, text="how much higher the ground is there"
+    )
     placed: bool = parameter(
-        False, text="whether these are x, y, heading and height in the world, where the run began at zero"
+        False,
+        text="whether these are x, y, heading and height in the world, where the run began at zero",
     )
     replaces: bool = parameter(
         False, text="whether it takes the place of the one before, if its jump has not begun"

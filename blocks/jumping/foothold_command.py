@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.signals import Field, Signal
@@ -48,5 +47,5 @@ class FootholdCommand(Block):
         )  # fmt: skip
         command.number, command.placed, command.replaces = memory.number, True, True
         command.ahead, command.aside = memory.position[0], memory.position[1]
-        command.turn = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        command.turn = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         command.up = memory.position[2]

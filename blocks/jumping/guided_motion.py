@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...planner.library.jump_table import JumpTable, TableRows, read_table, table_rows
 from ...robots.description import RobotDescription
@@ -149,7 +150,7 @@ class GuidedBody:
 
     def pitch(self, q: Array) -> float:
         """The forward pitch of the torso [rad]."""
-        return 2.0 * math.atan2(float(q[4]), float(q[6]))
+        return 2.0 * atan2(float(q[4]), float(q[6]))
 
     def angular_momentum(self, q: Array, v: Array) -> Array:
         """The angular momentum about the centre of mass [N m s, world], (3,)."""

@@ -88,7 +88,9 @@ class JumpPlan(Block):
     ``momentum_correction`` [N m s] that a rehearsal of the plan with this controller has learnt
     (``aloft plan --rehearse``), which are zero where there was none, or with ``rehearsed: false``. To
     them is added what the robot itself has learnt from its last jumps of this and of other tasks
-    (``aloft jump --learn``), if ``learnt`` names the file.
+    (``aloft jump --learn``), if ``learnt`` names the file. And it exports the ``load``: of every motor the
+    integral of its squared torque over the plan [N^2 m^2 s], from which a driver tells what the jump heats its
+    winding; none where the plan has yet to be solved.
 
     But for this, the progress and the rotation the block follows time alone. It raises ``BlockError`` at
     load where the task cannot be read or is for another robot, where it cannot be planned, or where its
@@ -211,7 +213,18 @@ class JumpPlan(Block):
             "rise": hops[0].rise if len(hops) == 1 else None,
             "velocity_correction": velocity,
             "momentum_correction": momentum,
+            "load": cls._load(task, params, context),
         }
+
+    @classmethod
+    def _load(cls, task: JumpTask, params: Params, context: Context) -> Mapping[str, float] | None:
+        """What the kept plan asks of the motors, if a block of the graph wants it."""
+        wanted = {"from": f"{context.path}.load"}
+        given = (block.get("with") or {} for block in context.graph.values())
+        if not any(value == wanted for each in given for value in each.values()):
+            return None
+        assert context.robot is not None
+        return plan_library(params, context.robot).load_of(_as_planned(task, params.formulation))
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:

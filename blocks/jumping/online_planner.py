@@ -96,7 +96,10 @@ class OnlinePlanner(Block):
         if number != int(answer.number):
             found = self._planner.plan(
                 HopRequest(
-                    float(request.ahead), float(request.aside), float(request.turn), float(request.up)
+                    float(request.ahead),
+                    float(request.aside),
+                    float(request.turn),
+                    float(request.up),
                 )
             )
             self._keep(found, number)

@@ -7,6 +7,7 @@ from typing import Literal
 
 from ...mathematics.arrays import Array1D, Array2D, Matrix3
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import atan2, cos, sin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle
 from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
@@ -299,5 +300,5 @@ def turned_beyond(rotation: Matrix3, orientation: Array1D) -> float:
     """By how much [rad] a body of this ``rotation`` has turned further about its y axis than one
     of the planned ``orientation``, a quaternion x, y, z, w."""
     planned = pitch_angle(orientation)
-    measured = math.atan2(-rotation[2, 0], rotation[0, 0])
-    return math.atan2(math.sin(measured - planned), math.cos(measured - planned))
+    measured = atan2(-rotation[2, 0], rotation[0, 0])
+    return atan2(sin(measured - planned), cos(measured - planned))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+from ...mathematics.elementary import cos, sin
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import multiply, turn_about_vertical
 from ...runtime.language.block import Block, Input, Output
@@ -39,5 +38,5 @@ class StartFrame(Block):
         base.angular_velocity[:] = state.angular_velocity
         turn = scratch.turn
         turn[0], turn[1] = 0.0, 0.0
-        turn[2], turn[3] = -math.sin(0.5 * frame.heading), math.cos(0.5 * frame.heading)
+        turn[2], turn[3] = -sin(0.5 * frame.heading), cos(0.5 * frame.heading)
         multiply(turn, state.orientation, base.orientation)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
+from ...mathematics.elementary import atan2, cos, sin, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, turn_about_vertical
 from ...planner.library.jump_table import (
@@ -73,7 +73,9 @@ class SteeringState(Signal):
     heading = Field(unit="rad", frame="world", text="heading of that frame")
     goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
     goal_heading = Field(unit="rad", frame="world", text="their heading there")
-    bias = Field(2, unit="m", text="by how much landings go too far ahead and aside, as learnt so far")
+    bias = Field(
+        2, unit="m", text="by how much landings go too far ahead and aside, as learnt so far"
+    )
     level = Field(unit="m", text="height of the ground there, above that where it first stood")
     before = Field(2, unit="m", frame="world", text="the goal before the command that waits")
     before_heading = Field(unit="rad", frame="world", text="the heading there")
@@ -291,7 +293,7 @@ def begin(middle: Array1D, heading: float, memory: SteeringState) -> None:
 def learn(middle: Array1D, heading: float, share: float, memory: SteeringState) -> None:
     """Take a share of how far the feet are from their goal, in their own axes, for the robot's own error."""
     x, y = middle[0] - memory.goal[0], middle[1] - memory.goal[1]
-    cosine, sine = math.cos(heading), math.sin(heading)
+    sine, cosine = sincos(heading)
     ahead, aside = cosine * x + sine * y, cosine * y - sine * x
     memory.bias[0] += share * min(max(ahead, -MOST_BIAS), MOST_BIAS)
     memory.bias[1] += share * min(max(aside, -MOST_BIAS), MOST_BIAS)
@@ -316,11 +318,11 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     memory.requests += 1
     memory.waits = True
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
-    cosine, sine = math.cos(heading), math.sin(heading)
+    sine, cosine = sincos(heading)
     turn = memory.goal_heading - heading
     memory.asked[0] = cosine * x + sine * y - memory.bias[0]
     memory.asked[1] = cosine * y - sine * x - memory.bias[1]
-    memory.asked[2] = math.atan2(math.sin(turn), math.cos(turn))
+    memory.asked[2] = atan2(sin(turn), cos(turn))
     memory.asked[3] = memory.level - memory.before_level
 
 
@@ -344,7 +346,7 @@ def land_at(done: Array1D, memory: SteeringState) -> None:
 @kernel
 def move(memory: SteeringState, ahead: float, aside: float, turn: float, up: float) -> None:
     """Move the goal by a jump."""
-    cosine, sine = math.cos(memory.goal_heading), math.sin(memory.goal_heading)
+    sine, cosine = sincos(memory.goal_heading)
     memory.goal[0] += cosine * ahead - sine * aside
     memory.goal[1] += sine * ahead + cosine * aside
     memory.goal_heading += turn
@@ -402,7 +404,7 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
 def tell_goal(memory: SteeringState, outcome: int, goal: CourseGoal) -> None:
     """The goal from where the robot stood at the start."""
     x, y = memory.goal[0] - memory.start[0], memory.goal[1] - memory.start[1]
-    cosine, sine = math.cos(memory.start_heading), math.sin(memory.start_heading)
+    sine, cosine = sincos(memory.start_heading)
     goal.position[0] = cosine * x + sine * y
     goal.position[1] = cosine * y - sine * x
     goal.heading = memory.goal_heading - memory.start_heading

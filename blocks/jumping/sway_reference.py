@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.interpolation import minimum_jerk
+from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...planner.library.jump_table import JumpTable
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
@@ -30,6 +32,8 @@ _SECOND = 2.3
 _FADE = 1.0
 """The time in which the motion begins and ends [s]."""
 _STEP = 1e-4
+_CODE = ("blocks/jumping", "blocks/signals", "mathematics", "planner/library", "robots")
+"""The code that decides on the motion."""
 
 
 class SwayReference(GuidedReference):
@@ -63,18 +67,25 @@ class SwayReference(GuidedReference):
     def make_table(self) -> JumpTable:
         """The stance and the motion after it."""
         p = self.params
-        return _plan(
+        return _kept_plan(
             self.robot.model_dump_json(), tuple(p.shift), tuple(p.turn), p.drop, p.frequency,
             p.stand_time, p.sway_time,
         )  # fmt: skip
 
 
 @lru_cache(maxsize=8)
+def _kept_plan(robot: str, *numbers: Any) -> JumpTable:
+    """As ``_plan``, computed once for all runs of a process, and kept for later ones."""
+    decided_by = (robot + repr(numbers)).encode() + code_digest(*_CODE)
+    arrays = kept_arrays(decided_by, lambda: _plan(robot, *numbers).as_arrays())
+    return JumpTable.from_arrays(arrays)
+
+
 def _plan(
     robot: str, shift: ThreeNumbers, turn: ThreeNumbers, drop: float, frequency: float,
     stand_time: float, sway_time: float,
 ) -> JumpTable:  # fmt: skip
-    """The motion for a robot given as JSON; it is computed once for all runs of a process."""
+    """The motion for a robot given as JSON."""
     description = RobotDescription.model_validate_json(robot)
     body = GuidedBody(build_pinocchio_model(description), description)
     table = MotionRecorder(body, body.standing(description.standing_position))

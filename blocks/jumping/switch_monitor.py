@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from ...mathematics.elementary import exp
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, parameter
@@ -91,7 +90,7 @@ class SwitchMonitor(Block):
         constants.air_samples = round(p.air_time / self.period)
         if p.stand_time is not None:
             constants.stand_samples = max(1, round(p.stand_time / self.period))
-        constants.fading = np.exp(-self.period / p.bounce_window)
+        constants.fading = exp(-self.period / p.bounce_window)
 
     @kernel
     @staticmethod

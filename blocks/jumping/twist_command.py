@@ -31,9 +31,7 @@ class TwistCommand(Block):
         jump_time: float = parameter(
             1.9, unit="s", gt=0.0, le=10.0, text="from one jump to the next one"
         )
-        least: float = parameter(
-            0.02, unit="m", ge=0.0, le=0.2, text="shorter jumps are none"
-        )
+        least: float = parameter(0.02, unit="m", ge=0.0, le=0.2, text="shorter jumps are none")
         least_turn: float = parameter(
             0.05, unit="rad", ge=0.0, le=0.5, text="smaller turns on the spot are none"
         )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from enum import IntEnum
-from math import atan2, cos, degrees, radians, sin, sqrt
+from math import degrees, radians, sqrt
 
+from ...mathematics.elementary import atan2, cos, sin, sincos
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.context import Clock
@@ -251,7 +252,7 @@ def measure_place(record: CourseRecord) -> None:
     """Compare the place of the feet with the target."""
     find_place(record)
     x, y = record.middle[0] - record.start[0], record.middle[1] - record.start[1]
-    cosine, sine = cos(record.start_heading), sin(record.start_heading)
+    sine, cosine = sincos(record.start_heading)
     dx = cosine * x + sine * y - record.target[0]
     dy = cosine * y - sine * x - record.target[1]
     turn = record.heading - record.start_heading - record.target_heading

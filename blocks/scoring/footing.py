@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import atan2, cos, sin, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D, Vector3
+from ...mathematics.elementary import atan2, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
 from ...robots.description import RobotDescription
@@ -136,7 +137,7 @@ def measure_feet(
             continue
         if feet == 1:
             heading = yaw(orientation)
-            direction[foot, 0], direction[foot, 1] = cos(heading), sin(heading)
+            direction[foot, 1], direction[foot, 0] = sincos(heading)
             continue
         for axis in range(2):
             total = 0.0

@@ -7,9 +7,10 @@ their apex and where they land.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import atan2, cos, degrees, pi, radians, sin
+from math import degrees, pi, radians
 
 from ...mathematics.arrays import Array2D
+from ...mathematics.elementary import atan2, cos, sin
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field, Signal

@@ -55,6 +55,16 @@ class BaseState(Signal):
     angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity of the base")
 
 
+class MotorCondition(Signal):
+    """What motors and pack are like now. Shares are of what the description says, in the motors' order."""
+
+    torque_constant = Field("n_joints", text="share of the torque constant")
+    corner_speed = Field("n_joints", text="share of the speed up to which there is peak torque")
+    no_load_speed = Field("n_joints", text="share of the speed at which there is no torque left")
+    open_voltage = Field(unit="V", text="of the pack without load; zero: not known")
+    pack_resistance = Field(unit="ohm", text="of the pack and its leads")
+
+
 class PlaceMeasurement(Signal):
     """Where the base is, as seen from outside."""
 

@@ -41,10 +41,12 @@ class JumpCommand(Signal):
         dtype="int64", text="counts the commands; a jump follows a number that is greater"
     )
     replaces = Field(
-        dtype="bool", text="whether it takes the place of a command whose jump has not begun; else it waits for it"
+        dtype="bool",
+        text="whether it takes the place of a command whose jump has not begun; else it waits for it",
     )
     placed = Field(
-        dtype="bool", text="whether the rest is a foothold in the estimator's world: x, y, heading and height of the ground"
+        dtype="bool",
+        text="whether the rest is a foothold in the estimator's world: x, y, heading and height of the ground",
     )
     ahead = Field(unit="m", text="how far ahead of the feet")
     aside = Field(unit="m", text="how far to their left")

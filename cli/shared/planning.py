@@ -75,12 +75,12 @@ def winding_heat(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]
     A run also stands before and after: in simulation ``winding_heat_j`` of jumps of 12 cm is 10 J more.
     """
     from ...blocks.control.safety_monitor import SafetyMonitor
+    from ...planner.task.plan import motor_load
 
     copper = SafetyMonitor.Params()
-    torque = np.asarray(plan.joint_torque[:-1] @ robot.torque_to_motor.T)
-    squared = (torque**2 * np.diff(plan.time)[:, None]).sum(axis=0)
-    heat = copper.winding_resistance / copper.torque_constant**2 * squared
-    return dict(zip(robot.transmission.motors, heat.tolist(), strict=True))
+    each = copper.winding_resistance / copper.torque_constant**2
+    load = motor_load(plan.time, plan.joint_torque, robot)
+    return {motor: each * squared for motor, squared in load.items()}
 
 
 def _shown(value: Any) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...runtime.language.errors import AloftError
 from .output import say, table
+from .robot_trials import graph_of, jump_graphs
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,43 +115,3 @@ def show(found: Rehearsed, task: JumpTask, screen: Console) -> dict[str, Any]:
     screen.print(table(f"{task.name}: rehearsed", columns, rows))
     say(screen, f"rehearsed in the {found.trial} trial: {found.reason}")
     return {"rehearsal": {**asdict(found), "corrects": found.corrects}}
-
-
-def graph_of(robot: str) -> tuple[Path, list[str]]:
-    """The shipped graph in which a robot jumps, and the settings that name robot and task there.
-
-    A robot without a graph of its own, also one in a URDF, MJCF or YAML file, jumps in that of all
-    robots.
-
-    Raises:
-        AloftError: there is no such robot.
-    """
-    from ...files.nodes import text_of
-    from ...robots.description import path_of
-    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
-
-    known = jump_graphs()
-    if robot in known:
-        return known[robot], []
-    try:
-        found = path_of(robot)
-    except LookupError as error:
-        raise AloftError(f"--robot {robot}: {error.args[0]}; or give a file: robot.urdf") from error
-    named = robot if found.stem == robot else str(found.resolve())
-    path = shipped_graphs()[f"{PREFIX}robots/jump"]
-    return path, [f"robot={text_of(named)}", f"plan.task={{rise: {FIRST_RISE}}}"]
-
-
-FIRST_RISE = 0.1
-"""How high a robot without a task of its own jumps, if it is not said [m]."""
-
-
-def jump_graphs() -> dict[str, Path]:
-    """The shipped graph in which each robot jumps, by the robot's name."""
-    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
-
-    return {
-        name.removeprefix(f"{PREFIX}robots/").removesuffix("_jump"): path
-        for name, path in shipped_graphs().items()
-        if name.endswith("_jump") and name.startswith(f"{PREFIX}robots/")
-    } | {"bruce": shipped_graphs()[f"{PREFIX}jump"]}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,15 +15,7 @@ from .output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
     from ...robots.calibration import Calibration
-    from ...robots.identification import MeasuredRun
-    from ...robots.robot_description import RobotDescription
-
-_FIELDS = {
-    "position": "joints.position", "velocity": "joints.velocity", "torque": "joints.torque",
-    "rate": "imu.angular_velocity", "force": "imu.specific_force", "closed": "contacts.closed",
-    "voltage": "health.voltage",
-}  # fmt: skip
-_PHASE = "phase.phase.phase"
+    from ...studies.robot_calibration import SwayedRun
 
 
 def calibrate(
@@ -54,14 +47,17 @@ def calibrate(
     and what the model does not explain is listed by joint and sensor, and by phase.
     """
     from ...robots.calibration import fragment
+    from ...studies.robot_calibration import calibration_from
 
     with errors_reported(as_json):
-        signals, period, description = _measured(source, settings or [], robot, command)
-        found = _found(signals, period, description, mass, source)
+        with _blocks_of(source):
+            run = _measured(source, settings or [], robot, command)
+            found = calibration_from(run, mass)
         if jump is not None:
-            signals, period, description = _measured(jump, [], robot, command, whole=False)
-        phases = _by_phase(signals, period, description, found)
-        text = fragment(description, found, source.name)
+            with _blocks_of(jump):
+                run = _measured(jump, [], robot, command, whole=False)
+        phases = _by_phase(run, found)
+        text = fragment(run.robot, found, source.name)
         if out is not None:
             try:
                 out.write_text(text, encoding="utf-8")
@@ -88,109 +84,52 @@ def calibrate(
         typer.echo(text, nl=False)
 
 
-def _measured(
-    source: Path, settings: list[str], robot: str, command: str, whole: bool = True
-) -> tuple[dict[str, Any], float, RobotDescription]:
-    """All signals that are needed, from a run that is made now or from a recording; ``whole``: a run
-    that does not succeed is of no use."""
-    names = {key: f"{robot}.{field}" for key, field in _FIELDS.items()}
-    names |= {key: f"{command}.{key}" for key in ("stiffness", "damping")}
-    names["asked"] = f"{command}.torque"
+@contextmanager
+def _blocks_of(source: Path) -> Iterator[None]:
+    """A block or a port that is not there is an error of this file."""
     try:
-        if source.suffix in (".yaml", ".yml"):
-            from ...runtime.graph import load
-
-            graph = load(source, settings)
-            result = graph.run()
-            result.raise_if_failed()
-            if whole and not result.success:
-                raise AloftError(f"{source}: the robot did not sway to the end: {result.reason}")
-            assert graph.checked.robot is not None
-            signals = {key: result.signal(name) for key, name in names.items()}
-            signals["phase"] = _phases(result.signal, len(signals["asked"]))
-            return signals, result.period, graph.checked.robot
-        if settings:
-            raise AloftError("--set is for a graph; a recording has been made already")
-        from .viewing import read
-
-        run = read(source)
-        if run.header.robot is None:
-            raise AloftError(f"{source}: the graph {run.header.name} names no robot")
-        signals = {key: run[name] for key, name in names.items()}
-        signals["phase"] = _phases(run.__getitem__, len(signals["asked"]))
-        return signals, 1.0 / run.header.base_rate, run.header.robot
+        yield
     except KeyError as error:
         raise AloftError(
             f"{source}: {error.args[0]}; --robot and --command name the blocks"
         ) from error
 
 
-def _phases(signal: Callable[[str], Any], ticks: int) -> Any:
-    """The phase of each tick; a robot whose graph tells none stands."""
-    import numpy as np
+def _measured(
+    source: Path, settings: list[str], robot: str, command: str, whole: bool = True
+) -> SwayedRun:
+    """A run that is made now, or a recorded one; ``whole``: a run that does not succeed is of no use."""
+    from ...studies.robot_calibration import read_run, swayed
 
-    try:
-        return signal(_PHASE)
-    except KeyError:
-        return np.zeros(ticks, dtype=np.int64)
+    if source.suffix in (".yaml", ".yml"):
+        from ...runtime.graph import load
+
+        return swayed(load(source, settings), robot, command, whole)
+    if settings:
+        raise AloftError("--set is for a graph; a recording has been made already")
+    from .viewing import read
+
+    run = read(source)
+    if run.header.robot is None:
+        raise AloftError(f"the graph {run.header.name} names no robot")
+    return read_run(run.__getitem__, 1.0 / run.header.base_rate, run.header.robot, robot, command)
 
 
-def _motion(signals: dict[str, Any], period: float) -> MeasuredRun:
-    import numpy as np
-
-    from ...robots.identification import MeasuredRun
-
-    return MeasuredRun(
-        period, signals["position"], signals["velocity"], signals["torque"], signals["rate"],
-        signals["force"], np.zeros((len(signals["position"]), 3)), signals["closed"],
-    )  # fmt: skip
-
-
-def _by_phase(
-    signals: dict[str, Any], period: float, robot: RobotDescription, found: Calibration
-) -> dict[str, dict[str, float]]:
+def _by_phase(run: SwayedRun, found: Calibration) -> dict[str, dict[str, float]]:
     """What is not explained in the phases in which the robot moves as it is told."""
     from ...blocks.signals.jumping import Phase
     from ...robots.phase_residuals import phase_residuals
 
     standing = (Phase.STAND, Phase.SQUAT, Phase.RECOVER)
-    names = {
-        int(each): each.name.lower()
-        for each in (
-            Phase.STAND,
-            Phase.SQUAT,
-            Phase.THRUST,
-            Phase.FLIGHT,
-            Phase.LANDING,
-            Phase.RECOVER,
-        )
-    }
+    judged = (*standing[:2], Phase.THRUST, Phase.FLIGHT, Phase.LANDING, Phase.RECOVER)
     return phase_residuals(
-        robot,
-        _motion(signals, period),
-        signals["phase"],
-        names,
+        run.robot,
+        run.motion,
+        run.phase,
+        {int(each): each.name.lower() for each in judged},
         frozenset(map(int, standing)),
         found,
     )
-
-
-def _found(
-    signals: dict[str, Any],
-    period: float,
-    robot: RobotDescription,
-    mass: float | None,
-    source: Path,
-) -> Calibration:
-    from ...robots.calibration import calibrate_robot
-    from ...robots.identification import IdentificationError
-
-    motion = _motion(signals, period)
-    feedback = (signals["stiffness"] != 0.0).any(axis=1) | (signals["damping"] != 0.0).any(axis=1)
-    try:
-        return calibrate_robot(robot, motion, signals["voltage"], signals["asked"], feedback, mass)
-    except IdentificationError as error:
-        raise AloftError(f"{source}: {error}") from error
 
 
 def _rows(found: Calibration) -> list[tuple[str, str, str, str]]:

@@ -1,7 +1,7 @@
 """The effects that a simulated robot can have, for ``aloft robot show --effects``.
 
-Parameters, units and defaults are those of the simulator's own models; what the trial ``real`` sets, and
-the source behind it, are values and comments of ``graphs/trials/real.yaml`` and of the trials it includes.
+Parameters, units and defaults are those of the simulator's own models; what the trials ``real`` and
+``warm`` set, and the source behind it, are values and comments of their files and of the trials they include.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from ...hal.simulated.simulated_robot import SimulatorParameters
 from ...planner.library.library import shipped_folder
 from ...runtime.language.parameters import Parameters
 
+TRIAL = "warm"
+"""The trial whose sizes are shown: ``real``, and what it adds."""
 ROBOT = "robot."
 """What the trials' keys for the simulated robot begin with."""
 
@@ -32,7 +34,7 @@ class Setting(NamedTuple):
     source: str
 
 
-def simulated_effects(trial: str = "real") -> list[dict[str, Any]]:
+def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
     """Every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``, ``default``, what the trial
     sets (``trial``, ``None`` if nothing) and ``source``.
 

@@ -137,7 +137,7 @@ class BearRobot(DrivenRobot):
         except BusError:
             bus_port.close()
             raise
-        driver = Driver(self.robot, hardware, bus_port, board_port, self._law)
+        driver = Driver(self.robot, hardware, bus_port, board_port, self._law, params.planned_load)
         self.driver = driver
         self._opened_at = time.monotonic()
         driver.loop.clock = self.now

@@ -178,14 +178,22 @@ class DriveSettings(Parameters):
         text="of the pack and its leads: under load the voltage may be lower",
     )
     winding_resistance: float = parameter(0.2, unit="ohm", ge=0, text="of a motor, for its load")
+    winding_heat_capacity: float = parameter(15.0, unit="J/K", gt=0, text="of a winding")
+    winding_thermal_resistance: float = parameter(
+        2.0, unit="K/W", gt=0, text="from a winding to what cools it"
+    )
+    coolant_temperature: float = parameter(25.0, ge=-20.0, le=80.0, text="of what cools it [deg C]")
     highest_voltage: float = parameter(18.0, unit="V", gt=0, text="above it nothing is enabled")
     highest_temperature: float = parameter(
         75.0, gt=0, le=125.0, text="of a winding [deg C]; beyond it all drives are damped"
     )
     jump_heating: float = parameter(
         5.0, ge=0, le=100.0,
-        text="what a jump heats a winding [deg C]: too hot for one more, nothing is enabled",
+        text="what a jump heats a winding [K] where its plan is not known: too hot for one more, nothing is enabled",
     )  # fmt: skip
+    heat_margin: float = parameter(
+        1.5, ge=1.0, le=10.0, text="by how much more a run heats a winding than its plan alone does"
+    )
 
 
 class MotorSettings(Parameters):

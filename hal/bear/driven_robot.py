@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ...files.problems import Code, Position, Problem, Report
+from ...files.problems import Code, Position, Problem, Report, listing
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
@@ -23,6 +23,11 @@ class DriveParameters(DriveGains):
     armed: bool = parameter(
         False, text="whether the drives may be switched on; else they are only watched"
     )
+    planned_load: dict[str, float] | None = parameter(
+        None,
+        text="integral of the squared torque of every motor over the plan [N^2 m^2 s], {from: plan.load}: with "
+        "windings that it would overheat nothing is enabled; none: `drives.jump_heating` of the hardware",
+    )  # fmt: skip
 
 
 class DrivenRobot(Robot):
@@ -37,6 +42,13 @@ class DrivenRobot(Robot):
         robot = context.robot
         assert isinstance(params, DriveParameters) and robot is not None
         yield from gain_requirements(params, robot)
+        motors = robot.transmission.motors
+        missing = [name for name in motors if name not in (params.planned_load or motors)]
+        if missing:
+            yield UnmetRequirement(
+                f"the planned load says nothing of {listing(missing)}", parameter="planned_load",
+                expected="a number for every motor", fix="planned_load: {from: plan.load}",
+            )  # fmt: skip
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:

@@ -25,6 +25,7 @@ from .configuration import Hardware
 from .motor_loop import MotorLoop
 from .protocol import Mode, Torque
 from .sense_board import BoardMode, SenseBoard
+from .winding_heat import hot_winding
 
 
 class DriveLaw:
@@ -139,13 +140,19 @@ def configure(
         )
 
 
-def check_ready(loop: MotorLoop, standing: Array, names: tuple[str, ...]) -> None:
+def check_ready(
+    loop: MotorLoop,
+    standing: Array,
+    names: tuple[str, ...],
+    load: Mapping[str, float] | None = None,
+) -> None:
     """See to it that every drive is healthy and near enough to the standing pose.
 
     Args:
         loop: after a cycle, with the drives off.
         standing: the motors' angles in the standing pose [rad], (n_joints,).
         names: the motors.
+        load: what the plan asks of them, as for ``winding_heat.rise_of``.
 
     Raises:
         BusError: all that is wrong, by drive.
@@ -160,11 +167,9 @@ def check_ready(loop: MotorLoop, standing: Array, names: tuple[str, ...]) -> Non
                 f"{name} has {voltage:.1f} V instead of {drives.lowest_voltage:g} to "
                 f"{drives.highest_voltage:g} V"
             )
-        if measured.temperature.item(k) > drives.highest_temperature - drives.jump_heating:
-            wrong.append(
-                f"{name} has {measured.temperature.item(k):.0f} deg C: with {drives.jump_heating:g} "
-                f"of a jump more than {drives.highest_temperature:g}"
-            )
+        hot = hot_winding(hardware, name, measured.temperature.item(k), load)
+        if hot is not None:
+            wrong.append(str(hot))
         if not abs(angle - standing.item(k)) <= farthest:
             wrong.append(
                 f"{name} is at {angle:.2f} rad and stands at {standing.item(k):.2f}: more than "
@@ -242,6 +247,7 @@ class Driver:
         hardware: how they are connected and what they may do.
         bus_port, board_port: open serial ports.
         law: the drives' gains, and how commands become their goals.
+        load: what the plan of the run asks of the motors, as for ``winding_heat.rise_of``.
 
     Attributes:
         cooling: the strength of pump and fan that the board was told.
@@ -249,10 +255,10 @@ class Driver:
 
     def __init__(
         self, robot: RobotDescription, hardware: Hardware, bus_port: SerialPort,
-        board_port: SerialPort, law: DriveLaw,
+        board_port: SerialPort, law: DriveLaw, load: Mapping[str, float] | None = None,
     ) -> None:  # fmt: skip
         names = self._names = robot.transmission.motors
-        self.hardware = hardware
+        self.hardware, self._load = hardware, load
         self.bus = BearBus(bus_port, reply_time=hardware.bus.reply_time)
         self.board = SenseBoard(board_port, hardware.board.mounted(robot))
         self._gains = (
@@ -300,7 +306,7 @@ class Driver:
             clear_errors(self.bus, self.hardware)
             configure(self.bus, self.hardware, *self._gains)
             self.loop.cycle()
-            check_ready(self.loop, self._standing, self._names)
+            check_ready(self.loop, self._standing, self._names, self._load)
             enable(self.loop, self._names)
             soft_start(self.loop, self._standing, next_cycle)
             self.loop.measured.forget_torques()  # those of the way to the standing pose

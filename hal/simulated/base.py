@@ -10,6 +10,7 @@ import numpy as np
 from ...blocks.signals import RobotTruth
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import sincos
 from ...mathematics.kernel import kernel
 from ...runtime.language.steps import signal_call
 
@@ -33,7 +34,7 @@ def report_planar(position: Array1D, velocity: Array1D, truth: RobotTruth) -> No
     half = 0.5 * position[2]
     report_fixed(truth)
     truth.base_position[0], truth.base_position[2] = position[0], position[1]
-    truth.base_orientation[1], truth.base_orientation[3] = math.sin(half), math.cos(half)
+    truth.base_orientation[1], truth.base_orientation[3] = sincos(half)
     truth.base_linear_velocity[0], truth.base_linear_velocity[2] = velocity[0], velocity[1]
     truth.base_angular_velocity[1] = velocity[2]
 

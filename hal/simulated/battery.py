@@ -14,12 +14,14 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import expm1
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
 from .drives import DriveTrain, MotorLimits, MotorScratch
 from .effects import BatteryParameters
 from .state import PhysicsState
+from .windings import WarmMotors
 
 
 class Pack(NamedTuple):
@@ -41,8 +43,8 @@ class Pack(NamedTuple):
 
 
 @kernel
-def draw_power(pack: Pack, motors: DriveTrain, scratch: MotorScratch, memory: PhysicsState) -> None:
-    """The voltage after a physics step with these motor torques and speeds, and the limits at it.
+def draw_power(pack: Pack, scratch: MotorScratch, memory: PhysicsState) -> None:
+    """The voltage after a physics step with these motor torques and speeds.
 
     ``memory.battery`` holds the voltage [V], the charge that is gone [C], the voltage that is still to
     recover [V], and the current [A].
@@ -69,7 +71,12 @@ def draw_power(pack: Pack, motors: DriveTrain, scratch: MotorScratch, memory: Ph
     battery[1] += current * pack.timestep
     battery[2] += pack.share * (pack.recovery_resistance * current - battery[2])
     battery[3] = current
-    ratio = max(voltage / pack.rated_voltage, 0.05)
+
+
+@kernel
+def limit_by_voltage(pack: Pack, motors: DriveTrain, memory: PhysicsState) -> None:
+    """What the motors can do at the pack's voltage."""
+    ratio = max(memory.battery[0] / pack.rated_voltage, 0.05)
     for k in range(pack.no_load.shape[0]):
         motors.no_load[k] = pack.no_load[k] * ratio
         motors.slope[k] = pack.slope[k] / ratio
@@ -89,14 +96,24 @@ class Battery:
         robot: whose description has a ``supply``.
         timestep: of the physics [s].
         memory: keeps voltage and charge.
+        warm: the motors as their temperature leaves them; none: it does not change.
     """
 
     def __init__(
         self, params: BatteryParameters, robot: RobotDescription, timestep: float,
-        memory: PhysicsState,
+        memory: PhysicsState, warm: WarmMotors | None = None,
     ) -> None:  # fmt: skip
-        self._supply, self._heating = params.of(robot), params.of(robot).heating(robot.motors)
-        self._recovery_time, self._timestep, self._memory = params.recovery_time, timestep, memory
+        p = self._supply = params.of(robot)
+        motors, self._memory = robot.motors, memory
+        slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
+        curves = (slope, np.array(motors.no_load_speed), p.heating(motors))
+        if warm is not None:
+            curves = (warm.slope, warm.no_load, warm.heating)
+        self._pack = Pack(
+            p.open_voltage, p.resistance, -expm1(-timestep / params.recovery_time),
+            p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage, timestep,
+            *curves,
+        )  # fmt: skip
 
     def begin(self) -> None:
         """The pack is full and has rested."""
@@ -109,11 +126,9 @@ class Battery:
         return found
 
     def feeding(self, limits: MotorLimits) -> KernelCall:
-        """Feeds the motors in a physics step, and sets what they can do in the next one."""
-        p, motors = self._supply, limits.motors
-        pack = Pack(
-            p.open_voltage, p.resistance, -math.expm1(-self._timestep / self._recovery_time),
-            p.recovery_resistance, p.fall, p.capacity, p.board_power, p.rated_voltage,
-            self._timestep, np.array(motors.slope), np.array(motors.no_load), self._heating,
-        )  # fmt: skip
-        return signal_call(draw_power, pack, motors, limits.scratch, self._memory)
+        """Feeds the motors in a physics step."""
+        return signal_call(draw_power, self._pack, limits.scratch, self._memory)
+
+    def limiting(self, limits: MotorLimits) -> KernelCall:
+        """Sets what the motors can do at the present voltage, before a physics step."""
+        return signal_call(limit_by_voltage, self._pack, limits.motors, self._memory)

@@ -21,6 +21,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Array1D, Array2D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import expm1, sin, tanh
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
@@ -28,8 +29,9 @@ from ...robots.transmission import PLAY_TIME, PLAY_TORQUE, SLIDING_SPEED
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
-from .effects import EncoderEffects, MotorEffects
+from .effects import EncoderEffects, MotorEffects, WindingParameters
 from .state import PhysicsState
+from .windings import Windings
 
 
 class EncoderModel(NamedTuple):
@@ -66,10 +68,10 @@ def sense_joints(
     """
     for k in range(position.shape[0]):
         reading = position[k] + model.compliance * torque[k]
-        end = model.play[k] * math.tanh(torque[k] / PLAY_TORQUE)
+        end = model.play[k] * tanh(torque[k] / PLAY_TORQUE)
         memory.encoder_play[k] += model.crossing * (end - memory.encoder_play[k])
         reading += memory.encoder_play[k]
-        reading += model.eccentricity * math.sin(position[k] + model.phase[k])
+        reading += model.eccentricity * sin(position[k] + model.phase[k])
         scratch.position[k] = reading
     scratch.counts[0] = memory.encoder_taken[0]
     delay_sample(
@@ -136,11 +138,11 @@ def produce_torque(
         if model.peak[k] > 0.0:
             load = min(abs(given) / model.peak[k], 1.0)
         given *= model.constant[k] * (1.0 - model.saturation * load * load)
-        given -= model.friction * abs(given) * math.tanh(scratch.speed[k] / SLIDING_SPEED)
+        given -= model.friction * abs(given) * tanh(scratch.speed[k] / SLIDING_SPEED)
         turned = model.periods * scratch.angle[k] + model.phase[k]
-        given += model.ripple[k] * math.sin(turned)
+        given += model.ripple[k] * sin(turned)
         turned = model.teeth * scratch.angle[k] + model.at_tooth[k]
-        given += model.cogging[k] * math.sin(turned)
+        given += model.cogging[k] * sin(turned)
         scratch.gained[k] = given - requested[k]
     multiply_vector(model.to_joint, scratch.gained, scratch.joint)
     torque[:] += scratch.joint
@@ -154,39 +156,44 @@ class DriveEffects:
         encoders, motors: the sizes of the effects.
         seed: draws what differs from motor to motor.
         timestep: of the physics [s].
-        memory: of late readings, filters and current loops.
+        memory: of late readings, filters, current loops and windings.
+        windings: that warm; none: they do not.
     """
 
     def __init__(
         self, robot: RobotDescription, encoders: EncoderEffects, motors: MotorEffects, seed: int,
-        timestep: float, memory: PhysicsState,
+        timestep: float, memory: PhysicsState, windings: WindingParameters | None = None,
     ) -> None:  # fmt: skip
         n = len(robot.joints)
         self._memory, self._count = memory, n
         self.has_encoders = encoders != EncoderEffects()
-        self.has_motors = motors != MotorEffects()
+        self.has_motors = motors != MotorEffects() or windings is not None
         time = encoders.velocity_filter
         turn = 2.0 * math.pi
         self._encoders = EncoderModel(
             np.full(n, round(encoders.delay / timestep)),
-            -math.expm1(-timestep / time) if time > 0.0 else 1.0,
+            -expm1(-timestep / time) if time > 0.0 else 1.0,
             encoders.eccentricity, turn * stream(seed, Purpose.ECCENTRICITY).random(n),
-            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -math.expm1(-timestep / PLAY_TIME),
+            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -expm1(-timestep / PLAY_TIME),
         )  # fmt: skip
         draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
         self.torque_constant = motors.torque_constant * (
             1.0 + motors.torque_constant_spread * draws
         )
-        """The factor on the torque constant of every motor, (n,)."""
+        """The factor on the torque constant of every motor at its nominal temperature, (n,)."""
+        self.windings = None
+        if windings is not None:
+            self.windings = Windings(windings, robot, self.torque_constant, timestep, memory)
+        constant = self.torque_constant if self.windings is None else self.windings.warm.constant
         band = motors.current_bandwidth
         self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
         """By how much [s] a drive's loop is late beside that of an ideal drive."""
         limit = math.inf if motors.torque_limit is None else motors.torque_limit
         self._motors = DrawnMotors(
             np.ascontiguousarray(robot.joint_to_motor),
-            np.ascontiguousarray(robot.joint_to_motor.T), self.torque_constant,
+            np.ascontiguousarray(robot.joint_to_motor.T), constant,
             motors.saturation, np.array(robot.motors.peak_torque),
-            -math.expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
+            -expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
             motors.ripple * robot.motors.peak_torque, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
             motors.load_friction, motors.cogging * robot.motors.peak_torque, motors.cogging_periods,
             turn * stream(seed, Purpose.COGGING).random(n),
@@ -194,7 +201,11 @@ class DriveEffects:
 
     @staticmethod
     def dimensions(
-        robot: RobotDescription, encoders: EncoderEffects, motors: MotorEffects, timestep: float
+        robot: RobotDescription,
+        encoders: EncoderEffects,
+        motors: MotorEffects,
+        timestep: float,
+        windings: WindingParameters | None = None,
     ) -> Mapping[str, int]:
         """The sizes of what is kept in ``PhysicsState``."""
         n = len(robot.joints)
@@ -202,7 +213,8 @@ class DriveEffects:
         return {
             "n_sensed_joints": n if sensed else 0,
             "n_encoder_slots": round(encoders.delay / timestep) + 1 if sensed else 0,
-            "n_real_motors": n if motors != MotorEffects() else 0,
+            "n_real_motors": n if motors != MotorEffects() or windings is not None else 0,
+            "n_windings": n if windings is not None else 0,
         }
 
     def sensing(self, position: Array, velocity: Array, torque: Array) -> KernelCall:

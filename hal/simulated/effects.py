@@ -1,7 +1,7 @@
 """What a simulated robot can have that its description does not say: the parameters of all effects.
 
 How each effect is computed stands in the file that uses its parameters: ``imu_effects.py``, ``drive_effects.py``,
-``gears.py``, ``battery.py``, ``switch_effects.py``, ``gantry.py``, ``joint_effects.py`` and ``variation.py``. A check of a graph needs none
+``gears.py``, ``battery.py``, ``windings.py``, ``switch_effects.py``, ``gantry.py``, ``joint_effects.py`` and ``variation.py``. A check of a graph needs none
 of them. A *spread* is half the width of a uniform distribution around the nominal value, drawn by the seed.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from ...mathematics.arrays import Array
+from ...mathematics.constants import COPPER, MAGNETS
 from ...robots.robot_description import PowerSupply, RobotDescription
 from ...runtime.language.parameters import Parameters, ThreeNumbers, TwoNumbers, parameter
 
@@ -256,6 +257,40 @@ class BatteryParameters(Parameters):
         """The supply of a robot whose description has one, with what is said here in place of its values."""
         assert robot.supply is not None
         changes = self.model_dump(exclude_none=True, exclude={"recovery_time"})
+        return robot.supply.model_copy(update=changes)
+
+
+class WindingParameters(Parameters):
+    """Windings that warm, and by what that weakens the motors; what is none is as ``supply`` in the robot's description says."""
+
+    temperature: float = parameter(
+        25.0, ge=-40.0, le=150.0, text="of all windings at the start [deg C]"
+    )
+    ambient: float = parameter(25.0, ge=-40.0, le=100.0, text="of what cools them [deg C]")
+    magnets: float = parameter(
+        MAGNETS,
+        unit="1/K",
+        ge=0.0,
+        le=0.01,
+        text="share of the torque constant at 25 deg C that is lost",
+    )
+    copper: float = parameter(
+        COPPER,
+        unit="1/K",
+        ge=0.0,
+        le=0.01,
+        text="share of the resistance at 25 deg C that is gained",
+    )
+    heat_capacity: float | None = parameter(None, unit="J/K", gt=0.0, text="of a winding")
+    thermal_resistance: float | None = parameter(
+        None, unit="K/W", gt=0.0, text="from a winding to what cools it"
+    )
+
+    def of(self, robot: RobotDescription) -> PowerSupply:
+        """The supply of a robot whose description has one, with what is said here in place of its windings' values."""
+        assert robot.supply is not None
+        given = {"heat_capacity": self.heat_capacity, "thermal_resistance": self.thermal_resistance}
+        changes = {f"winding_{name}": value for name, value in given.items() if value is not None}
         return robot.supply.model_copy(update=changes)
 
 

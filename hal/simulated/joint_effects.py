@@ -12,13 +12,13 @@ with speed it drives the joint; a step must be short beside the time in which th
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementary import exp
 from ...mathematics.kernel import kernel
 from ...runtime.language.steps import signal_call
 
@@ -37,7 +37,7 @@ def set_friction(velocity: Array1D, friction: StribeckFriction, loss: Array1D) -
     """Write the friction loss [N m] of joints at their ``velocity`` [rad/s] to ``loss``, (n_joints,)."""
     for k in range(velocity.shape[0]):
         ratio = velocity[k] / friction.velocity
-        loss[k] = friction.coulomb[k] + friction.beyond[k] * math.exp(-ratio * ratio)
+        loss[k] = friction.coulomb[k] + friction.beyond[k] * exp(-ratio * ratio)
 
 
 def falling_friction(

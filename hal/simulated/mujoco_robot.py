@@ -56,10 +56,10 @@ class MujocoRobot(SimulatedRobot):
     other. Snapshots are exact: a restored run continues bit for bit.
 
     A real robot differs from its description in what ``imu``, ``encoders``, ``motors``, ``gears``,
-    ``battery``, ``switches``, ``soles``, ``links``, ``joints``, ``cable`` and ``floor_tilt`` say; by default
+    ``battery``, ``windings``, ``switches``, ``soles``, ``links``, ``joints``, ``cable`` and ``floor_tilt`` say; by default
     in nothing. The trial ``graphs/trials/real.yaml`` has the usual sizes.
 
-    It does not model: motor temperature, contact of a limb with the torso or with itself, wind.
+    It does not model: contact of a limb with the torso or with itself, wind.
 
     Raises:
         StartError: the robot does not stand as its description says.
@@ -98,7 +98,7 @@ class MujocoRobot(SimulatedRobot):
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
                 "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
             },
-            "battery": {"resistance": 0.03},
+            "battery": {"resistance": 0.03}, "windings": {"temperature": 60.0},
             "links": {
                 "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
             },
@@ -207,7 +207,7 @@ class MujocoRobot(SimulatedRobot):
             *plant.reading_switches(self.contacts.closed),
             *plant.sensors.reading_mounted(self.mounted()),
             *plant.truth.reporting(self.truth), self.reporting(),
-            *plant.reporting_voltage(self.health),
+            *plant.reporting_drives(self.health),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep

@@ -71,6 +71,7 @@ from .state import (
 from .switch_effects import SwitchDelays
 from .truth import TruthReport
 from .variation import Variation, draw_pull, draw_variation
+from .windings import NOMINAL, read_temperatures
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
@@ -268,11 +269,13 @@ class Plant:
         if not params.imu.ideal:
             self.imu = ImuModel(params.imu, params.seed, params.timestep, physics)
         self.drives = DriveEffects(
-            robot, params.encoders, params.motors, params.seed, params.timestep, physics
-        )
-        self.battery = None
+            robot, params.encoders, params.motors, params.seed, params.timestep, physics,
+            params.windings,
+        )  # fmt: skip
+        self.windings, self.battery = self.drives.windings, None
         if params.battery is not None:
-            self.battery = Battery(params.battery, robot, params.timestep, physics)
+            warm = None if self.windings is None else self.windings.warm
+            self.battery = Battery(params.battery, robot, params.timestep, physics, warm)
         self.switches = None
         if params.switches != SwitchEffects():
             self.switches = SwitchDelays(params.switches, params.timestep, physics)
@@ -303,7 +306,9 @@ class Plant:
             "n_random": RandomStreams(params.seed_of_noise, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
             **ImuModel.dimensions(params.imu, params.timestep),
-            **DriveEffects.dimensions(robot, params.encoders, params.motors, params.timestep),
+            **DriveEffects.dimensions(
+                robot, params.encoders, params.motors, params.timestep, params.windings
+            ),
             "n_rotors": 0 if params.gears is None else len(robot.joints),
             "n_gantry": 0 if params.gantry is None else 4,
             "n_battery": 0 if params.battery is None else 4,
@@ -426,6 +431,8 @@ class Plant:
         self.physics.encoder_play.fill(0.0)
         if self.battery is not None:
             self.battery.begin()
+        if self.windings is not None:
+            self.windings.begin()
         if self.gears is not None:
             self.gears.begin(self.position)
         if self.switches is not None:
@@ -453,10 +460,14 @@ class Plant:
         pulls, too: it is put on when the robot stands.
         """
         step, torque, turning = self.physics.step, self.data.ctrl, self._turning
+        feeds = [each for each in (self.windings, self.battery) if each is not None]
         one: list[Call] = [
             self._encoding,
+            *(each.limiting(drives.limits) for each in feeds),
             drives.torque_call(step, self._encoder, self.sensed[1], turning, torque),
         ]
+        if self.windings is not None:
+            one.append(self.windings.heating(drives.limits))
         if self.battery is not None:
             one.append(self.battery.feeding(drives.limits))
         if self.drives.has_motors:
@@ -532,15 +543,25 @@ class Plant:
         if self.gears is not None:
             self.gears.sensing().run()
 
-    def reporting_voltage(self, health: RobotHealth) -> list[Call]:
-        """Write the voltage of the pack at all drives, where there is a pack."""
-        if self.battery is None:
-            return []
-        return [KernelCall(spread_voltage, self.battery.voltage, health.voltage)]
+    def reporting_drives(self, health: RobotHealth) -> list[Call]:
+        """Write the pack's voltage and the windings' temperatures to all drives, where they are simulated."""
+        found: list[Call] = []
+        if self.battery is not None:
+            found.append(KernelCall(spread_voltage, self.battery.voltage, health.voltage))
+        if self.windings is not None:
+            temperatures = self.physics.winding_temperature
+            found.append(KernelCall(read_temperatures, temperatures, health.temperature))
+        return found
 
     def voltage(self, supply: float) -> float:
         """The voltage of the pack [V], or of the ``supply`` where none is simulated."""
         return supply if self.battery is None else float(self.battery.voltage[0])
+
+    def temperature(self, motor: int) -> float:
+        """The temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
+        if self.windings is None:
+            return NOMINAL
+        return float(self.physics.winding_temperature[motor])
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed."""
@@ -559,6 +580,11 @@ class Plant:
             ),
             **({} if self.imu is None else self.imu.metrics()),
             **(self.drives.metrics() if self.drives.has_motors else {}),
+            **(
+                {"robot_hottest_winding_degc": float(self.physics.winding_temperature.max())}
+                if self.windings is not None
+                else {}
+            ),
             **self.variation.metrics(),
         }
 

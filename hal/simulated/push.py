@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Literal
@@ -10,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ...blocks.signals import ExternalForce, RobotTruth
+from ...mathematics.elementary import cos, sin
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, live_parameter, parameter
@@ -106,11 +106,11 @@ class Push(Block):
     def prepare(self) -> None:
         """Find the point and compute the force."""
         params, constants = self.params, self.constants
-        flat, force = math.cos(params.elevation), params.force
+        flat, force = cos(params.elevation), params.force
         if params.speed_change is not None:
             force = self.robot.total_mass * params.speed_change / params.duration
-        direction = [flat * math.cos(params.angle), flat * math.sin(params.angle)]
-        constants.force[:] = force * np.array([*direction, math.sin(params.elevation)])
+        direction = [flat * cos(params.angle), flat * sin(params.angle)]
+        constants.force[:] = force * np.array([*direction, sin(params.elevation)])
         constants.point = list(self.robot.points).index(params.point)
 
     @kernel

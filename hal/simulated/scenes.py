@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from pydantic import model_validator
 
+from ...mathematics.elementary import cos, sincos
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, HeightField, Terrain
 from .tiles import TileParameters
@@ -172,11 +173,11 @@ class FieldParameters(PieceParameters):
             heights: list[list[float]] = (self.height * draws).tolist()
             return heights
         assert self.waves is not None
-        ahead, left = math.cos(self.heading), math.sin(self.heading)
+        left, ahead = sincos(self.heading)
         xs, ys = np.linspace(*self.x, columns).tolist(), np.linspace(*self.y, rows).tolist()
         number = 2.0 * math.pi / self.waves
         return [
-            [0.5 * self.height * (1.0 - math.cos(number * (ahead * x + left * y))) for x in xs]
+            [0.5 * self.height * (1.0 - cos(number * (ahead * x + left * y))) for x in xs]
             for y in ys
         ]
 

@@ -31,6 +31,7 @@ from .effects import (
     MotorEffects,
     SoleParameters,
     SwitchEffects,
+    WindingParameters,
     longest_gear_step,
     longest_stribeck_step,
 )
@@ -167,6 +168,9 @@ class SimulatorParameters(DriveGains):
     battery: BatteryParameters | None = parameter(
         None, text="the pack; none: a supply whose voltage never changes"
     )
+    windings: WindingParameters | None = parameter(
+        None, text="windings that warm; none: their temperature changes nothing"
+    )
     switches: SwitchEffects = parameter(
         SwitchEffects(), text="the foot switches, besides `switch_threshold` and bounce"
     )
@@ -240,6 +244,8 @@ def impossible_effects(
             expected="`supply` in the description", found="none",
             fix="supply: {rated_voltage: ..., open_voltage: ..., resistance: ..., capacity: ...}",
         )  # fmt: skip
+    if params.windings is not None:
+        yield from _unknown_windings(params.windings, robot)
     fastest = 0.45 / step
     for name in ("bandwidth", "mount_frequency"):
         frequency = getattr(params.imu, name)
@@ -255,6 +261,21 @@ def impossible_effects(
                 f"{what} faster than physics steps of {step:g} s follow",
                 parameter="timestep", expected=f"up to {longest:.3g} s",
                 found=f"{step:g} s", fix=f"timestep: {next(each for each in _STEPS if each <= longest):g} s",
+            )  # fmt: skip
+
+
+def _unknown_windings(
+    windings: WindingParameters, robot: RobotDescription
+) -> Iterator[UnmetRequirement]:
+    """Report what neither the parameters nor the description say of windings that warm."""
+    supply = None if robot.supply is None else windings.of(robot)
+    for name, unit in (("heat_capacity", "J/K"), ("thermal_resistance", "K/W")):
+        if supply is None or getattr(supply, f"winding_{name}") is None:
+            yield UnmetRequirement(
+                f"neither `windings` nor the description of {robot.name} says the {name} of a winding",
+                parameter="windings", expected=f"`supply` with winding_{name} [{unit}] in the description",
+                found="none" if supply is None else "a supply without it",
+                fix=f"supply: {{winding_{name}: ...}}" if supply is None else f"windings: {{{name}: ... {unit}}}",
             )  # fmt: skip
 
 

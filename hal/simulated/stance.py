@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.capture_step import support_margin
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import acos
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
@@ -412,7 +413,7 @@ class StartCheck:
         cosine = 0.0
         for k in range(3):
             cosine += mujoco.mju_dot3(turned[k], rotation[k])
-        angle = math.acos(min(1.0, max(-1.0, 0.5 * (cosine - 1.0))))
+        angle = acos(min(1.0, max(-1.0, 0.5 * (cosine - 1.0))))
         if angle <= MOST_TILT_ERROR:
             return []
         return [f"its base has turned by {math.degrees(angle):.2g} deg from its standing pose"]

@@ -44,6 +44,7 @@ class PhysicsState(Signal):
     switch_waits = Field("n_late_switches", dtype="int64", text="steps that a change has lasted")
     gantry = Field("n_gantry", text="rope paid out, and to be; step when; distance of its ends")
     battery = Field("n_battery", text="voltage, charge gone, voltage to recover, current")
+    winding_temperature = Field("n_windings", text="of every winding [deg C]")
 
 
 class DriveState(CommandTargets):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import cos, sin
 from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
 from .effects import CableParameters, JointEffects
@@ -72,8 +73,8 @@ def _gravity(params: SimulatorParameters) -> tuple[float, float, float]:
     if not params.floor_tilt:
         return 0.0, 0.0, -GRAVITY
     heading = 2.0 * math.pi * float(stream(params.seed, Purpose.FLOOR_TILT).random())
-    along, down = GRAVITY * math.sin(params.floor_tilt), GRAVITY * math.cos(params.floor_tilt)
-    return along * math.cos(heading), along * math.sin(heading), -down
+    along, down = GRAVITY * sin(params.floor_tilt), GRAVITY * cos(params.floor_tilt)
+    return along * cos(heading), along * sin(heading), -down
 
 
 def _static_friction(joints: JointEffects, seed: int, n: int) -> tuple[float, ...]:
@@ -91,7 +92,7 @@ def draw_pull(
     """The force of a cable [N, world]."""
     pull, hanging = cable.pull * robot.weight, cable.weight * robot.weight
     heading = 2.0 * math.pi * float(stream(seed, Purpose.CABLE).random())
-    return pull * math.cos(heading), pull * math.sin(heading), -hanging
+    return pull * cos(heading), pull * sin(heading), -hanging
 
 
 def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Variation:

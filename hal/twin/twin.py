@@ -134,8 +134,7 @@ class Twin:
             self._standing,
             lambda pose, torque: self._gantry.hold(pose, torque, plant.stiffness, plant.damping),
         )
-        for actuator in self.actuators:
-            actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
+        self._feed_drives()
         self._sense()
         self._begin_packet()
 
@@ -309,18 +308,24 @@ class Twin:
 
     def _apply_drive_faults(self) -> None:
         """Let faults of drives begin and end."""
-        if self.plant.battery is not None:
-            for actuator in self.actuators:
-                actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
+        if self.plant.battery is not None or self.plant.windings is not None:
+            self._feed_drives()
         if not self.faults:
             return
         for k, (name, actuator) in enumerate(zip(self._names, self.actuators, strict=True)):
             self.drives.stuck[k] = bool(self.faults.of(name, "stuck_encoder"))
             low, hot = self.faults.of(name, "low_voltage"), self.faults.of(name, "hot")
             actuator.status["input_voltage"] = low[0].value if low else self.plant.voltage(SUPPLY)
-            actuator.status["winding_temperature"] = hot[0].value if hot else 25.0
+            measured = self.plant.temperature(k)
+            actuator.status["winding_temperature"] = hot[0].value if hot else measured
             if self.faults.of(name, "dead"):
                 actuator.status["torque_enable"] = 0.0
+
+    def _feed_drives(self) -> None:
+        """The drives measure their supply and their windings."""
+        for k, actuator in enumerate(self.actuators):
+            actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
+            actuator.status["winding_temperature"] = self.plant.temperature(k)
 
     def _answer_with_faults(self, device: int, answer: bytes) -> bytes:
         """What travels of an answer."""

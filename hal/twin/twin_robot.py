@@ -281,7 +281,8 @@ def _driver(
 ) -> Driver:
     gains = joint_gains(params, robot)
     law = DriveLaw(robot, *gains, hardware.bus.lead, params.motor_model)
-    return Driver(robot, hardware, VirtualBusPort(twin), VirtualBoardPort(twin), law)
+    ports = VirtualBusPort(twin), VirtualBoardPort(twin)
+    return Driver(robot, hardware, *ports, law, params.planned_load)
 
 
 def _parts(twin: Twin, driver: Driver, queue: CommandQueue) -> list[Attributes]:

@@ -43,10 +43,9 @@ IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
     "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
-    "FootholdPose",
-    "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate",
-    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones", "SwitchHealth",
-    "WholeBodyTarget",
+    "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
+    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
+    "SwitchHealth", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
+from ..task.files import JumpTaskError
 from ..task.plan import ARRAYS, PlannedJump
 from .evidence import Evidence
 from .plan_tests import PLAN_TESTS
@@ -122,6 +123,15 @@ def require_valid(plan: PlannedJump, robot: RobotDescription) -> None:
             f"the plan {plan.task.name!r} is not valid:\n{report.explain()}",
             plan.with_report(report.as_json()),
         )
+
+
+def why_not(error: Exception) -> str:
+    """What binds where a task has no valid plan, in a few words, from what the planner raised."""
+    if isinstance(error, InvalidPlanError):
+        return ", ".join(t["name"] for t in error.plan.report["tests"] if not t["passed"])
+    if isinstance(error, JumpTaskError):
+        return "contradicts itself"
+    return getattr(error, "family", "") or "no plan"
 
 
 def broken_array(plan: PlannedJump, robot: RobotDescription) -> str:

@@ -14,7 +14,14 @@ import numpy as np
 
 from ...robots.description import RobotDescription
 from ..task.files import PlanError
-from ..task.plan import PlanFileError, PlannedJump, read_plan, task_of_header, write_plan
+from ..task.plan import (
+    PlanFileError,
+    PlannedJump,
+    motor_load,
+    read_plan,
+    task_of_header,
+    write_plan,
+)
 from ..task.task import JumpTask, JumpTaskError
 
 
@@ -192,6 +199,18 @@ class PlanLibrary:
             raise PlanFileError(
                 f"{error}; put the file back, or remove it to have the task planned anew"
             ) from error
+
+    def load_of(self, task: JumpTask) -> dict[str, float] | None:
+        """What the kept plan of a task asks of the motors, as ``motor_load`` has it; ``None`` where there is no
+        such plan or its file is damaged. Nothing else of the file is read."""
+        path = self.path_of(task)
+        if path is None:
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                return motor_load(file["time"], file["joint_torque"], self.robot)
+        except Exception:  # noqa: BLE001  # a damaged archive raises nearly anything; `find` says so
+            return None
 
     def nearest(self, task: JumpTask) -> tuple[PlannedJump, float] | None:
         """The valid plan of the nearest task that can be started from, and how far it is."""

@@ -332,7 +332,7 @@ class ProblemBuilder:
 
     def _fill_obstacle(self, k: int) -> None:
         hop, place, edge = self.structure.hop_at(k)
-        stretch, obstacles = self.of_knot[k], self.structure.obstacles
+        stretch, obstacles = self.structure.phase_at(k), self.structure.obstacles
         share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
         self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
         floor = self.task.foot_clearance * np.sin(np.pi * share)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -161,9 +162,9 @@ class Structure:
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
         self.given: dict[int, list[tuple[int, float, str]]] = {}
-        self.knots = self._knots()
+        self.knots = self._knots(bool(ball_feet(model.robot)))
 
-    def _knots(self) -> list[Knot]:
+    def _knots(self, knees_fold: bool) -> list[Knot]:
         n, end = self.n, len(self.of_knot)
         knots = []
         for k, stretch in enumerate(self.of_knot):
@@ -200,7 +201,10 @@ class Structure:
         values = [(i, float(at_rest[i]), "stance") for i in range(base)]
         self.given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
         fixed = tuple(i for i, _, _ in self.given[end])
-        return [*knots, Knot(2 * n, 0, fixed=fixed)]
+        last = Knot(2 * n, 0, fixed=fixed)
+        if knees_fold:  # where the base is given, knees can still fold
+            last.pieces["obstacle"] = (np.arange(n), self._obstacle_rows(end))
+        return [*knots, last]
 
     def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:
         """What is given at a knot: the start, forces on points without contact, a next time."""
@@ -278,15 +282,19 @@ class Structure:
             ahead = ahead[:0]
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
 
+    def phase_at(self, k: int) -> ProblemPhase:
+        """The phase of the interval that begins with a knot; at the end that of the last one."""
+        return self.of_knot[min(k, len(self.of_knot) - 1)]
+
     def hop_at(self, k: int) -> tuple[Hop, StanceLocation, float | None]:
         """The jump under way at a knot, or the last one; where it began, and its step's edge."""
-        number = min(self.of_knot[k].place, len(self.hops) - 1)
+        number = min(self.phase_at(k).place, len(self.hops) - 1)
         hop, place = self.hops[number], self.places[number]
         return hop, place, edge_of(hop, place)
 
     def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
         hop, _, edge = self.hop_at(k)
-        stretch = self.of_knot[k]
+        stretch = self.phase_at(k)
         return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
 
     def _moment_rows(

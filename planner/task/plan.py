@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
+from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
 from .files import write_whole
 from .task import JumpTask, JumpTaskError, make_task
@@ -171,6 +172,18 @@ def plan_bytes(plan: PlannedJump, names: Mapping[str, list[str]] | None = None) 
     memory = io.BytesIO()
     np.savez_compressed(memory, header=np.array(json.dumps(header, default=_plain)), **arrays)
     return memory.getvalue()
+
+
+def motor_load(time: Array, joint_torque: Array, robot: RobotDescription) -> dict[str, float]:
+    """The integral of the squared torque of every motor over a motion [N^2 m^2 s], by its name.
+
+    Args:
+        time: of the knots [s], (n,).
+        joint_torque: from each of them to the next [N m], (n, n_joints).
+    """
+    torque = np.asarray(joint_torque[:-1] @ robot.torque_to_motor.T)
+    load = (torque**2 * np.diff(time)[:, None]).sum(axis=0)
+    return dict(zip(robot.transmission.motors, load.tolist(), strict=True))
 
 
 def _plain(value: Any) -> Any:

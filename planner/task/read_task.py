@@ -12,9 +12,17 @@ from typing import Any
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription, find_robot
-from ...robots.kinematics import link_poses
+from ...robots.kinematics import (
+    contact_centres,
+    link_poses,
+    link_poses_in_base,
+    standing_contacts,
+    standing_heights,
+)
 from .files import JumpTaskError, read_placed
 from .margins import unknown_joints
 from .sequence import Hop, StanceLocation, edge_of
@@ -210,17 +218,52 @@ def leg_travel(robot: RobotDescription) -> tuple[float, float]:
 
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """A step's edge is under no foot."""
-    reach = [contact.position[0] for contact in robot.contacts]
+    """A step's edge is under no foot, and nothing of the standing robot is in the step."""
+    feet = standing_contacts(robot) if robot.contacts else np.zeros((0, 3))
     for path, hop, start, end in _jumps(task):
         edge = edge_of(hop, start)
-        for where, place in (("start", start), ("landing", end)) if edge is not None else ():
-            ends = [place.x + math.cos(place.heading) * x for x in (min(reach), max(reach))]
-            back, front = min(ends), max(ends)
-            if edge is not None and back < edge < front:
-                yield (
-                    f"{path}step_edge",
-                    f"the step's edge at x = {edge:g} m is under the feet at the {where}, which "
-                    + f"reach from {back:.3f} to {front:.3f} m; give a step_edge between start and "
-                    + "landing, or jump farther",
-                )
+        if edge is None or not len(feet):
+            continue
+        step = hop.landing_height or 0.0
+        for where, place, higher in (("start", start, step), ("landing", end, -step)):
+            # Who stands beside higher ground must be away from it with all that is below its height.
+            for name, points, radii in (
+                ("the feet", feet, np.zeros(len(feet))),
+                *_low_links(robot, higher),
+            ):
+                x: Array = place.x + product(points[:, :2], _onward(place.heading))
+                back, front = float(np.min(x - radii)), float(np.max(x + radii))
+                if back < edge < front:
+                    yield (
+                        f"{path}step_edge",
+                        f"the step's edge at x = {edge:g} m is under {name} at the {where}, which "
+                        + f"reach from {back:.3f} to {front:.3f} m; give a step_edge between start and "
+                        + "landing, or jump farther",
+                    )
+                    break
+
+
+def _onward(heading: float) -> Array:
+    return np.array([math.cos(heading), -math.sin(heading)])
+
+
+def _low_links(robot: RobotDescription, height: float) -> Iterator[tuple[str, Array, Array]]:
+    """Links of the standing robot of which a part is lower than that [m] above the ground: the name, the places
+    (n, 3) of the ends of the shapes that are, from the feet's middle, and their radii (n,)."""
+    if height <= 0.0:
+        return
+    poses = link_poses_in_base(robot, robot.standing_position)
+    links = {foot.name: foot.link for foot in robot.feet}
+    rotation, origin = poses[links[robot.contacts[0].foot]]
+    middle = origin + product(rotation, contact_centres(robot)[0]) - standing_contacts(robot)[0]
+    ground = float(np.min(standing_heights(robot)))
+    for link in robot.links:
+        rotation, origin = poses[link.name]
+        ends = np.array([e for shape in link.shapes for e in (shape.start, shape.end)]).reshape(
+            -1, 3
+        )
+        radii = np.repeat([shape.radius for shape in link.shapes], 2)
+        places = origin + product(ends, rotation.T)
+        low = places[:, 2] - radii - ground < height
+        if low.any():
+            yield link.name, places[low] - middle, radii[low]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from aloft.cli.jump import load_jump, settings_for, task_changes, task_of
-from aloft.cli.shared.rehearsal import graph_of
+from aloft.cli.shared.robot_trials import TrialOptions, graph_of
 from aloft.planner.library import library
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.rehearsal import trial_settings
@@ -88,7 +88,7 @@ def test_what_cannot_be_understood_is_said(words: dict[str, str], error: str) ->
 
 def test_the_step_the_score_and_the_trial_are_in_the_graph() -> None:
     asked = {"distance_x": 0.2, "landing_height": 0.05}
-    graph = load_jump(BRUCE, settings_for(asked, "robust"), 7)
+    graph = load_jump(BRUCE, settings_for(asked, TrialOptions(trial="robust")), 7)
     robot, score = graph.checked.block("robot").params, graph.checked.block("score").params
     assert (robot.model_dump()["seed"], robot.model_dump()["mass_spread"]) == (7, 0.05)
     assert robot.model_dump()["scene"]["boxes"][0]["top"] == 0.05
@@ -98,12 +98,20 @@ def test_the_step_the_score_and_the_trial_are_in_the_graph() -> None:
 
 
 def test_a_trial_takes_back_what_only_another_sets() -> None:
-    nominal = load_jump(BRUCE, settings_for({}, "nominal"), 0).checked.block("robot").params
+    nominal = (
+        load_jump(BRUCE, settings_for({}, TrialOptions(trial="nominal")), 0)
+        .checked.block("robot")
+        .params
+    )
     assert nominal.model_dump()["gyro_noise"] == 0.0
     assert nominal.model_dump()["latency"] == 0.0
     assert nominal.model_dump()["timestep"] == 0.0005
     go2, _ = graph_of("go2")
-    standard = load_jump(go2, settings_for({}, "standard"), 0).checked.block("robot").params
+    standard = (
+        load_jump(go2, settings_for({}, TrialOptions(trial="standard")), 0)
+        .checked.block("robot")
+        .params
+    )
     assert standard.model_dump()["mass_spread"] == 0.0
     assert standard.model_dump()["gyro_noise"] == 0.02
     with pytest.raises(AloftError, match="--trial windy: there is nominal, real, robust, standard"):
@@ -126,7 +134,7 @@ def test_every_robot_with_a_shipped_jump_can_be_named() -> None:
 def test_a_file_of_a_robot_is_enough(folder: Path) -> None:
     (folder / "stick.xml").write_text(STICKS)
     path, own = graph_of(str(folder / "stick.xml"))
-    graph = load_jump(path, [*own, *settings_for({"distance_x": 0.1}, "")], 0)
+    graph = load_jump(path, [*own, *settings_for({"distance_x": 0.1}, TrialOptions())], 0)
     assert graph.checked.robot is not None
     assert [foot.name for foot in graph.checked.robot.feet] == [
         "fl_foot",

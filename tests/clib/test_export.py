@@ -262,8 +262,11 @@ def test_names_and_targets_that_cannot_be(folder: Path) -> None:
 def test_the_controllers_of_jumps_give_all_recorded_bytes(graph: str, tmp_path: Path) -> None:
     recording = tmp_path / f"{graph}.rrd"
     aloft.load(f"aloft:{graph}.yaml").run(sinks=[Recorder(recording)]).raise_if_failed()
-    made = write_library(f"aloft:{graph}.yaml", tmp_path / graph)
-    found = check(made.description, recording)
-    assert found.difference == ""
-    assert found.ticks > 1000
-    assert found.signal_bytes > 1000 * found.ticks
+    for target in TARGETS if graph == "jump" else ("x86_64",):
+        if not TARGETS[target].linker() or not all(map(shutil.which, TARGETS[target].runner[:1])):
+            continue
+        made = write_library(f"aloft:{graph}.yaml", tmp_path / graph / target, target=target)
+        found = check(made.description, recording)
+        assert found.difference == "", target
+        assert found.ticks > 1000
+        assert found.signal_bytes > 1000 * found.ticks

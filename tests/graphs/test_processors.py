@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import aloft
+from aloft.logs.recording.recorder import Recorder
 
 ROOT = Path(aloft.__file__).parent
 RUN = """
@@ -66,3 +67,24 @@ def test_a_jump_has_the_same_bytes_with_the_blas_of_another_processor(graph):
     types = ("Haswell", "Nehalem")
     hashes = {run_with({"OPENBLAS_CORETYPE": each}, graph)[1] for each in types}
     assert len(hashes) == 1
+
+
+@pytest.mark.long
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc chooses by the processor")
+def test_a_controller_has_the_same_bytes_with_the_c_library_of_another_processor(tmp_path):
+    """Without FMA and AVX2 glibc's sine differs in its last bit; the controller has one of its own."""
+    recording = tmp_path / "jump.rrd"
+    aloft.load("aloft:jump.yaml").run(sinks=[Recorder(recording)]).raise_if_failed()
+    command = [sys.executable, "-m", "aloft", "replay", str(recording), "--check"]
+    older = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2"}
+    for inputs, code in (("recorded", 0), ("seed", 1)):  # MuJoCo takes the C library's
+        done = subprocess.run(
+            [*command, "--inputs", inputs], env=older, capture_output=True, text=True, check=False
+        )
+        if code == 0 or has_fma():
+            assert done.returncode == code, done.stdout + done.stderr
+
+
+def has_fma() -> bool:
+    """Whether the processor has what the older one lacks."""
+    return "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8").split()

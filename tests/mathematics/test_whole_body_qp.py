@@ -14,7 +14,9 @@ JOINTS = 10
 
 
 def limits_of(n, kind=qp.MOTOR_LIMITS):
-    return qp.TorqueLimits(kind, np.eye(n), np.eye(n), *(np.zeros(n) for _ in range(6)))
+    return qp.TorqueLimits(
+        kind, np.eye(n), np.eye(n), *np.zeros((3, n)), *np.ones((3, n)), *np.zeros((3, n))
+    )
 
 
 def test_torque_rows_bound_the_transmitted_torque():
@@ -65,6 +67,17 @@ def test_motor_limits(speed, lower, upper):
     qp.motor_limits(motors)
     assert (motors.lower[0], motors.upper[0]) == pytest.approx((lower, upper))
     assert (motors.lower[1], motors.upper[1]) == (-1.0, 1.0)  # every motor has its own curve
+
+
+def test_of_a_warm_motor_shares_are_left():
+    warm, other = limits_of(2), limits_of(2)
+    warm.peak[:], warm.corner[:], warm.no_load[:], warm.speed[:] = 10.0, 18.0, 30.0, [25.0, 0.0]
+    warm.peak_share[:], warm.corner_share[:], warm.no_load_share[:] = 0.9, 0.8, 1.1
+    other.peak[:], other.corner[:], other.no_load[:], other.speed[:] = 9.0, 14.4, 33.0, [25.0, 0.0]
+    for motors in (warm, other):
+        qp.motor_limits(motors)
+    np.testing.assert_allclose(warm.upper, other.upper)
+    np.testing.assert_allclose(warm.lower, other.lower)
 
 
 def test_a_motor_without_a_speed_limit_gives_its_peak_below_it():

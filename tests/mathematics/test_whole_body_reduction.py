@@ -27,7 +27,7 @@ def program(seed, stance=(True, False, True, True), kind=qp.JOINT_LIMITS, peak=2
         root @ root.T + np.eye(N), random.normal(size=N), random.normal(size=(POINTS, 3, N))
     )
     weights = qp.ProgramWeights(*(np.array([each]) for each in (0.1, 0.01, 0.5, 0.0, 80.0)))
-    limits = [np.full(JOINTS, peak), *np.ones((2, JOINTS)), *np.zeros((3, JOINTS))]
+    limits = [np.full(JOINTS, peak), *np.ones((5, JOINTS)), *np.zeros((3, JOINTS))]
     motors = qp.TorqueLimits(kind, np.eye(JOINTS), np.eye(JOINTS), *limits)
     return qp.WholeBodyProgram(tasks, terms, np.array(stance), np.zeros(JOINTS), weights, motors)
 

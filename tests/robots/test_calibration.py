@@ -7,54 +7,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 import aloft
 from aloft.hal.simulated.variation import draw_variation
-from aloft.robots.calibration import Calibration, calibrate_robot, fragment
+from aloft.robots.calibration import Calibration, fragment
 from aloft.robots.description import find_robot
 from aloft.robots.identification import IdentificationError, MeasuredRun
-from aloft.robots.motor_identification import EVERY, most_alike
+from aloft.robots.motor_identification import EVERY, PERIODS, most_alike, waves_of
 from aloft.robots.sensor_identification import (
     EDGE,
+    base_motion,
+    contact_jacobians,
     fit,
     identify_sensors,
     shifted,
     smooth,
     standing_span,
+    vertical,
 )
-from aloft.runtime.graph import Graph
-from aloft.runtime.running.run_result import RunResult
 from aloft.studies.oracle import oracle_values, reading_ages
+from aloft.studies.robot_calibration import calibration_from, swayed
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
 ROBOT = find_robot("bruce")
 
 
-def swayed(graph: Graph) -> tuple[RunResult, MeasuredRun]:
-    result = graph.run()
-    assert result.success, result.reason
-    read = result.signal
-    return result, MeasuredRun(
-        result.period, read("robot.joints.position"), read("robot.joints.velocity"),
-        read("robot.joints.torque"), read("robot.imu.angular_velocity"),
-        read("robot.imu.specific_force"), np.zeros((result.ticks, 3)),
-        read("robot.contacts.closed"),
-    )  # fmt: skip
-
-
 def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
     graph = aloft.load(GRAPH).with_seed(seed)
-    result, motion = swayed(graph)
-    read = result.signal
-    found = calibrate_robot(
-        ROBOT, motion, read("robot.health.voltage"), read("safety.command.torque"),
-        np.ones(result.ticks, dtype=np.bool_),
-    )  # fmt: skip
+    found = calibration_from(swayed(graph))
     params = next(block.params for block in graph.checked.blocks if block.path == "robot")
     drawn, pack = draw_variation(params, ROBOT), params.battery.of(ROBOT)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
@@ -99,7 +87,7 @@ def test_gears_that_yield_are_told() -> None:
         "robot.seed=97822", "duration=12 s", "plan.sway_time=10 s", "robot.timestep=0.25 ms",
         "robot.gears={stiffness: 1000 N m/rad, damping: 0.3 N m s/rad}",
     ])  # fmt: skip
-    compliance = identify_sensors(ROBOT, swayed(graph)[1]).gear_compliance
+    compliance = identify_sensors(ROBOT, swayed(graph).motion).gear_compliance
     assert compliance.value == pytest.approx(1e-3, abs=2.0 * compliance.std)
     assert compliance.value > 3.0 * compliance.std
 
@@ -137,6 +125,42 @@ def test_the_filter_is_not_late_and_a_shift_is() -> None:
     np.testing.assert_allclose(shifted(wave, 1.5)[inner], later[inner], atol=1e-3)
 
 
+def test_the_filter_is_that_of_scipy() -> None:
+    """``sosfiltfilt`` of a Butterworth filter of the third order, to the last digits."""
+    values = np.cumsum(np.random.default_rng(1).normal(size=(3000, 4)), axis=0)
+    sections = butter(3, 2.0 * 6.0 * 0.002, output="sos")
+    np.testing.assert_allclose(
+        smooth(values, 0.002, 6.0), sosfiltfilt(sections, values, axis=0), rtol=0.0, atol=1e-10
+    )
+
+
+def test_the_base_moves_as_least_squares_says() -> None:
+    """Tick by tick, of joints that contradict each other, too."""
+    random = np.random.default_rng(2)
+    angles = ROBOT.standing_position + 0.1 * random.normal(size=(3, 10))
+    speeds = random.normal(size=(3, 10))
+    moves, places = base_motion(ROBOT, angles, speeds)
+    jacobians, points = contact_jacobians(ROBOT, angles)
+    for k in range(3):
+        own = np.linalg.lstsq(jacobians[k, :, :6], -jacobians[k, :, 6:] @ speeds[k])[0]
+        np.testing.assert_allclose(moves[k], own, rtol=1e-10)
+    np.testing.assert_allclose(places, points.mean(axis=1), rtol=1e-14)
+
+
+def test_the_vertical_turns_against_the_base() -> None:
+    turning = np.random.default_rng(4).normal(size=(200, 3))
+    up, tilts, drifts = vertical(turning, 0.002)
+    turned, drift = Rotation.identity(), np.zeros((3, 3))
+    for k, (here, after) in enumerate(pairwise(turning)):
+        matrix = turned.as_matrix()
+        np.testing.assert_allclose(up[k], matrix[2], atol=1e-12)
+        across = np.cross(np.eye(3), [0.0, 0.0, 1.0]).T  # of z with each axis, negated
+        np.testing.assert_allclose(tilts[k], -(matrix.T @ across)[:, :2], atol=1e-12)
+        np.testing.assert_allclose(drifts[k], -(matrix.T @ across @ drift), atol=1e-12)
+        drift = drift + 0.002 * matrix
+        turned = turned * Rotation.from_rotvec(0.5 * (here + after) * 0.002)
+
+
 def test_a_foot_that_rocks_spoils_no_fit() -> None:
     """Errors that are large now and then count less; those that are always there, as least squares says."""
     random = np.random.default_rng(7)
@@ -159,7 +183,8 @@ def test_ripple_is_found_by_how_often_it_comes_again() -> None:
     at = slice(edge, len(time) - edge, EVERY)
     error = 0.05 * random.normal(size=turned[at].shape)
     error[:, :2] += 0.07 * np.sin(84.0 * turned[at, :2] + 1.0)
-    assert most_alike(error, turned, 0.002) == pytest.approx(84.0, abs=2.0)
+    waves = {float(often): waves_of(turned, float(often), 0.002) for often in PERIODS}
+    assert most_alike(error, waves) == pytest.approx(84.0, abs=2.0)
 
 
 def test_readings_of_slow_motions_are_as_old_as_the_simulator_makes_them() -> None:

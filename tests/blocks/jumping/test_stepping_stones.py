@@ -68,9 +68,7 @@ def test_the_robot_stands_on_the_ground_that_they_make() -> None:
 
 def test_stones_that_overlap_are_refused() -> None:
     with pytest.raises(AloftError, match="stone 2 overlaps the one before it"):
-        load(
-            shipped_folder() / "steer_stones.yaml", {"commands.stones": [{"x": 0.25}, {"x": 0.3}]}
-        )
+        load(shipped_folder() / "steer_stones.yaml", {"commands.stones": [{"x": 0.25}, {"x": 0.3}]})
     with pytest.raises(AloftError, match="gap must be two positive lengths"):
         load(shipped_folder() / "steer_stones.yaml", {"commands.random.gap": [0.1, 0.05]})
 

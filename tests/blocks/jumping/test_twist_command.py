@@ -10,7 +10,9 @@ from aloft.runtime.testing import BlockBench
 Bench = BlockBench[TwistCommand]
 
 
-def ask(bench: Bench, ahead: float = 0.0, left: float = 0.0, turn: float = 0.0, up: float = 0.0) -> int:
+def ask(
+    bench: Bench, ahead: float = 0.0, left: float = 0.0, turn: float = 0.0, up: float = 0.0
+) -> int:
     """Ask for a velocity, and the number of the command."""
     bench.set("twist", linear=[ahead, left, up], angular=[0.0, 0.0, turn])
     bench.step()

@@ -113,8 +113,11 @@ def stays_off(twin: Twin) -> None:
     ("wrong", "text"),
     [
         (low_voltage, r"the drives are not enabled: left_knee_motor has 12\.0 V instead of 13 to"),
-        (hot, "the drives are not enabled: left_knee_motor has 76 deg C"),
-        (too_hot_for_a_jump, "left_knee_motor has 71 deg C: with 5 of a jump more than 75"),
+        (hot, r"the drives are not enabled: left_knee_motor has 76\.0 deg C"),
+        (
+            too_hot_for_a_jump,
+            r"71\.0 deg C, and a jump .* heats it by 5\.0 to 76\.0: more than 75; wait 1 s",
+        ),
         (emergency_stop, r"drive left_knee_motor \(address 9\): "),
         (stays_off, "drives cannot be enabled: left_knee_motor: it does not say why"),
     ],

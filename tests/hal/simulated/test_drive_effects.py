@@ -24,6 +24,7 @@ from aloft.hal.simulated.effects import (
 )
 from aloft.hal.simulated.gears import YieldingGears
 from aloft.hal.simulated.state import PhysicsState, TickRecord
+from aloft.mathematics.compiling.call_sequence import CallSequence
 from aloft.robots.description import RobotDescription, find_robot
 
 from .simulated_bruce import bench, hold
@@ -33,7 +34,7 @@ N = len(ROBOT.joints)
 STEP = 0.0005
 SIZES = dict.fromkeys(
     ("n_integration", "n_random", "n_imu_filters", "n_imu_slots", "n_imu_axes", "n_encoder_slots",
-     "n_sensed_joints", "n_real_motors", "n_rotors", "n_late_switches", "n_battery", "n_gantry"), 0,
+     "n_sensed_joints", "n_real_motors", "n_rotors", "n_late_switches", "n_battery", "n_gantry", "n_windings"), 0,
 )  # fmt: skip
 
 
@@ -257,7 +258,8 @@ def pack(
     battery = Battery(chosen, robot, STEP, memory)
     battery.begin()
     limits = MotorLimits(ROBOT, TickRecord.allocate({**ROBOT.dimensions}))
-    return battery, memory, limits, battery.feeding(limits)
+    calls = CallSequence([battery.feeding(limits), battery.limiting(limits)])
+    return battery, memory, limits, calls
 
 
 def test_a_pack_sags_as_its_resistance_says() -> None:

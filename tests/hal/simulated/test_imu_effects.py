@@ -35,7 +35,7 @@ def unit(**effects: Any) -> tuple[ImuModel, Any]:
 
 SIZES = (
     "n_integration", "n_random", "n_encoder_slots", "n_sensed_joints", "n_real_motors", "n_rotors",
-    "n_late_switches", "n_battery", "n_gantry",
+    "n_late_switches", "n_battery", "n_gantry", "n_windings",
 )  # fmt: skip
 
 

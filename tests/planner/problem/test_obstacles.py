@@ -14,6 +14,7 @@ from aloft.planner.problem.obstacles import (
     obstacle_points,
     step_parameters,
 )
+from aloft.planner.solving.solve import make_problem
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
@@ -102,6 +103,14 @@ def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
             others = {link.name for link in robot.links if link.shapes and link.name not in feet}
             expected = others if watched and not stretch.flies else set()
             assert links == expected, stretch.phase
+
+
+def test_knees_keep_off_the_ground_also_at_the_end() -> None:
+    """Where only the base is given: the last knot has no interval, and its joints are free."""
+    for robot, watched in ((quadruped(), True), (ROBOT, False)):
+        task = make_task({"name": "up", "robot": robot.name, "rise": 0.1})
+        last = make_problem(task, robot, compiled=False).assembly.knots[-1]
+        assert ("obstacle" in last.pieces) is watched
 
 
 @pytest.mark.parametrize("ahead", [0.15, 0.2])

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.robots.example_robots import needs_robots
 
 from aloft.planner.library.library import SHIPPED, solve_and_check
 from aloft.planner.task.read_task import (
@@ -113,6 +114,22 @@ def test_what_contradicts_itself(values: dict[str, Any], key: str, words: str) -
     problems = found(**values)
     assert problems[0][0] == key
     assert words in problems[0][1]
+
+
+@needs_robots
+def test_a_quadruped_stands_wholly_on_either_side_of_an_edge() -> None:
+    """Its feet where they stand, and its knees, which reach behind them, where the ground is higher."""
+    go2 = find_robot("go2")
+    off = {"name": "off", "rise": 0.08, "landing_height": -0.15}
+
+    def told(**values: Any) -> list[str]:
+        return [text for _, text in contradictions(make_task({**off, **values}), go2)]
+
+    assert "under the feet at the start, which reach from -0.19" in told(distance_x=0.3)[0]
+    (knee,) = told(distance_x=0.6)
+    assert "x = 0.3 m is under RL_thigh at the landing, which reach from 0.2" in knee
+    assert told(distance_x=0.6, landing_height=0.08) == [], "the knees are above that step"
+    assert told(distance_x=0.75, step_edge=0.28) == []
 
 
 def test_several_are_all_told() -> None:

@@ -6,11 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from aloft.benchmarks.frontier import frontier as module
-from aloft.benchmarks.frontier.frontier import frontier
-from aloft.benchmarks.frontier.search import DIRECTIONS, Direction, PlanJob, RunJob, enough
+from aloft.benchmarks import frontier as bench
+from aloft.benchmarks.frontier import frontier
+from aloft.benchmarks.jumps.jumps import bruce_jumps
 from aloft.studies.batch.jobs import JobResult, attempt
 from aloft.studies.journal import Outcome
+from aloft.studies.reach import frontier as module
+from aloft.studies.reach.directions import DIRECTIONS, Direction
+from aloft.studies.reach.search import PlanJob, RunJob, enough
 
 UP, BACK = DIRECTIONS[0], DIRECTIONS[2]
 
@@ -42,7 +45,7 @@ class StandIn:
         return found
 
 
-def in_this_process(function, jobs) -> Iterator[JobResult]:  # type: ignore[no-untyped-def]
+def in_this_process(function, jobs, *, workers) -> Iterator[JobResult]:  # type: ignore[no-untyped-def]
     for index, job in enumerate(jobs):
         yield JobResult(index, *attempt(function, job))
 
@@ -105,7 +108,7 @@ def test_what_is_kept_is_not_done_again(stand_in: StandIn, tmp_path: Path) -> No
 def test_a_search_ends_when_its_time_is_spent(
     stand_in: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("aloft.benchmarks.frontier.search.FIRST_LOOK_CPU", 2.0)
+    monkeypatch.setattr(bench, "FIRST_LOOK_CPU", 2.0)
     frontier([9000], tmp_path, [UP])
     found = told(tmp_path, UP)
     assert (found["planned"], found["planned_ended"]) == (23.0, False)
@@ -115,7 +118,7 @@ def test_a_search_ends_when_its_time_is_spent(
 def test_more_seeds_search_longer(
     stand_in: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("aloft.benchmarks.frontier.search.FIRST_LOOK_CPU", 2.0)
+    monkeypatch.setattr(bench, "FIRST_LOOK_CPU", 2.0)
     frontier(range(9000, 9004), tmp_path, [UP])
     assert told(tmp_path, UP)["planned_ended"] is False
     frontier(range(9000, 9020), tmp_path, [UP])
@@ -138,6 +141,6 @@ def test_what_breaks_is_a_failure_with_its_error(
 
 
 def test_code_and_graph_are_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    one = module._Keys().code
+    one = module._Keys(bruce_jumps()).code
     monkeypatch.setattr(module, "code_fingerprint", lambda: "other")
-    assert module._Keys().code != one
+    assert module._Keys(bruce_jumps()).code != one

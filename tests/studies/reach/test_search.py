@@ -8,9 +8,10 @@ from collections.abc import Callable, Generator
 
 import pytest
 
-from aloft.benchmarks.frontier.search import DIRECTIONS, GOALS, Direction, furthest, outward
 from aloft.planner.task.read_task import require_consistent
 from aloft.robots.description import find_robot
+from aloft.studies.reach.directions import DIRECTIONS, GOALS, Direction
+from aloft.studies.reach.search import furthest, outward
 
 BY_NAME = {direction.name: direction for direction in DIRECTIONS}
 

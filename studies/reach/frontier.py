@@ -1,44 +1,41 @@
 """The frontier: how far jumps in every direction land at 95 %, against what the motors could give.
 
-Along each of ``search.DIRECTIONS`` three ends are looked for on one ladder of values:
+Along each of a robot's directions three ends are looked for on one ladder of values:
 
 - **planned**: the last rung for which the planner finds a valid plan with its usual recipe, by
   strides and bisection (``search.furthest``);
-- **reached**: the largest rung, walking from rung to rung, of whose runs in the robust trial at least
-  95 % land (``blocks.JumpScore``); the walk ends after two failing rungs in a row;
-- **theory**: the last rung for which the planner finds a valid plan with ``search.LOOSEST``, each
+- **reached**: the largest rung, walking from rung to rung, of whose runs in the graph's trial at least
+  95 % land (``blocks.JumpScore``); the walk ends after two failing rungs in a row. A quick effort
+  looks for it by bisection;
+- **theory**: the last rung for which the planner finds a valid plan with ``directions.LOOSEST``, each
   solve started from the plan of the nearest rung below and, if that fails, from nothing. Flight and
   impact are exact as always, and the plan passes the same check by exact dynamics. It is what this
   planner can find, so a lower bound of what the motors could give; nothing is fed back.
 
-What has been planned and run is kept in ``results/frontier`` and not done again unless the code or
+What has been planned and run is kept in a folder and not done again unless the code or
 the graph changes; more seeds go on from there.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from ...planner.library.library import shipped_folder
-from ...plotting import COLOURS, FAINT, INK, PALE, new_figure, style, svg_text
 from ...robots.description import find_robot
-from ...studies.batch.jobs import job_results
-from ...studies.expansion import load_cell
-from ...studies.journal import Journal, Outcome, code_fingerprint
-from ...studies.summary import wilson_interval
-from ..rows import Row
+from ...runtime.graph import load
+from ..batch.jobs import job_results
+from ..journal import Journal, Outcome, code_fingerprint
+from ..summary import wilson_interval
+from .directions import Direction
 from .search import (
-    DIRECTIONS,
-    RATE,
     Ask,
-    Direction,
+    Effort,
+    JumpGraph,
     PlanJob,
     RunJob,
     Tries,
@@ -105,20 +102,6 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
     }
 
 
-def row_of(found: dict[str, Any]) -> Row:
-    """A direction's row: what is reached, its ratio to the theory, and what ends it."""
-    note = f"planned {found['planned']:g}, theory {found['theory']:g}"
-    note += f" ({found['binds']})" if found["binds"] else ""
-    if found["runs"]:
-        lands = f"{found['landed']} of {found['runs']} land"
-        note = f"{lands}, 95 % interval {found['ci_low']:.2f} to {found['ci_high']:.2f}; {note}"
-    if found["fails_at"] is not None:
-        note += f"; {found['fails_at']:g} fails: {found['why']}"
-    ratio = found["reached"] / found["theory"] if found["theory"] else None
-    name = f"frontier, {found['name']}"
-    return Row(name, found["reached"], found["unit"], "theory", ratio, note=note)
-
-
 def _failed(tries: Tries, runs: int) -> dict[int, str]:
     """Every rung that failed and why, in their order: the runs' most frequent reason, or what kept
     the planner from a plan."""
@@ -167,61 +150,23 @@ def _seconds(outcomes: Iterable[Outcome]) -> float:
     return round(sum(float(each.metrics.get("cpu_s", 0.0)) for each in outcomes), 2)
 
 
-KINDS = (
-    ("theory", "theory: full motors, no margins", PALE, 0.78),
-    ("planned", "planned by the recipe", COLOURS[5], 0.46),
-    ("reached", "lands at 95 %", COLOURS[0], 0.22),
-)
-"""What the bars show, from the widest to the narrowest: key, label, colour and width."""
-
-
-def frontier_chart(found: Sequence[Mapping[str, Any]]) -> str:
-    """The chart as SVG text: one row a direction, the first at the top, its bars as shares of the
-    theoretical bound, and the values beside them."""
-    from matplotlib.ticker import PercentFormatter
-
-    with style():
-        figure = new_figure(9.0, 1.5 + 0.42 * max(len(found), 1), "How far jumps reach")
-        axes = figure.add_subplot()
-        axes.grid(axis="y", visible=False)
-        for key, label, colour, width in KINDS:
-            shares = [each[key] / each["theory"] if each["theory"] else 0.0 for each in found]
-            bars = axes.barh(range(len(found)), shares, width, color=colour, label=label)
-            for row, bar in enumerate(bars):
-                bar.set_gid(f"{key}-{row}")
-        for row, each in enumerate(found):
-            more = "" if each["theory_ended"] else " or more"
-            values = " / ".join(f"{each[key]:g}" for key in ("reached", "planned", "theory"))
-            axes.annotate(
-                f"{values}{more} {each['unit']}", (1.0, row), (8, 0),
-                xycoords=axes.get_yaxis_transform(), textcoords="offset points", va="center",
-                fontsize=8, color=FAINT,
-            )  # fmt: skip
-        axes.set_yticks(range(len(found)), [each["name"] for each in found], color=INK)
-        axes.tick_params(axis="y", length=0)
-        axes.spines["left"].set_visible(False)
-        axes.set_ylim(len(found) - 0.4, -0.6)
-        axes.set_xlim(0.0, 1.0)
-        axes.xaxis.set_major_formatter(PercentFormatter(1.0, 0))
-        axes.set_xlabel("share of the theoretical bound; values: reached / planned / theory")
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8)
-        return svg_text(figure)
-
-
-SEEDS = tuple(range(9000, 9020))
-"""Nothing is tuned on them."""
-FOLDER = Path("results") / "frontier"
-
-
 def frontier(
-    seeds: Sequence[int] = SEEDS,
-    folder: Path = FOLDER,
-    directions: Sequence[Direction] = DIRECTIONS,
-) -> list[Row]:
-    """One row a direction; writes ``frontier.json`` and ``frontier.svg`` into ``folder``."""
-    keys = _Keys()
+    graph: JumpGraph,
+    directions: Sequence[Direction],
+    seeds: Sequence[int],
+    folder: Path,
+    effort: Effort,
+    *,
+    workers: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[dict[str, Any]]:
+    """What ``result_of`` says of every direction; plans and what was tried are kept in ``folder``.
+
+    ``progress`` is told each try, and what came of it.
+    """
+    keys = _Keys(graph)
     walks = {d.name: Tries(d) for d in directions}
-    searches = {name: explore(tries, len(seeds)) for name, tries in walks.items()}
+    searches = {name: explore(tries, effort) for name, tries in walks.items()}
     waiting = {name: next(search) for name, search in searches.items()}
     with Journal(folder / "runs.jsonl") as journal:
         while waiting:
@@ -229,39 +174,44 @@ def frontier(
             for name in list(waiting):
                 while name in waiting:
                     tries, ask = walks[name], waiting[name]
-                    job = job_for(tries.direction, ask, seeds, folder, journal, keys)
+                    job = job_for(graph, tries.direction, ask, seeds, folder, journal, keys)
                     if job is not None:
                         names.append(name)
                         jobs.append(job)
                         break
                     answer(tries, ask, seeds, journal, keys)
+                    progress(_told(tries, ask))
                     try:
                         waiting[name] = next(searches[name])
                     except StopIteration:
                         del waiting[name]
-            with closing(job_results(do, jobs)) as results:
+            with closing(job_results(do, jobs, workers=workers)) as results:
                 for result in results:
                     tries = walks[names[result.index]]
                     ask = waiting[names[result.index]]
                     keep(journal, keys, tries.direction, ask, jobs[result.index], result)
-    told = [result_of(tries, len(seeds)) for tries in walks.values()]
-    found = {"seeds": list(seeds), "rate": RATE, "code": keys.code, "directions": told}
-    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
-    (folder / "frontier.json").write_text(text, encoding="utf-8")
-    (folder / "frontier.svg").write_text(frontier_chart(told), encoding="utf-8")
-    return [row_of(each) for each in told]
+    return [result_of(tries, len(seeds)) for tries in walks.values()]
+
+
+def _told(tries: Tries, ask: Ask) -> str:
+    """A try and what came of it, as a line."""
+    way = tries.direction
+    what = f"{way.name} {way.value(ask.rung):g} {way.unit}"
+    if ask.kind == "run":
+        runs = tries.runs[ask.rung]
+        return f"{what}: {sum(run.success for run in runs)} of {len(runs)} land"
+    found = (tries.recipe if ask.kind == "recipe" else tries.loosest)[ask.rung]
+    limits = "" if ask.kind == "recipe" else ", all of the motors and no margins"
+    return f"{what}{limits}: {'a plan' if found.success else f'no plan ({found.reason})'}"
 
 
 class _Keys:
     """What outcomes are kept under: code and graph, then the task by its hash."""
 
-    def __init__(self) -> None:
-        graphs = shipped_folder()
-        trial = graphs / "trials" / "robust.yaml"
-        graph = load_cell(graphs / "jump.yaml", [trial], {}, graphs / "bench.yaml")
-        text = f"{code_fingerprint()}\n{graph.checked.text}"
+    def __init__(self, graph: JumpGraph) -> None:
+        text = f"{code_fingerprint()}\n{load(graph.path, graph.settings).checked.text}"
         self.code = hashlib.sha256(text.encode()).hexdigest()[:24]
-        self._robot = find_robot("bruce")
+        self._robot = find_robot(graph.robot)
         self._hashes: dict[tuple[str, bool, int], str] = {}
 
     def __call__(self, way: Direction, ask: Ask, seed: int | None = None) -> str:
@@ -287,20 +237,20 @@ def _known(way: Direction, ask: Ask, seeds: Sequence[int], journal: Journal,
     return found
 
 
-def job_for(way: Direction, ask: Ask, seeds: Sequence[int], folder: Path, journal: Journal,
-            keys: _Keys) -> PlanJob | RunJob | None:  # fmt: skip
+def job_for(graph: JumpGraph, way: Direction, ask: Ask, seeds: Sequence[int], folder: Path,
+            journal: Journal, keys: _Keys) -> PlanJob | RunJob | None:  # fmt: skip
     """What is still to be done for a try; ``None`` if all of it is kept."""
+    plans = folder / "plans"
     if ask.kind != "run":
         if keys(way, ask) in journal.outcomes:
             return None
         task = way.loosest(ask.rung) if ask.kind == "loosest" else way.task(ask.rung)
-        return PlanJob(task, folder / "plans", ask.near)
+        return PlanJob(graph.robot, task, plans, ask.near)
     known = _known(way, ask, seeds, journal, keys)
     done, failed = len(known), sum(not each.success for each in known)
     if enough(done, failed, len(seeds)):
         return None
-    missing = tuple(seeds[done:])
-    return RunJob(way.task(ask.rung), folder / "plans", missing, len(seeds), done, failed)
+    return RunJob(graph, way.task(ask.rung), plans, tuple(seeds[done:]), len(seeds), done, failed)
 
 
 def keep(journal: Journal, keys: _Keys, way: Direction, ask: Ask, job: PlanJob | RunJob,

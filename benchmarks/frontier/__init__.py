@@ -1,1 +1,0 @@
-"""How far jumps reach in every direction, landed and planned."""

@@ -1,0 +1,102 @@
+"""``aloft robot reach``: how far a robot jumps in every direction, and what ends it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...runtime.language.errors import ExitCode
+from .options import JsonBesideTables, Workers
+from .output import console, errors_reported, print_json, say, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def reach(
+    name: Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")],
+    seeds: Annotated[
+        str, typer.Option(help="Seeds of the robust trial that each jump is run with: 9000:9004.")
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for what is found; by default results/reach/NAME.")
+    ] = None,
+    workers: Workers = 0,
+    as_json: JsonBesideTables = False,
+) -> None:
+    """Search how far a robot jumps in every direction: planned, landed, and by its motors alone.
+
+    It takes about ten minutes on four cores, and continues after an interruption. A picture shows it
+    beside BRUCE, in lengths of the legs of each.
+    """
+    from ...robots.description import path_of, read
+    from ...runtime.graph import load
+    from ...studies.batch.seeds import parse_seeds
+    from ...studies.reach.charts import reach_chart
+    from ...studies.reach.reach import SEEDS, bruce_reach
+    from ...studies.reach.reach import reach as find_reach
+    from ...studies.reach.search import JumpGraph
+    from ...studies.rehearsal import trial_settings
+    from .robot_trials import about_robot, graph_of
+
+    screen = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        chosen = parse_seeds(seeds) if seeds else SEEDS
+        path, own = graph_of(name)
+        about_robot(name, "jump", screen)
+        file = path_of(name).resolve()
+        robot, named = read(file).description, str(file)
+        settings = {"robot": named, **trial_settings("robust")} if own else trial_settings("robust")
+        graph = JumpGraph(named, path, settings)
+        load(path, settings)
+        folder = out or Path("results") / "reach" / robot.name
+        compile_functions(robot, folder, screen)
+        told = find_reach(
+            robot, graph, folder, seeds=chosen, workers=workers,
+            progress=lambda text: say(screen, text),
+        )  # fmt: skip
+        picture = folder / "reach.svg"
+        picture.write_text(reach_chart(told, bruce_reach()), encoding="utf-8")
+        (folder / "reach.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    show(told, screen)
+    say(screen, f"drawn to {picture}")
+    landed = any(each["reached"] for each in told["directions"])
+    if as_json:
+        why = "jumps land" if landed else "no jump lands"
+        print_json({"success": landed, "reason": why, **told, "picture": str(picture)})
+    raise typer.Exit(ExitCode.SUCCESS if landed else ExitCode.NOT_SUCCESSFUL)
+
+
+def compile_functions(robot: Any, folder: Path, screen: Console) -> None:
+    """Compile what plans are made with once, before the workers start."""
+    from ...planner.library.library import PlanLibrary
+    from ...planner.task.task import make_task
+    from .planning import compile_once
+
+    tasks = [
+        make_task({"name": "", "robot": robot.name, "rise": 0.1, **more}).resolved(robot)
+        for more in ({}, {"distance_y": 0.1})
+    ]
+    compile_once(PlanLibrary(robot, folder, ()), tasks, screen)
+
+
+def show(told: dict[str, Any], screen: Console) -> None:
+    """Print a row for every direction."""
+    rows = []
+    for each in told["directions"]:
+        values = [f"{each[key]:g} {each['unit']}" for key in ("reached", "planned", "theory")]
+        for k, key in enumerate(("planned", "theory"), start=1):
+            values[k] += "" if each[f"{key}_ended"] else " or more"
+        fails = "" if each["fails_at"] is None else f"{each['fails_at']:g}: {each['why']}"
+        rows.append(
+            (each["name"], *values, f"{each['in_legs']['reached']:.2f}", each["binds"] or each["beyond"],
+             fails)
+        )  # fmt: skip
+    columns = (
+        "direction", ">lands", ">planned", ">theory", ">in legs", "what binds in theory", "what fails beyond",
+    )  # fmt: skip
+    title = f"{told['robot']}, {told['mass_kg']:.4g} kg, legs of {told['leg_length_m']:.3g} m"
+    screen.print(table(title, columns, rows))

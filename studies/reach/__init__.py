@@ -1,0 +1,1 @@
+"""How far a robot jumps in every direction: what is planned, what lands, and what the motors could give."""

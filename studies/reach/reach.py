@@ -1,0 +1,95 @@
+"""How far any robot jumps, in some minutes: the frontier in seven directions, beside BRUCE's.
+
+The directions are BRUCE's at the robot's size (``directions.single_directions``). Upwards comes first,
+because the other jumps rise by no more than half of what can be planned there. Each direction gets so much
+processor time (``PLANNED_CPU``, ``THEORY_CPU``) and few runs, so what is told is a first look: the benchmark
+``frontier`` shows with more seeds and rung by rung what holds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...robots.description import find_robot
+from ...robots.robot_description import RobotDescription
+from .directions import Direction, JumpSizes, leg_length, single_directions, sizes_of
+from .frontier import frontier
+from .search import RATE, Effort, JumpGraph
+
+SEEDS = tuple(range(9000, 9004))
+PLANNED_CPU, THEORY_CPU = 40.0, 20.0
+"""s; after so much processor time no further solve is begun along one direction."""
+QUARTER_TURN = 90.0
+"""deg; counts as one length of a leg."""
+BRUCE = Path(__file__).with_name("bruce.json")
+"""Written by ``docs/refresh.py frontier``, with the table in docs/frontier.md."""
+
+
+def reach(
+    robot: RobotDescription,
+    graph: JumpGraph,
+    folder: Path,
+    *,
+    seeds: Sequence[int] = SEEDS,
+    workers: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> dict[str, Any]:
+    """How far the robot jumps in every direction, as plain data.
+
+    Returns:
+        ``robot``, ``mass_kg``, ``leg_length_m``, ``seeds``, ``rate`` and ``directions``: what
+        ``frontier.result_of`` says of each, and ``in_legs``: its ends in lengths of the legs, or in turns of
+        90 degrees. Where no rise can be planned, upwards is the only direction.
+    """
+    effort = Effort(len(seeds), PLANNED_CPU, THEORY_CPU, quick=True)
+    bruce = find_robot("bruce")
+    name = "" if robot.name == bruce.name else robot.name
+    legs = leg_length(robot)
+
+    def along(directions: Sequence[Direction]) -> list[dict[str, Any]]:
+        return frontier(
+            graph, directions, seeds, folder, effort, workers=workers, progress=progress
+        )
+
+    up = single_directions(JumpSizes(legs / leg_length(bruce)), name)[:1]
+    found = along(up)
+    highest = found[0]["planned"] / up[0].shown
+    if highest:
+        found += along(single_directions(sizes_of(robot, bruce, highest), name)[1:])
+    for each in found:
+        each["in_legs"] = in_legs(each, legs)
+    return {
+        "robot": robot.name,
+        "mass_kg": robot.total_mass,
+        "leg_length_m": legs,
+        "seeds": list(seeds),
+        "rate": RATE,
+        "directions": found,
+    }
+
+
+def in_legs(each: Mapping[str, Any], legs: float) -> dict[str, float]:
+    """A direction's ends in lengths of the ``legs`` [m], or in turns of 90 degrees."""
+    unit = QUARTER_TURN if each["unit"] == "deg" else 100.0 * legs
+    return {key: round(each[key] / unit, 4) for key in ("reached", "planned", "theory")}
+
+
+def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
+    """What the benchmark ``frontier`` has found of a robot's single directions, as ``bruce_reach`` gives it."""
+    singles = {way.name for way in single_directions()}
+    legs = leg_length(robot)
+    rows = [
+        {"name": each["name"], "in_legs": in_legs(each, legs)}
+        for each in found["directions"]
+        if each["name"] in singles
+    ]
+    return {"robot": robot.name, "directions": rows}
+
+
+def bruce_reach() -> dict[str, Any]:
+    """BRUCE's reach: what the benchmark ``frontier`` has found with 20 seeds, for jumps of the same sizes."""
+    found: dict[str, Any] = json.loads(BRUCE.read_text(encoding="utf-8"))
+    return found
