@@ -164,7 +164,7 @@ class SteppingStones(Block):
         seen: SeenStones,
         memory: StonesTaken,
         rows: Array2D,
-        params: Params,
+        params: SteppingStonesParameters,
     ) -> None:
         if memory.given < rows.shape[0] and taken.command >= memory.given:
             memory.given += 1

@@ -59,10 +59,10 @@ from .steering import (
 
 __all__ = [
     "BaseState",
+    "BodyTwist",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
-    "BodyTwist",
     "CourseGoal",
     "DelayEstimate",
     "DrivePhase",
@@ -70,8 +70,8 @@ __all__ = [
     "EstimatorHealth",
     "ExternalForce",
     "FootLoad",
-    "FootholdPose",
     "FootTarget",
+    "FootholdPose",
     "ImuReading",
     "JointCommand",
     "JointState",
