@@ -42,6 +42,8 @@ from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, 
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
+DIRECTED = 0.05
+"""A jump is one ahead or back from that distance on [m]."""
 MOST_BIAS = 0.02
 """The largest error of place [m] that is taken for the robot's own, and not for a push."""
 BEHIND = 10.0
@@ -74,8 +76,11 @@ class SteeringState(Signal):
     goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
     goal_heading = Field(unit="rad", frame="world", text="their heading there")
     bias = Field(
-        2, unit="m", text="by how much landings go too far ahead and aside, as learnt so far"
+        (3, 2),
+        unit="m",
+        text="by how much landings go too far ahead and aside: of jumps ahead, back and others",
     )
+    kind = Field(dtype="int64", text="the row of the last request")
     level = Field(unit="m", text="height of the ground there, above that where it first stood")
     before = Field(2, unit="m", frame="world", text="the goal before the command that waits")
     before_heading = Field(unit="rad", frame="world", text="the heading there")
@@ -104,8 +109,9 @@ class SteeredPlan(Block):
     stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
     told at ``JumpPlan``: by the speed and height that the thrust has reached.
 
-    Each robot lands a little beside its plans, and always to the same side, as its masses are not exactly those of the
-    description. So a ``learning`` share of the last error is added to a bias, which requests are shortened by.
+    Each robot lands a little beside its plans, and jumps ahead, back or others always to the same side, as its masses are not
+    exactly those of the description. So a ``learning`` share of the last error is added to a bias of that kind
+    of jump, which its requests are shortened by.
 
     The ground has the height that the commands say, and a robot that stands is taken to stand on it: ``up`` is
     the difference between the ground of two commands and never measured.
@@ -295,10 +301,11 @@ def learn(middle: Array1D, heading: float, share: float, memory: SteeringState) 
     x, y = middle[0] - memory.goal[0], middle[1] - memory.goal[1]
     sine, cosine = sincos(heading)
     ahead, aside = cosine * x + sine * y, cosine * y - sine * x
-    memory.bias[0] += share * min(max(ahead, -MOST_BIAS), MOST_BIAS)
-    memory.bias[1] += share * min(max(aside, -MOST_BIAS), MOST_BIAS)
-    memory.bias[0] = min(max(memory.bias[0], -MOST_BIAS), MOST_BIAS)
-    memory.bias[1] = min(max(memory.bias[1], -MOST_BIAS), MOST_BIAS)
+    bias = memory.bias[memory.kind]
+    bias[0] += share * min(max(ahead, -MOST_BIAS), MOST_BIAS)
+    bias[1] += share * min(max(aside, -MOST_BIAS), MOST_BIAS)
+    bias[0] = min(max(bias[0], -MOST_BIAS), MOST_BIAS)
+    bias[1] = min(max(bias[1], -MOST_BIAS), MOST_BIAS)
 
 
 @kernel
@@ -320,8 +327,12 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
     sine, cosine = sincos(heading)
     turn = memory.goal_heading - heading
-    memory.asked[0] = cosine * x + sine * y - memory.bias[0]
-    memory.asked[1] = cosine * y - sine * x - memory.bias[1]
+    ahead, aside = cosine * x + sine * y, cosine * y - sine * x
+    memory.kind = 2
+    if abs(ahead) >= DIRECTED:
+        memory.kind = 0 if ahead > 0.0 else 1
+    memory.asked[0] = ahead - memory.bias[memory.kind, 0]
+    memory.asked[1] = aside - memory.bias[memory.kind, 1]
     memory.asked[2] = atan2(sin(turn), cos(turn))
     memory.asked[3] = memory.level - memory.before_level
 
@@ -339,7 +350,8 @@ def tell_request(memory: SteeringState, request: PlanRequest) -> None:
 @kernel
 def land_at(done: Array1D, memory: SteeringState) -> None:
     """Move the goal to where a plan lands, with the robot's own error."""
-    ahead, aside = done[0] + memory.bias[0], done[1] + memory.bias[1]
+    ahead = done[0] + memory.bias[memory.kind, 0]
+    aside = done[1] + memory.bias[memory.kind, 1]
     move(memory, ahead, aside, done[2], done[3])
 
 
