@@ -22,6 +22,8 @@ SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Each worker takes a part of the tests in their order, so that what many tests share is made once;
 # tests/conftest.py makes one worker more than there are cores, as some tests wait.
 WORKERS := --numprocesses auto --dist worksteal
+# pytest keeps the tests whose assertions it has rewritten, also where the environment forbids bytecode
+CACHED := PYTHONDONTWRITEBYTECODE=
 
 .PHONY: setup jump test test-all lint format bench plans docs site clean help
 
@@ -50,10 +52,10 @@ jump: $(READY)  ## run graphs/jump.yaml and write recordings/jump.rrd
 	@$(BIN)/aloft run graphs/jump.yaml --record $(RECORDING)
 
 test: $(COMPLETE)  ## run the tests, without the long ones
-	@$(SINGLE) $(BIN)/python -m pytest $(WORKERS) -m "not long"
+	@$(CACHED) $(SINGLE) $(BIN)/python -m pytest $(WORKERS) -m "not long"
 
 test-all: $(COMPLETE)  ## run all tests
-	@$(SINGLE) $(BIN)/python -m pytest $(WORKERS)
+	@$(CACHED) $(SINGLE) $(BIN)/python -m pytest $(WORKERS)
 
 lint: $(COMPLETE)  ## check style and types
 	@$(BIN)/ruff check .

@@ -5,6 +5,7 @@ need lies in ``shared``. Heavy imports are inside functions only.
 from __future__ import annotations
 
 import gc
+import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,8 @@ start makes and that all stay. A check of a jump makes 100 000."""
 def main() -> None:
     """Run the command line and leave with one of ``ExitCode``."""
     gc.set_threshold(*COLLECTED_AFTER)
+    # Else Pydantic looks through all installed packages for plugins, a tenth of a start.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     from .app import main as run_command_line
 
     run_command_line()

@@ -6,12 +6,12 @@
 #
 # Without PYTHON, `newest` takes the newest one it finds whose version is not that of .venv, and does
 # nothing if there is none; `oldest` takes the one that .venv was made with. The environment goes to
-# build/ and is used again. `.ci/run` runs both. LIMIT bounds the seconds of the installation and of the
-# tests, each.
+# build/ and is used again. `.ci/run` runs both beside each other, so each has no more processes than there
+# are cores. LIMIT bounds the seconds of the installation and of the tests, each.
 set -e
 cd "$(dirname "$0")/.."
 which=$1
-limit=${LIMIT:-600}
+limit=${LIMIT:-1200}
 version='import sys; print("%d.%d" % sys.version_info[:2])'
 ours=$(.venv/bin/python -c "$version")
 
@@ -55,15 +55,17 @@ for text in told["dependency-groups"]["dev"]:
         print(text)
 PROGRAM
 pip="$folder/bin/python -m pip install -qq --disable-pip-version-check"
-if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! $pip --no-deps --no-build-isolation --editable .; then
+editable="$pip --no-deps --no-build-isolation --editable ."
+# one after the other: setuptools writes what it knows of a checkout into the checkout
+if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! { flock 9 || true; $editable; } 9>build/lock; then
     echo "the packages could not be installed within $limit s: nothing is tested with $which on $python"
     exit 0
 fi
 # where the environment forbids to write bytecode, every process of the tests would compile all sources
 "$folder/bin/python" -m compileall -q -x '/(\.venv|build|tests)/' .
 echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
-OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 timeout "$limit" "$folder/bin/python" -m pytest \
-    --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
+PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTEST_XDIST_AUTO_NUM_WORKERS=$(nproc) \
+    timeout "$limit" "$folder/bin/python" -m pytest --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_check_graph.py \
     tests/runtime/loading/test_graph_file.py tests/runtime/loading/test_schema.py tests/files \
     tests/blocks/general/test_pid.py tests/blocks/general/test_linear_systems.py \

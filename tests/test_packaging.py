@@ -23,10 +23,9 @@ LISTED = PROJECT["tool"]["setuptools"]["packages"]
 
 
 def sub_packages() -> set[str]:
-    folders = {path.parent for path in ROOT.glob("*/**/__init__.py")}
-    parts = {folder.relative_to(ROOT).parts for folder in folders}
-    ours = {p for p in parts if p[0] not in NOT_SHIPPED and not p[0].startswith(".")}
-    return {".".join(("aloft", *p)) for p in ours} | {"aloft"}
+    tops = [p for p in ROOT.glob("*/") if p.name not in NOT_SHIPPED and not p.name.startswith(".")]
+    folders = {path.parent for top in tops for path in top.rglob("__init__.py")}
+    return {".".join(("aloft", *f.relative_to(ROOT).parts)) for f in folders} | {"aloft"}
 
 
 def test_every_sub_package_is_listed() -> None:

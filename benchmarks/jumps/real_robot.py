@@ -157,7 +157,8 @@ def graph_of(
     }  # fmt: skip
     if learnt is not None:
         sets["plan.learnt"] = str(learnt)
-    graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml")
+    behind = [graphs / asked.behind] if asked.behind else []
+    graph = load_cell(graphs / asked.graph, include, sets, graphs / "bench.yaml", behind)
     if told == "draws":
         return graph.changed(oracle_values(graph, CALIBRATED, seed=seed))
     return graph

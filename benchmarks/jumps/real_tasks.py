@@ -31,12 +31,14 @@ class AskedJump:
         task: changes of that graph's task.
         times: how often it is made by a robot that learns.
         sets: further parameters of the graph.
+        behind: a shipped file that the graph includes behind all others.
     """
 
     task: Mapping[str, Any]
     graph: str = ALONE
     times: int = TIMES
     sets: Mapping[str, Any] = field(default_factory=dict)
+    behind: str = ""
 
     def before(self, first: bool) -> list[dict[str, float]]:
         """The smaller jumps that a robot that learns makes before: all of the ladder at ``first``, then half as far."""
@@ -55,18 +57,21 @@ ASKED: Mapping[str, AskedJump] = {
 }
 """The jumps of every robot, in their order."""
 RANDOM, PUSH, TEN = "random task", "pushed in flight", "ten in a row"
-EVERY = (*ASKED, RANDOM, PUSH, TEN)
+SEEN = "ten in a row, place measured"
+EVERY = (*ASKED, RANDOM, PUSH, TEN, SEEN)
 """All that is asked for, in the order in which a robot does it."""
 
 
 def asked_of(seed: int) -> Mapping[str, AskedJump]:
     """What the robot of a seed is asked for, by name; the random task and the push are its own."""
     angle = math.radians(PUSHES[seed % len(PUSHES)])
+    ten: dict[str, Any] = {"rise": 0.06, "repeat": 10}
     return {
         **ASKED,
         RANDOM: AskedJump(random_task(seed), times=4),
         PUSH: AskedJump({"rise": 0.12}, "push_12cm.yaml", 1, {"push.angle": angle}),
-        TEN: AskedJump({"rise": 0.06, "repeat": 10}, "hops.yaml", 1),
+        TEN: AskedJump(ten, "hops.yaml", 1),
+        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/place_sensor.yaml"),
     }
 
 

@@ -13,8 +13,18 @@ from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
 from ...runtime.language.signals import Field, Signal
-from ..signals import ContactState, DynamicsTerms, FootLoad, JointState, Phase, PhaseState
+from ..signals import (
+    ContactState,
+    ContactSwitches,
+    DynamicsTerms,
+    FootLoad,
+    JointState,
+    Phase,
+    PhaseState,
+)
 
+_STILL = 0.05
+"""A point that moves up or down more slowly than this [m/s] is still."""
 _DAMPING = 1e-6
 """Added to the squared lever arms [m^2] of the joints, so that a straight leg has a finite inverse."""
 
@@ -25,11 +35,17 @@ class FootLoadMemory(Signal):
     force = Field(("n_contacts", 3), unit="N", frame="world", text="of each point, filtered")
     loaded = Field("n_feet", dtype="bool", text="whether each foot carries load")
     touched = Field(
-        "n_contacts", dtype="bool", text="whether each point has touched while its foot stands"
+        "n_contacts",
+        dtype="bool",
+        text="whether each point has touched, or rested, while its foot stands",
     )
     ground = Field(
-        "n_contacts", unit="m", frame="world", text="the lowest height it has had since then"
+        "n_contacts",
+        unit="m",
+        frame="world",
+        text="where it rested last, or the lowest height at which it has touched since",
     )
+    still = Field("n_contacts", unit="s", text="how long each point has neither risen nor sunk")
 
 
 class FootLoadConstants(Signal):
@@ -69,8 +85,14 @@ class FootLoadEstimator(Block):
     **Contacts.** After a touchdown a loaded foot may stand on an edge between its points. Load anywhere
     between toe and heel is a sum of loads at both, so then the points count as in contact that are less than
     ``flat_height`` above where they have touched since the foot came down, or, before they have, above where
-    its other points have. If none has touched, all count: the foot has come down on the edge. Points with a
-    closed switch stay in contact, and before the touchdown only they are.
+    its other points have. A point has touched where its switch has closed, and where it has been still for ``still_time``: a
+    sole that rests on its heel and across an edge has its toe in the air, and the edge carries what the program
+    puts on the toe; with more load there the sole turns about the edge until the toe touches. If no point has touched, all
+    count: the foot has come down on the edge.
+
+    A contact that is only held, its switch being open, ends where the point has risen by ``flat_height``: on a sole
+    that tips over an edge an end is 2 cm up before a hold of 30 ms is over. All other points in ``switches``
+    stay in contact, and before the touchdown only they are.
 
     The joints' accelerations and friction are left out, so the force is wrong for some milliseconds after
     an impact, and by what friction holds. A leg that is stretched straight shows no load along itself. The block
@@ -91,6 +113,12 @@ class FootLoadEstimator(Block):
             0.006, unit="m", ge=0.0,
             text="height above where it has touched up to which a point of a loaded foot is in contact",
         )  # fmt: skip
+        still_time: float = live_parameter(
+            0.01,
+            unit="s",
+            gt=0.0,
+            text="a point of a loaded foot that is still for so long has touched",
+        )
 
     Constants = FootLoadConstants
     Scratch = FootLoadScratch
@@ -100,6 +128,7 @@ class FootLoadEstimator(Block):
     terms = Input(DynamicsTerms, text="the model's terms")
     joints = Input(JointState, text="measured torques")
     switches = Input(ContactState, text="which points have contact by their switches")
+    closed = Input(ContactSwitches, text="the raw switches")
     phase = Input(PhaseState, text="the phase, of the tick before")
     load = Output(FootLoad, text="force and centre of pressure of every foot")
     contacts = Output(
@@ -131,6 +160,7 @@ class FootLoadEstimator(Block):
         terms: DynamicsTerms,
         joints: JointState,
         switches: ContactState,
+        closed: ContactSwitches,
         phase: PhaseState,
         load: FootLoad,
         contacts: ContactState,
@@ -138,6 +168,7 @@ class FootLoadEstimator(Block):
         params: Params,
         constants: FootLoadConstants,
         scratch: FootLoadScratch,
+        period: float,
     ) -> None:
         first = terms.velocity.shape[0] - joints.torque.shape[0]
         for foot in range(load.force.shape[0]):
@@ -151,7 +182,9 @@ class FootLoadEstimator(Block):
         if phase.phase < Phase.LANDING:
             memory.touched[:] = False
         else:
-            find_touched(terms, switches, memory, constants.foot_of_point)
+            time_still_points(terms, period, memory)
+            find_touched(terms, switches, memory, constants.foot_of_point, params.still_time)
+            leave_risen_points(terms, closed, memory, params.flat_height, contacts)
             add_loaded_points(terms, memory, constants.foot_of_point, params.flat_height, contacts)
 
 
@@ -235,18 +268,46 @@ def find_centre(
 
 @kernel
 def find_touched(
-    terms: DynamicsTerms, switches: ContactState, memory: FootLoadMemory, foot: Indices1D
+    terms: DynamicsTerms,
+    switches: ContactState,
+    memory: FootLoadMemory,
+    foot: Indices1D,
+    still_time: float,
 ) -> None:
     """Note where the points of the feet that stand have touched, and forget it for the others."""
     for i in range(foot.shape[0]):
         stands = bool(memory.loaded[foot[i]])
+        rests = stands and memory.still[i] >= still_time
         for j in range(foot.shape[0]):
             stands = stands or (foot[j] == foot[i] and switches.active[j])
         known, height = memory.touched[i], terms.contact_position[i, 2]
-        memory.touched[i] = stands and (known or switches.active[i])
+        memory.touched[i] = stands and (known or switches.active[i] or rests)
         # A contact lasts longer than its switch is closed, so a point may have left the ground already.
-        if switches.active[i] and not (known and memory.ground[i] < height):
+        if rests or (switches.active[i] and not (known and memory.ground[i] < height)):
             memory.ground[i] = height
+
+
+@kernel
+def time_still_points(terms: DynamicsTerms, period: float, memory: FootLoadMemory) -> None:
+    """Count how long each point has been still."""
+    for i in range(memory.still.shape[0]):
+        still = abs(terms.contact_velocity[i, 2]) < _STILL
+        memory.still[i] = memory.still[i] + period if still else 0.0
+
+
+@kernel
+def leave_risen_points(
+    terms: DynamicsTerms,
+    closed: ContactSwitches,
+    memory: FootLoadMemory,
+    flat_height: float,
+    contacts: ContactState,
+) -> None:
+    """Take out of the ``contacts`` the points with open switches that have left the ground."""
+    for i in range(closed.closed.shape[0]):
+        height = terms.contact_position[i, 2]
+        if not closed.closed[i] and height >= memory.ground[i] + flat_height:
+            contacts.active[i] = False
 
 
 @kernel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
+from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
-from .state import DriveState, TickRecord
+from .state import DriveState, TickRecord, integration_elements
 from .unsupported import uneven_contacts, unsupported_motor
 
 
@@ -262,6 +263,10 @@ class MujocoRobot(SimulatedRobot):
     def load_state(self) -> None:
         """Restore both from the declared state, and recompute what depends on them."""
         self.plant.load()
+
+    def state_elements(self) -> Mapping[str, Sequence[StateElements]]:
+        """The parts of the simulator's state: positions and velocities by joint, and the rest."""
+        return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed, and what the drives do not give of the gains."""

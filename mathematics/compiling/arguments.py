@@ -86,19 +86,35 @@ def type_of(argument: Any) -> ArgumentType:
     if isinstance(argument, np.ndarray):
         flags = argument.flags
         order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
-        return ArrayType(argument.dtype.name, argument.ndim, order)
+        return _array_type(argument.dtype, argument.ndim, order)
     if isinstance(argument, tuple) and hasattr(argument, "_fields"):
-        return RecordType(type(argument), tuple(type_of(part) for part in argument))
+        return _record_type(type(argument), tuple(map(type_of, argument)))
     if isinstance(argument, bool | np.bool_):
-        return NumberType("bool")
+        return _BOOL
     if isinstance(argument, int):
-        return NumberType("int")
+        return _INT
     if isinstance(argument, float):
-        return NumberType("float")
+        return _FLOAT
     raise TypeError(
         f"a kernel takes arrays, floats, ints, bools and named tuples of these, and not a "
         f"{type(argument).__name__}"
     )
+
+
+_FLOAT, _INT, _BOOL = NumberType("float"), NumberType("int"), NumberType("bool")
+
+
+@cache
+def _array_type(dtype: np.dtype[Any], dimensions: int, order: str) -> ArrayType:
+    """One object for equal types, which are compared a thousand times in a load; NumPy also composes the
+    name of a dtype anew each time."""
+    return ArrayType(dtype.name, dimensions, order)
+
+
+@cache
+def _record_type(kind: type, parts: tuple[ArgumentType, ...]) -> RecordType:
+    """As ``_array_type``."""
+    return RecordType(kind, parts)
 
 
 def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache
+from types import CodeType
 from typing import Any, NamedTuple
 
 from ..arrays import Rank
@@ -49,7 +50,9 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     annotation = getattr(annotation, "__forward_arg__", annotation)  # the text in a named tuple
     if isinstance(annotation, str):
         try:
-            annotation = eval(annotation, dict(scope))
+            # Not in a copy of the scope, which takes longer than the rest: a module's has all it needs.
+            whole = scope if isinstance(scope, dict) and "__builtins__" in scope else dict(scope)
+            annotation = eval(_compiled(annotation), whole)
         except Exception:  # noqa: BLE001  # a name that only type checkers see
             return None
     if annotation in (float, int, bool):
@@ -71,6 +74,11 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     if isinstance(annotation, type) and issubclass(annotation, IntEnum):
         return NUMBER
     return None
+
+
+@cache
+def _compiled(annotation: str) -> CodeType:
+    return compile(annotation, "<annotation>", "eval")
 
 
 @cache

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Collection, Mapping
-from functools import partial
+from functools import cache, partial
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -239,13 +239,14 @@ def call_of(block: Block, function: Callable[..., object]) -> KernelCall | Pytho
 
 def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
     """The call of a kernel with these arguments, in their order; it gets of signals what it reads."""
-    used = names_used(function)  # type: ignore[arg-type]
+    used = names_used(function)
     return KernelCall(
         function,
         *(as_record(each, used) if isinstance(each, Signal) else each for each in arguments),
     )
 
 
+@cache
 def names_used(function: FunctionType) -> frozenset[str]:
     """All attributes that a kernel and those that it calls name."""
     marked = {id(each) for each in kernels().values()}

@@ -150,12 +150,13 @@ def hanging(tick: int) -> Inputs:
 
 
 def loaded(n_velocities: int) -> Callable[[int], Inputs]:
-    """The legs bear a load that comes and goes, on soles that turn about their toes."""
+    """The legs bear a load that comes and goes, on soles that turn about their toes and rest at the top."""
     jacobian = np.random.default_rng(3).normal(size=(4, 3, n_velocities))
     bias = jacobian[:, 2].sum(axis=0)
 
     def inputs(tick: int) -> Inputs:
-        heels = 0.01 * (1.0 + np.sin(0.2 * tick))
+        heels, speed = 0.01 * (1.0 + np.sin(0.08 * tick)), 0.4 * np.cos(0.08 * tick)
+        speed = 0.0 if abs(speed) < 0.15 else speed
         return {
             "phase": {"phase": Phase.LANDING},
             "joints": {"torque": 0.0},
@@ -164,6 +165,7 @@ def loaded(n_velocities: int) -> Callable[[int], Inputs]:
                 "contact_jacobian": jacobian,
                 "nonlinear_effects": 30.0 * (1.0 + np.sin(0.05 * tick)) * bias,
                 "contact_position": np.outer([0.0, heels, 0.0, heels], [0, 0, 1]),
+                "contact_velocity": np.outer([0.0, speed, 0.0, speed], [0, 0, 1]),
             },
         }  # fmt: skip
 

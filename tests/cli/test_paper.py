@@ -73,6 +73,7 @@ def test_curves_are_drawn_and_frames_left_out_where_nothing_renders(
         assert not (out / figure["file"]).exists()
 
 
+@pytest.mark.long
 def test_the_page_says_what_came_of_the_runs(drawn: tuple[Path, dict[str, Any]]) -> None:
     out, results = drawn
     text = (out / "paper.md").read_text()
@@ -110,3 +111,15 @@ def test_a_changed_number_changes_the_page() -> None:
     after = page(results)
     assert "| 15 | 12.3 |" in after and "| 15 | 12.3 |" not in before
     assert re.search(r"succeed \| yes \| 0 of \d+ \|", after)
+
+
+def test_the_page_claims_no_success_and_links_no_picture_that_is_not_there() -> None:
+    results = json.loads((ROOT / "docs" / "paper.json").read_text())
+    for task in results["tasks"].values():
+        task["successes"] = 0
+    results["figures"]["step"] |= {"drawn": False, "reason": "no OpenGL without a screen"}
+    assert "does not work reliably in closed loop yet" in page(results)
+    assert "*Not drawn: no OpenGL" in page(results) and "(paper_step.png)" not in page(results)
+    told = json.loads((ROOT / "docs" / "paper.json").read_text())
+    assert "does not work reliably in closed loop yet" not in page(told)
+    assert "*Not drawn" not in page(told) and "(paper_step.png)" in page(told)

@@ -9,7 +9,7 @@ import aloft
 GRAPHS = Path(__file__).parents[2] / "graphs"
 
 
-@pytest.mark.parametrize("name", ["jump", "push"])
+@pytest.mark.parametrize("name", ["jump", pytest.param("push", marks=pytest.mark.long)])
 def test_bytes_do_not_depend_on_the_compiler(name):
     graph = aloft.load(GRAPHS / f"{name}.yaml")
     compiled = graph.run(0.1, log=False)

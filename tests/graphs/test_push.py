@@ -18,7 +18,10 @@ def test_the_graph_has_no_problems():
     assert check(PUSH.with_name("push_12cm.yaml")).ok
 
 
-@pytest.mark.parametrize("angle", [0.0, np.pi, np.pi / 2.0])
+@pytest.mark.parametrize(
+    "angle",
+    [0.0, *(pytest.param(angle, marks=pytest.mark.long) for angle in (np.pi, np.pi / 2.0))],
+)
 def test_a_push_in_the_air_is_landed(angle):
     """Straight back nine of ten land (studies/tasks.yaml), so one of three may fail."""
     failures = []

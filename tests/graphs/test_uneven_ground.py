@@ -12,6 +12,8 @@ import aloft
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 LEFT_FOOT_HIGHER = {"x": [0.1, 1], "y": [0, 0.75], "top": "2 cm"}
 HEELS_HIGHER = {"x": [0.1, 0.2], "top": "1 cm"}
+EDGE = {"x": [0.2, 1], "top": "1 cm"}
+"""Its edge is under the middle of the soles."""
 
 
 def land(folder: Path, box: dict[str, object], **sets: object) -> aloft.RunResult:
@@ -47,6 +49,15 @@ def test_soles_across_an_edge_stand_by_their_load(tmp_path: Path) -> None:
     contacts = result.signal("load.contacts.active")[-500:]
     assert contacts.all(), "all points count"
     assert not switches.all(), "though not all have contact"
+
+
+@pytest.mark.long
+def test_soles_that_tip_over_an_edge_stand_where_they_come_to_rest(tmp_path: Path) -> None:
+    result = land(tmp_path, EDGE)
+    assert result.success, result.reason
+    assert result.metrics["steps"] == 0
+    without = land(tmp_path, EDGE, **{"load.flat_height": 0.0})
+    assert not without.success
 
 
 @pytest.mark.long

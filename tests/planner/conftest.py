@@ -16,11 +16,11 @@ from aloft.robots.pinocchio_model import build_pinocchio_model
 
 RISE = 0.085
 """m"""
-EVERY = 5
-"""Knots every so many rows of the table, 10 ms."""
+EVERY = 10
+"""Knots every so many rows of the table, 20 ms."""
 
 
-def squat_jump_plan() -> PlannedJump:
+def squat_jump_plan(every: int = EVERY) -> PlannedJump:
     """The squat jump as a plan. Its feet hit the ground with the speed of the fall."""
     robot = find_robot("bruce")
     dynamics = ExactDynamics(robot)
@@ -30,7 +30,7 @@ def squat_jump_plan() -> PlannedJump:
     ends = [0, *[k + 1 for k in breaks], len(table.time)]
     rows = []
     for first, last in pairwise(ends):
-        rows += [*range(first, last - 1, EVERY), last - 1]
+        rows += [*range(first, last - 1, every), last - 1]
     # The phases meet in two rows of one instant; only at touchdown do they differ.
     keep = [
         k
@@ -114,3 +114,9 @@ def with_forces(plan: PlannedJump, dynamics: ExactDynamics) -> PlannedJump:
 @pytest.fixture(scope="session")
 def by_hand() -> PlannedJump:
     return squat_jump_plan()
+
+
+@pytest.fixture(scope="session")
+def by_hand_finely() -> PlannedJump:
+    """The same with knots every 10 ms."""
+    return squat_jump_plan(5)

@@ -11,7 +11,16 @@ import pytest
 
 from aloft.benchmarks.jumps import real_robot
 from aloft.benchmarks.jumps.real_robot import RobotJob, graph_of, jumps_of
-from aloft.benchmarks.jumps.real_tasks import ASKED, EFFORT, EVERY, PUSH, RANDOM, TEN, asked_of
+from aloft.benchmarks.jumps.real_tasks import (
+    ASKED,
+    EFFORT,
+    EVERY,
+    PUSH,
+    RANDOM,
+    SEEN,
+    TEN,
+    asked_of,
+)
 from aloft.planner.library.learnt import read_learnt
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.batch.jobs import JobResult
@@ -45,6 +54,18 @@ def test_each_robot_has_a_random_task_and_a_push_of_its_own_and_a_margin() -> No
     graph = graph_of(97000, "nothing", first[TEN], first[TEN].task, 1)
     assert graph.checked.block("plan").params.task["effort"] == EFFORT
     assert graph.checked.block("score").params.jumps == 10
+    wires = graph.checked.block("ahead").wires
+    assert wires["measured_base"].source == "estimator.base"
+
+
+def test_a_row_whose_place_is_measured_is_that_row_with_a_sensor() -> None:
+    asked = asked_of(97000)
+    assert asked[SEEN].task == asked[TEN].task and asked[SEEN].graph == asked[TEN].graph
+    graph = graph_of(97000, "draws", asked[SEEN], asked[SEEN].task, 1)
+    wires = graph.checked.block("ahead").wires
+    assert wires["measured_base"].source == "place.base"
+    assert wires["measured_joints"].source == "timing.joints", "late sensors are as without it"
+    assert graph.checked.block("capture").block_type.__name__ == "MotionCapture"
 
 
 def test_smaller_jumps_come_first_and_later_only_half_as_far() -> None:

@@ -92,17 +92,22 @@ class Landed:
             terms_of(self.robot),
         )
 
-    def contacts(self, active, heights, loaded, phase=Phase.LANDING):
+    def contacts(
+        self, active, heights, loaded, phase=Phase.LANDING, closed=None, speed=0.2, ticks=60
+    ):
+        """The contacts after ``ticks`` in which the points rise with ``speed``."""
         terms, forces = {name: array.copy() for name, array in self.terms.items()}, np.zeros((4, 3))
         forces[:2, 2] = 15.0 * loaded
         jacobian = terms["contact_jacobian"].reshape(12, -1)
         torque = terms["nonlinear_effects"][6:] - jacobian[:, 6:].T @ forces.ravel()
         terms["contact_position"][:, 2] = heights
+        terms["contact_velocity"][:, 2] = speed
         self.bench.set("terms", **terms)
         self.bench.set("joints", torque=torque)
         self.bench.set("switches", active=active)
+        self.bench.set("closed", closed=active if closed is None else closed)
         self.bench.set("phase", phase=phase)
-        for _ in range(60):
+        for _ in range(ticks):
             self.bench.step()
         return self.bench.get("contacts").active.tolist()
 
@@ -138,3 +143,26 @@ def test_a_foot_that_was_in_the_air_forgets_where_it_stood():
     foot.contacts(HEEL, [0.0, 0.0, 0.0, 0.0], True)
     foot.contacts(NONE, [0.03, 0.03, 0.0, 0.0], False)
     assert foot.contacts(HEEL, [0.025, 0.02, 0.0, 0.0], True) == [True, True, False, False]
+
+
+def test_a_contact_that_is_only_held_ends_where_its_point_has_risen():
+    foot, both, up = Landed(flat_height=0.006), [True, True, False, False], [0.017, 0.0, 0.0, 0.0]
+    assert foot.contacts(both, [0.01, 0.01, 0.0, 0.0], True) == both
+    assert foot.contacts(both, up, True, closed=HEEL) == HEEL
+    assert foot.contacts(both, [0.015, 0.0, 0.0, 0.0], True, closed=HEEL) == both, "5 mm up"
+    assert foot.contacts(both, up, True) == both, "its switch is closed"
+
+
+def test_a_point_that_rests_while_its_foot_is_loaded_stands_until_it_rises():
+    """A sole on its heel and across an edge: the toe is up, and nothing but the edge can hold it."""
+    foot, both, up = Landed(flat_height=0.006), [True, True, False, False], [0.013, 0.0, 0.0, 0.0]
+    assert foot.contacts(HEEL, up, True) == HEEL, "it moves"
+    assert foot.contacts(HEEL, up, True, speed=0.04, ticks=4) == HEEL, "8 ms of rest"
+    assert foot.contacts(HEEL, up, True, speed=0.04, ticks=1) == both
+    assert foot.contacts(HEEL, [0.018, 0.0, 0.0, 0.0], True) == both, "5 mm above where it rested"
+    assert foot.contacts(HEEL, [0.0, 0.0, 0.0, 0.0], True, speed=-1.0) == both, (
+        "it goes down under load"
+    )
+    assert foot.contacts(HEEL, [0.02, 0.0, 0.0, 0.0], True) == HEEL
+    unloaded = Landed(flat_height=0.006)
+    assert unloaded.contacts(HEEL, up, False, speed=0.0) == HEEL, "a foot in the air may be still"

@@ -171,7 +171,7 @@ def test_a_plan_that_fails_is_not_handed_over(by_hand: PlannedJump) -> None:
         require_valid(forged, ROBOT)
     message = str(caught.value)
     assert "the plan 'by_hand' is not valid" in message
-    assert "pull: how hard a foot pulls at the ground is 2" in message
+    assert "pull: how hard a foot pulls at the ground is 18" in message
     assert "at most 0.001 N is allowed" in message
 
 

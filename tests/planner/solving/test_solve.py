@@ -95,7 +95,7 @@ def test_a_near_plan_saves_iterations() -> None:
     ("neighbour", "change"),
     [
         ("forward_20cm", {"rise": 0.085, "distance_x": 0.215}),
-        ("turn_60deg", {"rise": 0.095, "twist": 1.1}),
+        pytest.param("turn_60deg", {"rise": 0.095, "twist": 1.1}, marks=pytest.mark.long),
     ],
 )
 def test_a_start_from_a_neighbour_takes_fewer_iterations_to_a_plan_as_good(

@@ -1,0 +1,25 @@
+"""Questions to a graph: its linear model and margins, another course of a run, and why a run failed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .linearisation import Linearisation, linearise
+    from .loop_margins import Margins, margins
+
+_HOMES = {
+    "Linearisation": "linearisation",
+    "linearise": "linearisation",
+    "Margins": "loop_margins",
+    "margins": "loop_margins",
+}
+
+__all__ = ["Linearisation", "Margins", "linearise", "margins"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOMES[name]}", __name__), name)
