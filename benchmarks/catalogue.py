@@ -71,6 +71,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "tsid": ("tick",),
     "since": ("tick",),
     "arms": ("real_robot",),
+    "robot": ("real_robot",),
     "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
 }

@@ -94,6 +94,9 @@ def bench(
             help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'; the effects of 'known_effects'."
         ),
     ] = "",
+    robot: Annotated[
+        str, typer.Option(help="Which robot of 'real_robot': go2, g1, solo12; by default bruce.")
+    ] = "",
     harder: Annotated[
         bool,
         typer.Option("--harder", help="Draw the tasks of 'jumps' as far as jumps land at all."),
@@ -121,6 +124,7 @@ def bench(
             "since": since or None,
             "arms": _names(arms),
             "asked": _names(asked),
+            "robot": robot or None,
             "harder": harder or None,
         }
         given = {option: value for option, value in options.items() if value is not None}

@@ -123,7 +123,8 @@ def errors_of(found: Calibration, graph: Graph) -> dict[str, Errors]:
         return _errors([value], drawn, scale)
 
     def friction(name: str, known: Array) -> Array:
-        return known + np.array([true[name][joint.name] for joint in robot.joints])
+        beyond: Array = np.array([true[name][joint.name] for joint in robot.joints])
+        return known + beyond
 
     constants = np.array([*true["robot.motor_model.torque_constant"].values()])
     rotors = float(np.mean([*true["dynamics.rotor_inertia"].values()]))

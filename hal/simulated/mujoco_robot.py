@@ -99,7 +99,8 @@ class MujocoRobot(SimulatedRobot):
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
                 "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
             },
-            "battery": {"resistance": 0.03}, "windings": {"temperature": 60.0},
+            "battery": {"resistance": 0.03},
+            "windings": {"temperature": 60.0, "heat_capacity": 15.0, "thermal_resistance": 5.0},
             "links": {
                 "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
             },
