@@ -6,17 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .branching import branch
     from .linearisation import Linearisation, linearise
     from .loop_margins import Margins, margins
 
 _HOMES = {
+    "branch": "branching",
     "Linearisation": "linearisation",
     "linearise": "linearisation",
     "Margins": "loop_margins",
     "margins": "loop_margins",
 }
 
-__all__ = ["Linearisation", "Margins", "linearise", "margins"]
+__all__ = ["Linearisation", "Margins", "branch", "linearise", "margins"]
 
 
 def __getattr__(name: str) -> Any:
