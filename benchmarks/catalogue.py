@@ -15,7 +15,7 @@ import numpy as np
 
 from .agreement import agreement
 from .background import background
-from .courses import courses
+from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .frontier import frontier
@@ -32,6 +32,7 @@ from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
+from .stones import stones
 from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
@@ -53,19 +54,29 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "identification": identification,
     "frontier": frontier,
     "courses": courses,
+    "pushed_courses": pushed_courses,
+    "stones": stones,
     "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
-    "every_robot",
+    "pushed_courses", "stones", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
-    "seeds": ("frontier", "link_delays", "real_robot", "known_effects", "courses"),
+    "seeds": (
+        "frontier",
+        "link_delays",
+        "real_robot",
+        "known_effects",
+        "courses",
+        "pushed_courses",
+        "stones",
+    ),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick",),
