@@ -1,5 +1,6 @@
 """Margins of loops against closed forms."""
 
+from pathlib import Path
 from textwrap import dedent, indent
 
 import numpy as np
@@ -85,3 +86,28 @@ def test_margins_need_a_loop() -> None:
         aloft.AloftError, match="margins are those of a loop that is opened at a wire"
     ):
         margins(model)
+
+
+STANDING = {
+    "plan.stand_time": 10.0, "push.force": 0.0, "delay.nominal": "2 ms", "delay.follow": "nominal",
+    "robot.jitter": 0.0, "robot.joint_velocity_noise": 0.0, "robot.switch_bounce": 0.0,
+    "robot.gyro_noise": 0.0, "robot.gyro_bias": 0.0, "robot.accelerometer_noise": 0.0,
+    "robot.accelerometer_bias": 0.0,
+}  # fmt: skip
+
+
+@pytest.mark.long
+def test_the_standing_robot_sways_beyond_its_delay_margin() -> None:
+    graph = aloft.load(Path(__file__).parents[2] / "graphs" / "push.yaml", STANDING)
+    torque = "joint_pd.command.torque[*]"
+    found = margins(linearise(graph, inputs=torque, outputs=torque, at=1.5, opened=True))
+    assert found.growth < 0.01  # blocks that learn, but no fall
+    limit = 0.002 + found.together.delay
+
+    def late_rate(latency: float) -> float:
+        result = graph.changed({**STANDING, "robot.latency": latency}).run(3.0)
+        rate = np.asarray(result.signal("robot.truth.base_angular_velocity"))
+        return float(np.sqrt((rate[-200:] ** 2).mean()))
+
+    assert late_rate(0.85 * limit) < 1e-3
+    assert late_rate(1.15 * limit) > 1e-2
