@@ -20,6 +20,7 @@ from .driver import driver
 from .every_robot import every_robot
 from .frontier import frontier
 from .general_blocks import general_blocks
+from .jumps.identification import identification
 from .jumps.jumps import jumps
 from .jumps.known_effects import known_effects
 from .jumps.real_robot import real_robot
@@ -50,6 +51,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "jumps": jumps,
     "real_robot": real_robot,
     "known_effects": known_effects,
+    "identification": identification,
     "frontier": frontier,
     "courses": courses,
     "pushed_courses": pushed_courses,
@@ -58,7 +60,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
-    "agreement", "jumps", "real_robot", "known_effects", "frontier", "link_delays", "courses",
+    "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "pushed_courses", "stones", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""

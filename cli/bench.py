@@ -69,7 +69,7 @@ def bench(
     seeds: Annotated[
         str,
         typer.Option(
-            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects' and 'courses'."
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects', 'identification' and 'courses'."
         ),
     ] = "",
     jitter: Annotated[
