@@ -200,8 +200,9 @@ class Structure:
         self.given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
         fixed = tuple(i for i, _, _ in self.given[end])
         last = Knot(2 * n, 0, fixed=fixed)
-        if knees_fold:  # where the base is given, knees can still fold
-            last.pieces["obstacle"] = (np.arange(n), self._obstacle_rows(end))
+        obstacle = self._obstacle_rows(end)
+        if knees_fold and len(obstacle):  # where the base is given, knees can still fold
+            last.pieces["obstacle"] = (np.arange(n), obstacle)
         return [*knots, last]
 
     def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:

@@ -9,6 +9,8 @@ from PIL import Image
 from aloft import load
 from aloft.logs.file.reader import read
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.viewing.contacts import force_scale
+from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.figures.film import Camera, Take, instants
 from aloft.studies.figures.offscreen import NoRendererError, Offscreen
@@ -88,7 +90,8 @@ def test_what_is_shown_at_a_time(pushed: Path) -> None:
     assert take.row(0.0) == 0 and take.row(0.1011) == 50 and take.row(9.0) == len(take.time) - 1
     assert take.text(50) == "p  0.10 s  stand"
     weight = sum(force[2] for _, force in ((a, (b - a)) for a, b in take.arrows(200)))
-    assert weight == pytest.approx(0.5 * float(take.base[0, 2]), rel=0.1), (
+    robot = find_robot("bruce")
+    assert weight == pytest.approx(force_scale(robot) * robot.weight, rel=0.1), (
         "the arrows of a robot that stands"
     )
     np.testing.assert_allclose(instants([take], 0.1, 0.2, 0.05), [0.1, 0.15, 0.2])
