@@ -15,11 +15,12 @@ import numpy as np
 
 from .agreement import agreement
 from .background import background
-from .courses import courses
+from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .frontier import frontier
 from .general_blocks import general_blocks
+from .jumps.identification import identification
 from .jumps.jumps import jumps
 from .jumps.known_effects import known_effects
 from .jumps.real_robot import real_robot
@@ -31,6 +32,7 @@ from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
+from .stones import stones
 from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
@@ -49,25 +51,38 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "jumps": jumps,
     "real_robot": real_robot,
     "known_effects": known_effects,
+    "identification": identification,
     "frontier": frontier,
     "courses": courses,
+    "pushed_courses": pushed_courses,
+    "stones": stones,
     "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
-    "agreement", "jumps", "real_robot", "known_effects", "frontier", "link_delays", "courses", "every_robot",
+    "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
+    "pushed_courses", "stones", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background"),
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
-    "seeds": ("frontier", "link_delays", "real_robot", "known_effects", "courses"),
+    "seeds": (
+        "frontier",
+        "link_delays",
+        "real_robot",
+        "known_effects",
+        "courses",
+        "pushed_courses",
+        "stones",
+    ),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick",),
     "since": ("tick",),
     "arms": ("real_robot",),
+    "robot": ("real_robot",),
     "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
 }

@@ -19,6 +19,11 @@ from .rows import Row
 
 SEEDS = range(31700, 31720)
 """Of courses and robots; nothing is tuned on them."""
+PUSHED_SEEDS = range(31900, 31920)
+"""Of courses with a push, the same."""
+PUSH = 0.4
+"""N s on the torso's centre of mass, 0.03 s after a lift-off"""
+SENSOR = "controllers/motion_capture.yaml"
 JUMPS = 10
 DIRECTIONS = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)
 """Ahead, back, to the left and to the right."""
@@ -75,21 +80,50 @@ def courses(seeds: Sequence[int] = SEEDS) -> list[Row]:
     ]  # fmt: skip
 
 
+def pushed_courses(seeds: Sequence[int] = PUSHED_SEEDS) -> list[Row]:
+    """Rows of such courses with a push of 0.4 N s, in a drawn direction in a drawn flight."""
+    found = [run_pushed(seed) for seed in seeds]
+    n, fallen = len(found), [one for one in found if fell(one)]
+    low, high = wilson_interval(len(fallen), n)
+    note = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    return [
+        Row("pushed courses with a fall", len(fallen) / n, "", goal=0.1,
+            note=f"{n} courses, 95 % interval {low:.2f} to {high:.2f}; {PUSH:g} N s in a flight of each"),
+        Row("pushed courses that are no success", sum(not o["success"] for o in found) / n, "", note=note),
+    ]  # fmt: skip
+
+
+def run_pushed(seed: int) -> dict[str, Any]:
+    """The metrics of a course with a push."""
+    rng = np.random.default_rng([seed, 1])
+    flight, angle = int(rng.integers(1, JUMPS + 1)), float(rng.uniform(0.0, 2.0 * math.pi))
+    push = {"push.force": PUSH / 0.01, "push.flight": flight, "push.angle": round(angle, 4)}
+    return run_course(seed, push, (SENSOR, "trials/pushed.yaml"))
+
+
 def fell(metrics: Mapping[str, Any]) -> bool:
     """Whether a course ended with a fall."""
     return str(metrics["reason"]).startswith("fell")
 
 
-def run_course(seed: int) -> dict[str, Any]:
-    """The metrics of a course, with its ``seed``."""
-    graphs = shipped_folder()
-    sets: dict[str, Any] = {
-        "commands.commands": course(seed), "robot.seed": seed, "capture.seed": seed,
-        "duration": LONGEST,
-    }  # fmt: skip
-    graph = load_cell(
-        graphs / "steer.yaml", [graphs / "trials/robust.yaml"], sets, graphs / "bench.yaml",
-        [graphs / "controllers/motion_capture.yaml"],
+def run_course(
+    seed: int, more: Mapping[str, Any] | None = None, behind: Sequence[str] = (SENSOR,)
+) -> dict[str, Any]:
+    """The metrics of a course, with its ``seed``; ``more`` overrides what the graph says, and the files
+    ``behind`` are included behind it."""
+    return run_seed(
+        seed, "steer.yaml", behind, {"commands.commands": course(seed), "duration": LONGEST, **(more or {})},
     )  # fmt: skip
-    result = graph.run()
-    return {"seed": seed, "success": result.success, "reason": result.reason, **result.metrics}
+
+
+def run_seed(
+    seed: int, graph: str, behind: Sequence[str], sets: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The metrics of a run of a graph that steers, with its ``seed``, in the robust trial."""
+    graphs = shipped_folder()
+    found = load_cell(
+        graphs / graph, [graphs / "trials/robust.yaml"],
+        {"robot.seed": seed, "capture.seed": seed, **sets}, graphs / "bench.yaml",
+        [graphs / name for name in behind],
+    ).run()  # fmt: skip
+    return {"seed": seed, "success": found.success, "reason": found.reason, **found.metrics}

@@ -69,7 +69,7 @@ def bench(
     seeds: Annotated[
         str,
         typer.Option(
-            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects' and 'courses'."
+            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects', 'identification' and 'courses'."
         ),
     ] = "",
     jitter: Annotated[
@@ -93,6 +93,9 @@ def bench(
         typer.Option(
             help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'; the effects of 'known_effects'."
         ),
+    ] = "",
+    robot: Annotated[
+        str, typer.Option(help="Which robot of 'real_robot': go2, g1, solo12; by default bruce.")
     ] = "",
     harder: Annotated[
         bool,
@@ -121,6 +124,7 @@ def bench(
             "since": since or None,
             "arms": _names(arms),
             "asked": _names(asked),
+            "robot": robot or None,
             "harder": harder or None,
         }
         given = {option: value for option, value in options.items() if value is not None}

@@ -47,7 +47,7 @@ from result_tables import (
 
 from aloft.benchmarks.tick.chart import tick_chart
 from aloft.planner.task.margins import Margins
-from aloft.planner.task.sequence import Hop, PhaseSpec, RoughGround
+from aloft.planner.task.sequence import Hop, KnownStairs, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
 from aloft.robots.description import find_robot
 from aloft.robots.importing.urdf_text import find_file
@@ -194,6 +194,7 @@ def task_parameter_tables() -> str:
         ("One of `jumps`", Hop),
         ("One of `phases`", PhaseSpec),
         ("`rough`", RoughGround),
+        ("`stairs`", KnownStairs),
         ("`knots`", Knots),
         ("`weights`", Weights),
         ("`margins`", Margins),
@@ -281,6 +282,11 @@ def write_uneven(*files: Path) -> None:
     refresh(DOCS / "ground.md", "uneven", ground_table(_runs_of(files), "task"))
 
 
+def write_slopes(*files: Path) -> None:
+    """Landings on slopes, untold and told."""
+    refresh(DOCS / "ground.md", "slopes", ground_table(_runs_of(files), "ground"))
+
+
 def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
     """All runs of studies, of which ``files`` are the summaries."""
     from pyarrow import parquet
@@ -344,6 +350,7 @@ PAGES = {
     "robots_results": Page(
         write_robots_results, f"{STUDIES}robots.yaml", "results/robots/summary.json"
     ),
+    "slopes": Page(write_slopes, f"{STUDIES}slopes.yaml", "results/slopes/summary.json"),
     "task_parameters": Page(write_task_parameters),
     "tasks": Page(write_tasks, f"{STUDIES}tasks.yaml", "results/tasks/summary.json"),
     "tick": Page(write_tick, "aloft bench tick --tsid FOLDER --since COMMIT --json > FILE", "FILE"),

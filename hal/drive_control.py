@@ -189,11 +189,19 @@ def _some(gains: MotorGains, limit: int = 4) -> str:
 class CommandTargets(Signal):
     """What some commands say of the joints, a row for each command."""
 
-    torque = Field(("n_queue", "n_joints"), unit="N m", text="feedforward joint torques")
-    position = Field(("n_queue", "n_joints"), unit="rad", text="joint angle targets")
-    velocity = Field(("n_queue", "n_joints"), unit="rad/s", text="joint velocity targets")
-    stiffness = Field(("n_queue", "n_joints"), unit="N m/rad", text="gains on position")
-    damping = Field(("n_queue", "n_joints"), unit="N m s/rad", text="gains on velocity")
+    torque = Field(
+        ("n_queue", "n_joints"), unit="N m", text="feedforward joint torques", ring="active"
+    )
+    position = Field(("n_queue", "n_joints"), unit="rad", text="joint angle targets", ring="active")
+    velocity = Field(
+        ("n_queue", "n_joints"), unit="rad/s", text="joint velocity targets", ring="active"
+    )
+    stiffness = Field(
+        ("n_queue", "n_joints"), unit="N m/rad", text="gains on position", ring="active"
+    )
+    damping = Field(
+        ("n_queue", "n_joints"), unit="N m s/rad", text="gains on velocity", ring="active"
+    )
 
 
 class MotorGoals(Signal):

@@ -49,12 +49,13 @@ def assemble_normal(
 
 @kernel
 def factorise_band(equations: int, regularisation: float, band: Array2D, last: Indices1D) -> bool:
-    """The Cholesky factor, in place. To its diagonal the matrix gets that share of it.
+    """The Cholesky factor, in place. To its diagonal the matrix gets that share of it. An equation without
+    a variable that may change, whose diagonal is zero, holds nothing.
 
     Returns whether all pivots are positive.
     """
     for j in range(equations):
-        band[j, 0] *= 1.0 + regularisation
+        band[j, 0] = band[j, 0] * (1.0 + regularisation) if band[j, 0] > 0.0 else 1.0
     for j in range(equations):
         pivot = band[j, 0]
         if not 0.0 < pivot < math.inf:

@@ -100,20 +100,25 @@ def calibration_of(
     robot: RobotDescription, sensors: IdentifiedSensors, motors: IdentifiedMotors,
     pack: IdentifiedPack | None, delay: Estimate | None,
 ) -> Calibration:  # fmt: skip
-    """What was found, as one model."""
+    """What was found, as one model. Joints that are held do not move and tell nothing: theirs is the description's."""
 
-    def named(values: dict[str, Estimate]) -> dict[str, Value]:
-        return {name: _value(each) for name, each in values.items()}
+    def named(values: dict[str, Estimate], known: Array | None = None) -> dict[str, Value]:
+        found = {name: _value(each) for name, each in values.items()}
+        if known is None:
+            return found
+        told = dict(zip((joint.name for joint in robot.joints), known.tolist(), strict=True))
+        return found | {name: Value(value=told[name], std=told[name]) for name in robot.held}
 
     x, y, z = (_value(each) for each in sensors.imu_position)
     roll, pitch, yaw = (_value(each) for each in sensors.imu_rotation)
     return Calibration(
-        robot=robot.name, friction=named(motors.friction), damping=named(motors.damping),
+        robot=robot.name, friction=named(motors.friction, robot.motors.friction),
+        damping=named(motors.damping, robot.motors.damping),
         torque_constant=named(motors.torque_constant), saturation=_value(motors.saturation),
         load_friction=_value(motors.load_friction), rotor_inertia=_value(motors.rotor_inertia),
         mass=_value(motors.mass), imu_position=(x, y, z), imu_rotation=(roll, pitch, yaw),
         gyro_age=_value(sensors.gyro_age), accelerometer_age=_value(sensors.accelerometer_age),
-        velocity_age=_value(sensors.velocity_age), play=named(sensors.play),
+        velocity_age=_value(sensors.velocity_age), play=named(sensors.play, robot.motors.gear_play),
         gear_compliance=_value(sensors.gear_compliance),
         open_voltage=None if pack is None else _value(pack.open_voltage),
         resistance=None if pack is None else _value(pack.resistance),

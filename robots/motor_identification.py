@@ -355,22 +355,23 @@ def filtered_motion(
 
 
 def identify_pack(
-    robot: RobotDescription, motion: MeasuredRun, voltage: Array, heating: float = 0.2 / 0.35**2,
-    board_power: float = 15.0, recovery_time: float = 10.0,
-) -> IdentifiedPack | None:  # fmt: skip
-    """Fit the pack to the voltage that the drives report; None where they report none.
+    robot: RobotDescription, motion: MeasuredRun, voltage: Array, recovery_time: float = 10.0
+) -> IdentifiedPack | None:
+    """Fit the pack to the voltage that the drives report; None where they report none, or the description says
+    nothing of what feeds the motors.
 
     Args:
         voltage: at the drives (n,) [V].
-        heating: power for each square of a motor's torque [W/(N m)^2].
-        board_power: of everything but the motors [W].
         recovery_time: in which a part of the voltage comes back after a load [s].
     """
-    if float(voltage.max()) < 1.0 or float(np.ptp(voltage)) < 1e-3:
+    supply = robot.supply
+    if supply is None or float(voltage.max()) < 1.0 or float(np.ptp(voltage)) < 1e-3:
         return None
     motors = motion.torque @ robot.torque_to_motor.T
     speeds = motion.velocity @ robot.joint_to_motor.T
-    power = board_power + (motors * speeds).sum(axis=1) + heating * (motors**2).sum(axis=1)
+    power = supply.board_power + (motors * (speeds + supply.heating(robot.motors) * motors)).sum(
+        axis=1
+    )
     current = power / np.maximum(voltage, 1.0)
     period, slow = motion.period, np.zeros(len(current))
     for k in range(1, len(current)):

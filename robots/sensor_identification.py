@@ -25,6 +25,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from .identification import Estimate, IdentificationError, MeasuredRun
+from .kinematics import ball_feet
 from .pinocchio_model import build_pinocchio_model
 from .robot_description import RobotDescription
 from .transmission import PLAY_TIME, PLAY_TORQUE
@@ -279,26 +280,50 @@ def base_motion(robot: RobotDescription, position: Array, *velocities: Array) ->
 
 def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, Array]:
     """Jacobians of all contact points, (n, 3 n_contacts, n_velocities), and their places in the base's frame,
-    (n, n_contacts, 3), for the joints' angles (n, n_joints)."""
+    (n, n_contacts, 3), for the joints' angles (n, n_joints).
+
+    A ball touches the ground below its centre and rolls. Where is below is told by three balls or more; with fewer
+    the base is taken for level.
+    """
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
     model: Any = built.model
     data: Any = model.createData()
-    frames, count = built.contact_frames, 3 * len(built.contact_frames)
     q, world = np.zeros(model.nq), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    jacobians = np.empty((len(position), count, model.nv))
-    places = np.empty((len(position), len(frames), 3))
+    count = len(built.contact_frames)
+    jacobians = np.empty((len(position), count, 6, model.nv))
+    places = np.empty((len(position), count, 3))
+    turned = np.empty((len(position), count, 3, 3))
     q[6] = 1.0
     for k, angles in enumerate(position):
         q[7:] = angles
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        for row, frame in enumerate(frames):
-            jacobian = pin.getFrameJacobian(model, data, frame, world)
-            jacobians[k, 3 * row : 3 * row + 3] = jacobian[:3]
-            places[k, row] = data.oMf[frame].translation
-    return jacobians, places
+        for point, frame in enumerate(built.contact_frames):
+            jacobians[k, point] = pin.getFrameJacobian(model, data, frame, world)
+            places[k, point] = data.oMf[frame].translation
+            turned[k, point] = data.oMf[frame].rotation
+    moving = jacobians[:, :, :3]
+    if balls := ball_feet(robot):
+        at = [ball.point for ball in balls]
+        radius = np.array([ball.radius for ball in balls])
+        to_centre = np.array([ball.centre - robot.contacts[ball.point].position for ball in balls])
+        centres = places[:, at] + (turned[:, at] @ to_centre[..., None])[..., 0]
+        lowest = centres - radius[:, None] * _up(centres)[:, None]
+        lever = lowest - places[:, at]
+        moving[:, at] -= _cross(lever) @ jacobians[:, at, 3:]
+        places[:, at] = lowest
+    return moving.reshape(len(position), 3 * count, -1), places
+
+
+def _up(centres: Array) -> Array:
+    """The vertical by the plane through the centres (n, balls, 3), (n, 3)."""
+    if centres.shape[1] < 3:
+        return np.tile([0.0, 0.0, 1.0], (len(centres), 1))
+    apart = centres - centres.mean(axis=1, keepdims=True)
+    normal = np.linalg.eigh(apart.transpose(0, 2, 1) @ apart)[1][:, :, 0]
+    return np.asarray(normal * np.sign(normal[:, 2:]))
 
 
 def _gyroscope(

@@ -64,7 +64,7 @@ fi
 # where the environment forbids to write bytecode, every process of the tests would compile all sources
 "$folder/bin/python" -m compileall -q -x '/(\.venv|build|tests)/' .
 echo "all tests run on Python $ours of .venv; these run on $("$folder/bin/python" --version), the $which packages:"
-PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTEST_XDIST_AUTO_NUM_WORKERS=$(nproc) \
+PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTEST_XDIST_AUTO_NUM_WORKERS=$(getconf _NPROCESSORS_ONLN) \
     timeout "$limit" "$folder/bin/python" -m pytest --numprocesses auto --dist worksteal -m "not long" -p no:cacheprovider \
     tests/runtime/language tests/runtime/running tests/runtime/loading/test_check_graph.py \
     tests/runtime/loading/test_graph_file.py tests/runtime/loading/test_schema.py tests/files \

@@ -167,6 +167,7 @@ TERRAIN = Terrain(
 CHAIN_STARTS, CHAIN_ROWS = np.array([0, 1, 3, 5, 6]), np.array([0, 0, 1, 1, 2, 2])
 """The non-zeros of a matrix (3, 4) by columns: each row touches two neighbours."""
 UNUSED = {
+    "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
         np.zeros((3, 2)), np.zeros(3, dtype=np.int64),

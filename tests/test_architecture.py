@@ -16,7 +16,7 @@ from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = (
-    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "clib", "logs", "studies",
+    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "clib", "logs", "studies", "analysis",
     "benchmarks", "cli", "graphs",
 )  # fmt: skip
 ALLOWED: dict[str, tuple[str, ...]] = {
@@ -100,6 +100,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "logs": ("logs/file",),
     "studies": ("processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
+    "analysis": ("mathematics", "runtime", "logs", "plotting"),
     "benchmarks": (
         "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
     ),
@@ -120,6 +121,7 @@ HEAVY = {
     "PIL",
     "zenoh",
     "matplotlib",
+    "control",
 }
 LONGEST = 600
 NESTING = (ast.stmt, ast.excepthandler, ast.match_case)

@@ -160,6 +160,8 @@ def steer_alone():
     score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
     for tick in range(400):
         plan.step()
+        if tick == 100:  # it has jumped, and learns where it landed
+            plan.set("command", number=2, placed=True, ahead=0.3)
         score.set("goal", number=int(tick >= 10))
         score.set("truth", contact_touched=np.full(4, not 20 <= tick < 80))
         score.step()

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -33,7 +33,7 @@ from ...studies.oracle import CALIBRATED, oracle_values
 from ...studies.robot_calibration import calibrated_fragment
 from ...studies.summary import wilson_interval
 from ..rows import Row
-from .real_tasks import ALONE, EFFORT, EVERY, AskedJump, asked_of
+from .real_tasks import ASKED_OF_OTHERS, EFFORT, EVERY, AskedJump, asked_of
 
 SEEDS = range(97500, 97520)
 """The robots; nothing is tuned on them."""
@@ -60,6 +60,7 @@ class RobotJob:
     seed: int
     arms: tuple[str, ...] = tuple(ARMS)
     asked: tuple[str, ...] = EVERY
+    robot: str = "bruce"
 
 
 Jumps = dict[str, list[dict[str, Any]]]
@@ -67,20 +68,25 @@ Jumps = dict[str, list[dict[str, Any]]]
 
 
 def real_robot(
-    seeds: Sequence[int] = SEEDS, arms: Sequence[str] = (), asked: Sequence[str] = (), workers: int = 0
+    seeds: Sequence[int] = SEEDS, arms: Sequence[str] = (), asked: Sequence[str] = (), workers: int = 0,
+    robot: str = "bruce",
 ) -> list[Row]:  # fmt: skip
     """Rows: for each jump and arm the share of robots that do not land the last time.
 
     Args:
         seeds: of the robots.
-        arms, asked: some of ``ARMS`` and of ``EVERY``; none: all.
+        arms, asked: some of ``ARMS`` and of the robot's jumps (``real_tasks``); none: all.
         workers: processes; 0: as many as there are processors.
+        robot: BRUCE, or one of ``ASKED_OF_OTHERS``.
 
     Raises:
-        AloftError: there is no such arm or jump.
+        AloftError: there is no such arm, jump or robot.
     """
-    job = RobotJob(0, chosen("arm", arms, tuple(ARMS)), chosen("jump", asked, EVERY))
-    jobs = [RobotJob(seed, job.arms, job.asked) for seed in seeds]
+    (robot,) = chosen("robot", (robot,), ("bruce", *ASKED_OF_OTHERS))
+    there = tuple(asked_of(0, robot))
+    job = RobotJob(0, chosen("arm", arms, tuple(ARMS)), chosen("jump", asked, there), robot)
+    jobs = [replace(job, seed=seed) for seed in seeds]
+    file = FOLDER / ("results.json" if robot == "bruce" else f"results_{robot}.json")
     robots: list[dict[str, Any]] = []
     FOLDER.mkdir(parents=True, exist_ok=True)
     with closing(job_results(jumps_of, jobs, workers=workers)) as results:
@@ -88,11 +94,11 @@ def real_robot(
             if result.error:
                 raise RuntimeError(result.error)
             robots.append({"seed": jobs[result.index].seed, "arms": result.value})
-            robots.sort(key=lambda robot: robot["seed"])
+            robots.sort(key=lambda each: each["seed"])
             text = json.dumps({"effort": EFFORT, "robots": robots}, indent=1)
-            (FOLDER / "results.json").write_text(text + "\n", encoding="utf-8")
+            file.write_text(text + "\n", encoding="utf-8")
     return [
-        _row(f"{name}, {arm}", [robot["arms"][arm][name] for robot in robots])
+        _row(f"{name}, {arm}", [each["arms"][arm][name] for each in robots])
         for name in job.asked
         for arm in job.arms
     ]
@@ -114,9 +120,9 @@ def jumps_of(job: RobotJob) -> dict[str, Jumps]:
 def jumps_in(arm: str, job: RobotJob) -> Jumps:
     """What becomes of the jumps of a robot in one arm."""
     told, learns = ARMS[arm]
-    file = (FOLDER / f"robot_{job.seed}_{tuple(ARMS).index(arm)}.json").absolute()
-    learnt, found, count = LearntJumps("bruce"), Jumps(), 0
-    for name, asked in asked_of(job.seed).items():
+    file = (FOLDER / f"{_owner(job.robot)}_{job.seed}_{tuple(ARMS).index(arm)}.json").absolute()
+    learnt, found, count = LearntJumps(job.robot), Jumps(), 0
+    for name, asked in asked_of(job.seed, job.robot).items():
         if name not in job.asked:
             continue
         tasks: list[Mapping[str, Any]] = [asked.task] * (asked.times if learns else 1)
@@ -134,8 +140,8 @@ def jumps_in(arm: str, job: RobotJob) -> Jumps:
                 found[name].append(
                     {"success": result.success, "reason": result.reason, "tilt": tilt}
                 )
-            if learns and asked.graph == ALONE:
-                plan, mass = planned(task), find_robot("bruce").total_mass
+            if learns and asked.alone:
+                plan, mass = planned(task, job.robot), find_robot(job.robot).total_mass
                 applied = learnt.correction(launch_of(plan.task))
                 lesson = lesson_of(result.signal, plan, mass, applied)
                 learnt = learnt if lesson is None else learnt.with_lesson(lesson)
@@ -150,7 +156,8 @@ def graph_of(
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
     if told == "calibration":
-        include.append(calibrated(graphs / "calibrate.yaml", seed, "robot"))
+        sway = (graphs / asked.graph).parent / "calibrate.yaml"
+        include.append(calibrated(sway, seed, _owner(asked.robot), asked.robot))
     sets: dict[str, Any] = {
         "plan.task": with_margin(task), "robot.seed": seed, "robot.noise_seed": _NOISES * seed + number,
         **asked.sets,
@@ -170,24 +177,30 @@ def with_margin(task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @cache
-def calibrated(graph: Path, seed: int, name: str) -> Path:
+def calibrated(graph: Path, seed: int, name: str, robot: str = "bruce") -> Path:
     """The fragment that a calibration of a robot writes, which sways in a graph. Raises ``AloftError``."""
     folder = FOLDER.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{name}_{seed}.yaml"
-    text = calibrated_fragment(load(graph, [f"robot.seed={seed}"]), graph.name)
+    text = calibrated_fragment(load(graph, [f"robot={robot}", f"robot.seed={seed}"]), graph.name)
     file.write_text(text, encoding="utf-8")
     return file
 
 
-def planned(task: Mapping[str, Any]) -> PlannedJump:
-    """The plan of a task of BRUCE."""
-    return _planned(frozenset(with_margin(task).items()))
+def planned(task: Mapping[str, Any], robot: str) -> PlannedJump:
+    """The plan of a robot's task."""
+    return _planned(frozenset({**with_margin(task), "robot": robot}.items()))
 
 
 @cache
 def _planned(task: frozenset[tuple[str, Any]]) -> PlannedJump:
-    return PlanLibrary(find_robot("bruce"), None).plan(make_task({"name": "jump", **dict(task)}))[0]
+    made = make_task({"name": "jump", **dict(task)})
+    return PlanLibrary(find_robot(made.robot), None).plan(made)[0]
+
+
+def _owner(robot: str) -> str:
+    """How the files of a robot begin."""
+    return "robot" if robot == "bruce" else robot
 
 
 def _row(what: str, robots: Sequence[Sequence[Mapping[str, Any]]]) -> Row:

@@ -16,6 +16,8 @@ EFFORT = 0.75
 real robot: saturation, load friction and friction take 15 % of the peak torque in the trial ``real``."""
 ALONE = "jump.yaml"
 """The graph of one jump."""
+OTHERS = "robots/"
+"""The graphs of robots other than BRUCE."""
 TIMES = 5
 """How often a robot that learns makes a jump of one kind."""
 PUSHES = (0.0, 90.0, 180.0, 270.0)
@@ -27,6 +29,7 @@ class AskedJump:
     """One kind of jump.
 
     Attributes:
+        robot: that makes it.
         graph: the shipped graph that makes it.
         task: changes of that graph's task.
         times: how often it is made by a robot that learns.
@@ -39,11 +42,17 @@ class AskedJump:
     times: int = TIMES
     sets: Mapping[str, Any] = field(default_factory=dict)
     behind: str = ""
+    robot: str = "bruce"
+
+    @property
+    def alone(self) -> bool:
+        """Whether it is one jump without a push, from which a robot learns."""
+        return self.graph == ALONE or self.graph.startswith(OTHERS)
 
     def before(self, first: bool) -> list[dict[str, float]]:
         """The smaller jumps that a robot that learns makes before: all of the ladder at ``first``, then half as far."""
         rungs = ladder(self.task, self.task["rise"])
-        return rungs if first else rungs[-1:] if len(self.task) > 1 and self.graph == ALONE else []
+        return rungs if first else rungs[-1:] if len(self.task) > 1 and self.alone else []
 
 
 ASKED: Mapping[str, AskedJump] = {
@@ -62,8 +71,28 @@ EVERY = (*ASKED, RANDOM, PUSH, TEN, SEEN)
 """All that is asked for, in the order in which a robot does it."""
 
 
-def asked_of(seed: int) -> Mapping[str, AskedJump]:
-    """What the robot of a seed is asked for, by name; the random task and the push are its own."""
+def _others(
+    name: str, in_place: str, ahead: str, rise: float, distance: float
+) -> Mapping[str, AskedJump]:
+    graph = f"{OTHERS}{name}_jump.yaml"
+    return {
+        in_place: AskedJump({"rise": rise}, graph, robot=name),
+        ahead: AskedJump({"rise": rise, "distance_x": distance}, graph, robot=name),
+    }
+
+
+ASKED_OF_OTHERS: Mapping[str, Mapping[str, AskedJump]] = {
+    "go2": _others("go2", "in place 10 cm", "ahead 20 cm", 0.1, 0.2),
+    "g1": _others("g1", "in place 5 cm", "ahead 8 cm", 0.05, 0.08),
+    "solo12": _others("solo12", "in place 10 cm", "ahead 15 cm", 0.1, 0.15),
+}
+"""What robots other than BRUCE are asked for."""
+
+
+def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
+    """What the robot of a seed is asked for, by name; BRUCE's random task and push are its own."""
+    if robot != "bruce":
+        return ASKED_OF_OTHERS[robot]
     angle = math.radians(PUSHES[seed % len(PUSHES)])
     ten: dict[str, Any] = {"rise": 0.06, "repeat": 10}
     return {

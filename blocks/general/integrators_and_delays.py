@@ -140,7 +140,9 @@ class UnitDelay(UnitOfInput, Block):
 class DelayLine(Signal):
     """A delay line."""
 
-    values = Field(("samples", "n"), text="the last inputs, each in the place of its turn")
+    values = Field(
+        ("samples", "n"), text="the last inputs, each in the place of its turn", ring="next"
+    )
     next = Field((), dtype="int64", text="the place of the oldest, which is the next to be written")
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Array2D
+from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Input, Output, State
 from ...runtime.language.context import Clock
@@ -20,16 +20,29 @@ class TimedCommand(Parameters):
     """One command."""
 
     at: float = parameter(0.0, unit="s", ge=0.0, text="not before this time of the run")
-    ahead: float = parameter(0.0, unit="m", ge=-1.0, le=1.0, text="how far ahead it lands")
-    aside: float = parameter(0.0, unit="m", ge=-1.0, le=1.0, text="how far to the left")
+    ahead: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far ahead it lands")
+    aside: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far to the left")
     turn: float = parameter(0.0, unit="rad", ge=-3.2, le=3.2, text="turn to the left")
+    up: float = parameter(
+        0.0, unit="m", ge=-10.0, le=10.0, text="how much higher the ground is there"
+    )
+    placed: bool = parameter(
+        False,
+        text="whether these are x, y, heading and height in the world, where the run began at zero",
+    )
+    replaces: bool = parameter(
+        False, text="whether it takes the place of the one before, if its jump has not begun"
+    )
 
 
 class CommandRows(NamedTuple):
-    """The commands: ``at`` (n,) [s]; ``jumps`` (n, 3), ahead, aside [m] and turn [rad]."""
+    """The commands: ``at`` (n,) [s]; ``jumps`` (n, 4), ahead, aside [m], turn [rad] and up [m]; ``placed`` and
+    ``replaces`` (n,)."""
 
     at: Array1D
     jumps: Array2D
+    placed: Flags1D
+    replaces: Flags1D
 
 
 class CommandsGiven(Signal):
@@ -67,7 +80,9 @@ class CommandSchedule(Block):
         given = self.params.commands
         self.rows = CommandRows(
             np.array([one.at for one in given], dtype=np.float64),
-            np.array([[c.ahead, c.aside, c.turn] for c in given], dtype=np.float64).reshape(-1, 3),
+            np.array([[c.ahead, c.aside, c.turn, c.up] for c in given]).reshape(-1, 4),
+            np.array([c.placed for c in given], dtype=np.bool_),
+            np.array([c.replaces for c in given], dtype=np.bool_),
         )
 
     @kernel
@@ -84,8 +99,10 @@ class CommandSchedule(Block):
         if number < rows.at.shape[0] and taken.command >= number and now >= rows.at[number]:
             memory.given = number + 1
         command.number = memory.given
-        command.ahead, command.aside, command.turn = 0.0, 0.0, 0.0
+        command.placed, command.replaces = False, False
+        command.ahead, command.aside, command.turn, command.up = 0.0, 0.0, 0.0, 0.0
         if memory.given > 0:
-            command.ahead = rows.jumps[memory.given - 1, 0]
-            command.aside = rows.jumps[memory.given - 1, 1]
-            command.turn = rows.jumps[memory.given - 1, 2]
+            last = memory.given - 1
+            command.placed, command.replaces = rows.placed[last], rows.replaces[last]
+            command.ahead, command.aside = rows.jumps[last, 0], rows.jumps[last, 1]
+            command.turn, command.up = rows.jumps[last, 2], rows.jumps[last, 3]

@@ -105,7 +105,7 @@ class GuidedBody:
         self.pinocchio: Any = pinocchio
         self.model = built.model
         self.data = built.model.createData()
-        self.soles = built.sole_frames
+        self.soles, self.contacts = built.sole_frames, built.contact_frames
         self.name, self.mass = robot.name, robot.total_mass
         self._shapes = [foot_shape(robot, foot) for foot in range(len(robot.feet))]
         self._first = np.cumsum([6, *(ROWS_OF_FOOT[kind] for kind, _ in self._shapes)]).tolist()
@@ -144,9 +144,19 @@ class GuidedBody:
         joint = self.data.oMi[self.model.frames[self.soles[foot]].parentJoint]
         return np.asarray(joint.act(ball.centre) - [0.0, 0.0, ball.radius])
 
+    def contact_points(self, q: Array) -> Array:
+        """The places of all contact points (n_contacts, 3) [m]."""
+        self.pinocchio.framesForwardKinematics(self.model, self.data, q)
+        return np.array([self.data.oMf[frame].translation for frame in self.contacts])
+
     def com(self, q: Array) -> Array:
         """The centre of mass (3,)."""
         return np.array(self.pinocchio.centerOfMass(self.model, self.data, q))
+
+    def radii_of_inertia(self, q: Array) -> Array:
+        """The radii of inertia of the whole body about three axes through its centre of mass [m], (3,)."""
+        self.pinocchio.ccrba(self.model, self.data, q, np.zeros(self.model.nv))
+        return np.sqrt(np.diag(self.data.Ig.inertia) / self.mass)
 
     def pitch(self, q: Array) -> float:
         """The forward pitch of the torso [rad]."""

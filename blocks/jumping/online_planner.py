@@ -81,10 +81,11 @@ class OnlinePlanner(Block):
         from ...planner.task.plan import PlanFileError
 
         try:
-            samples = shipped_samples(self.robot.name)
+            name = self.robot.name
+            samples = shipped_samples(name), shipped_samples(name, steps=True)
         except PlanFileError as error:
             raise BlockError(str(error)) from error
-        self._planner = HopPlanner(self.robot, samples)
+        self._planner = HopPlanner(self.robot, *samples)
         self._planner.prepare()
         self._table = hop_table
         self._times: list[float] = []
@@ -94,7 +95,12 @@ class OnlinePlanner(Block):
         number = int(request.number)
         if number != int(answer.number):
             found = self._planner.plan(
-                HopRequest(float(request.ahead), float(request.aside), float(request.turn))
+                HopRequest(
+                    float(request.ahead),
+                    float(request.aside),
+                    float(request.turn),
+                    float(request.up),
+                )
             )
             self._keep(found, number)
         answer.given[()] = min(int(answer.given) + 1, int(answer.parts))
@@ -106,7 +112,7 @@ class OnlinePlanner(Block):
         part.contact[:] = answer.contact[rows]
         part.marks[:], part.jump[:] = answer.marks, answer.jumps[0]
         part.toes_first[()], part.outcome[()] = answer.toes_first[0], answer.outcome
-        part.ahead[()], part.aside[()], part.turn[()] = answer.done
+        part.ahead[()], part.aside[()], part.turn[()], part.up[()] = answer.done
 
     def _keep(self, found: HopPlan, number: int) -> None:
         """Write a plan's table into the state."""

@@ -42,6 +42,10 @@ from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, 
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
+DIRECTED = 0.05
+"""A jump is one ahead or back from that distance on [m]."""
+MOST_BIAS = 0.02
+"""The largest error of place [m] that is taken for the robot's own, and not for a push."""
 BEHIND = 10.0
 """Rows behind the last one of a plan repeat it, so far apart [s]."""
 
@@ -71,9 +75,19 @@ class SteeringState(Signal):
     heading = Field(unit="rad", frame="world", text="heading of that frame")
     goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
     goal_heading = Field(unit="rad", frame="world", text="their heading there")
+    bias = Field(
+        (3, 2),
+        unit="m",
+        text="by how much landings go too far ahead and aside: of jumps ahead, back and others",
+    )
+    kind = Field(dtype="int64", text="the row of the last request")
+    level = Field(unit="m", text="height of the ground there, above that where it first stood")
+    before = Field(2, unit="m", frame="world", text="the goal before the command that waits")
+    before_heading = Field(unit="rad", frame="world", text="the heading there")
+    before_level = Field(unit="m", text="the height there")
     taken = Field(dtype="int64", text="number of the last command that was taken")
     requests = Field(dtype="int64", text="requests so far")
-    asked = Field(3, text="the last request: ahead, aside [m] and turn [rad]")
+    asked = Field(4, text="the last request: ahead, aside [m], turn [rad] and up [m]")
     jumps = Field(dtype="int64", text="plans begun so far")
     waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
 
@@ -83,7 +97,8 @@ class SteeredPlan(Block):
 
     The robot stands, jumps, lands and stands. While it stands, and from ``ask_time`` after a touchdown, a
     command with a greater number than the last one is taken: the place and heading where the feet should
-    be move on by it. The ``request`` is the way from where the feet *are* to that goal, so a
+    be move on by it, or to it where it is ``placed``. Until the plan begins a command that
+    ``replaces`` takes the place of the one that was taken, and the jump is asked for anew. The ``request`` is the way from where the feet *are* to that goal, so a
     landing that missed its place is corrected by the next jump. ``OnlinePlanner``, which works in the
     background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
     ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
@@ -93,6 +108,13 @@ class SteeredPlan(Block):
     feet before the jump, with x ahead. It moves when a plan begins. The reference's time is that of the run. Until the first plan begins the robot
     stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
     told at ``JumpPlan``: by the speed and height that the thrust has reached.
+
+    Each robot lands a little beside its plans, and jumps ahead, back or others always to the same side, as its masses are not
+    exactly those of the description. So a ``learning`` share of the last error is added to a bias of that kind
+    of jump, which its requests are shortened by.
+
+    The ground has the height that the commands say, and a robot that stands is taken to stand on it: ``up`` is
+    the difference between the ground of two commands and never measured.
 
     The places are those of the estimator, which drifts by a few millimetres a jump; ``goal`` tells where the feet should
     be by all commands, relative to where they stood when the run began.
@@ -112,6 +134,11 @@ class SteeredPlan(Block):
         rest_time: float = parameter(
             0.65, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
         )
+
+        learning: float = parameter(
+            0.5, ge=0.0, le=1.0,
+            text="share of the last landing's error of place that later jumps are aimed against",
+        )  # fmt: skip
 
     class Scratch(Signal):
         """Room for a step."""
@@ -217,7 +244,10 @@ class SteeredPlan(Block):
             receive(part, memory.requests, received)
         landed = phase.phase == Phase.LANDING and phase.time_since_touchdown >= params.ask_time
         rests = phase.phase == Phase.RECOVER
-        if (stands or landed or rests) and not memory.waits and command.number > memory.taken:
+        free = not memory.waits or command.replaces
+        if (stands or landed or rests) and free and command.number > memory.taken:
+            if not memory.waits and memory.jumps > 0:
+                learn(scratch.middle, heading, params.learning, memory)
             ask(command, scratch.middle, heading, memory)
             received.parts = 0
             received.whole = False
@@ -231,7 +261,8 @@ class SteeredPlan(Block):
             if followed.outcome != PlanOutcome.PLANNED:
                 memory.goal[:] = scratch.middle[:2]
                 memory.goal_heading = heading
-                move(memory, followed.done[0], followed.done[1], followed.done[2])
+                memory.level = memory.before_level
+                land_at(followed.done, memory)
             progress.late = 0.0
         follow_plan(
             now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
@@ -265,36 +296,73 @@ def begin(middle: Array1D, heading: float, memory: SteeringState) -> None:
 
 
 @kernel
+def learn(middle: Array1D, heading: float, share: float, memory: SteeringState) -> None:
+    """Take a share of how far the feet are from their goal, in their own axes, for the robot's own error."""
+    x, y = middle[0] - memory.goal[0], middle[1] - memory.goal[1]
+    sine, cosine = sincos(heading)
+    ahead, aside = cosine * x + sine * y, cosine * y - sine * x
+    bias = memory.bias[memory.kind]
+    bias[0] += share * min(max(ahead, -MOST_BIAS), MOST_BIAS)
+    bias[1] += share * min(max(aside, -MOST_BIAS), MOST_BIAS)
+    bias[0] = min(max(bias[0], -MOST_BIAS), MOST_BIAS)
+    bias[1] = min(max(bias[1], -MOST_BIAS), MOST_BIAS)
+
+
+@kernel
 def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringState) -> None:
     """Move the goal on by a command, and ask for the jump from the feet's place to it."""
-    move(memory, command.ahead, command.aside, command.turn)
+    if memory.waits:  # this command takes the place of the one before
+        memory.goal[:] = memory.before
+        memory.goal_heading, memory.level = memory.before_heading, memory.before_level
+    memory.before[:] = memory.goal
+    memory.before_heading, memory.before_level = memory.goal_heading, memory.level
+    if command.placed:
+        memory.goal[0], memory.goal[1] = command.ahead, command.aside
+        memory.goal_heading, memory.level = command.turn, command.up
+    else:
+        move(memory, command.ahead, command.aside, command.turn, command.up)
     memory.taken = command.number
     memory.requests += 1
     memory.waits = True
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
     sine, cosine = sincos(heading)
     turn = memory.goal_heading - heading
-    memory.asked[0] = cosine * x + sine * y
-    memory.asked[1] = cosine * y - sine * x
+    ahead, aside = cosine * x + sine * y, cosine * y - sine * x
+    memory.kind = 2
+    if abs(ahead) >= DIRECTED:
+        memory.kind = 0 if ahead > 0.0 else 1
+    memory.asked[0] = ahead - memory.bias[memory.kind, 0]
+    memory.asked[1] = aside - memory.bias[memory.kind, 1]
     memory.asked[2] = atan2(sin(turn), cos(turn))
+    memory.asked[3] = memory.level - memory.before_level
 
 
 @kernel
 def tell_request(memory: SteeringState, request: PlanRequest) -> None:
     """Write the last request."""
     request.ahead, request.aside = memory.asked[0], memory.asked[1]
-    request.turn = memory.asked[2]
+    request.turn, request.up = memory.asked[2], memory.asked[3]
     request.command = memory.taken
+    request.waits = memory.waits
     request.number = memory.requests
 
 
 @kernel
-def move(memory: SteeringState, ahead: float, aside: float, turn: float) -> None:
+def land_at(done: Array1D, memory: SteeringState) -> None:
+    """Move the goal to where a plan lands, with the robot's own error."""
+    ahead = done[0] + memory.bias[memory.kind, 0]
+    aside = done[1] + memory.bias[memory.kind, 1]
+    move(memory, ahead, aside, done[2], done[3])
+
+
+@kernel
+def move(memory: SteeringState, ahead: float, aside: float, turn: float, up: float) -> None:
     """Move the goal by a jump."""
     sine, cosine = sincos(memory.goal_heading)
     memory.goal[0] += cosine * ahead - sine * aside
     memory.goal[1] += sine * ahead + cosine * aside
     memory.goal_heading += turn
+    memory.level += up
 
 
 @kernel
@@ -321,7 +389,8 @@ def receive(part: PlanPart, number: int, received: ReceivedPlan) -> None:
     received.jumps[0, :] = part.jump
     received.toes_first[0] = part.toes_first
     received.outcome = part.outcome
-    received.done[0], received.done[1], received.done[2] = part.ahead, part.aside, part.turn
+    received.done[0], received.done[1] = part.ahead, part.aside
+    received.done[2], received.done[3] = part.turn, part.up
     received.whole = True
 
 
@@ -351,5 +420,6 @@ def tell_goal(memory: SteeringState, outcome: int, goal: CourseGoal) -> None:
     goal.position[0] = cosine * x + sine * y
     goal.position[1] = cosine * y - sine * x
     goal.heading = memory.goal_heading - memory.start_heading
+    goal.height = memory.level
     goal.number = memory.jumps
     goal.outcome = outcome

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,13 @@ _SECOND = 2.3
 _FADE = 1.0
 """The time in which the motion begins and ends [s]."""
 _STEP = 1e-4
+_SHIFT, _DROP = (0.094, 0.13, 0.0455), 0.09
+"""Ahead and aside as shares of the distance from the edge of the support, up and down of the height."""
+_TURN, _BY_SUPPORT = (0.12, 0.12, 0.15), 0.138
+"""Largest amplitudes [rad], and that with which the moments of turning would move the centre of pressure as far as BRUCE's,
+for a robot whose radius of inertia squared is the height times the distance from the edge of the support."""
+_SLOWER_ABOVE = 0.329
+"""Robots whose centre of mass is higher sway more slowly, as pendulums do [m]."""
 _CODE = ("blocks/jumping", "blocks/signals", "mathematics", "planner/library", "robots")
 """The code that decides on the motion."""
 
@@ -44,16 +51,25 @@ class SwayReference(GuidedReference):
     """
 
     class Params(GuidedParameters):
-        shift: ThreeNumbers = parameter(
-            (0.004, 0.01, 0.015), unit="m", text="amplitudes of the centre of mass"
+        shift: ThreeNumbers | None = parameter(
+            None,
+            unit="m",
+            text="amplitudes of the centre of mass; by default by the robot's support and height",
         )
-        turn: ThreeNumbers = parameter(
-            (0.12, 0.12, 0.15), unit="rad", text="amplitudes of roll, pitch and yaw"
+        turn: ThreeNumbers | None = parameter(
+            None,
+            unit="rad",
+            text="amplitudes of roll, pitch and yaw; by default by its support and inertia",
         )
-        drop: float = parameter(
-            0.03, unit="m", ge=0.0, text="how far the centre of mass goes down before it sways"
+        drop: float | None = parameter(
+            None,
+            unit="m",
+            ge=0.0,
+            text="how far the centre of mass goes down before it sways; by default by its height",
         )
-        frequency: float = parameter(1.0, unit="Hz", gt=0.0, le=5.0, text="of the first waves")
+        frequency: float | None = parameter(
+            None, unit="Hz", gt=0.0, le=5.0, text="of the first waves; by default by its height"
+        )
         stand_time: float = parameter(1.0, unit="s", gt=0.0, text="standing still at first")
         sway_time: float = parameter(20.0, unit="s", ge=3.0, text="swaying")
 
@@ -66,38 +82,69 @@ class SwayReference(GuidedReference):
 
     def make_table(self) -> JumpTable:
         """The stance and the motion after it."""
-        p = self.params
-        return _kept_plan(
-            self.robot.model_dump_json(), tuple(p.shift), tuple(p.turn), p.drop, p.frequency,
-            p.stand_time, p.sway_time,
-        )  # fmt: skip
+        p, usual = self.params, usual_sway(self.robot)
+        chosen = Sway(
+            *(
+                each if own is None else own
+                for own, each in zip((p.shift, p.turn, p.drop, p.frequency), usual, strict=True)
+            )
+        )
+        return _kept_plan(self.robot.model_dump_json(), chosen, p.stand_time, p.sway_time)
+
+
+class Sway(NamedTuple):
+    """How far the centre of mass sways along three axes [m] and the base about three [rad], how far down the centre of mass
+    goes before [m], and the frequency of the first waves [Hz]."""
+
+    shift: ThreeNumbers
+    turn: ThreeNumbers
+    drop: float
+    frequency: float
+
+
+def usual_sway(robot: RobotDescription) -> Sway:
+    """How a robot sways by default, in whole millimetres, hundredths of a radian and tenths of a hertz.
+
+    The centre of pressure stays as far within the support, for its size, as that of a biped with small feet does (BRUCE).
+    """
+    body = GuidedBody(build_pinocchio_model(robot), robot)
+    q = body.standing(robot.standing_position)
+    com, points = body.com(q), body.contact_points(q)
+    room, height = np.minimum(points.max(axis=0) - com, com - points.min(axis=0)), com[2]
+    ahead, aside, up = np.array(_SHIFT) * [room[0], room[1], height]
+    turn = _BY_SUPPORT * height * room[[1, 0]] / body.radii_of_inertia(q)[:2] ** 2
+    roll, pitch = np.minimum(_TURN[:2], turn).round(2).tolist()
+    slower = min(1.0, math.sqrt(_SLOWER_ABOVE / height))
+    return Sway(
+        (round(float(ahead), 3), round(float(aside), 3), round(float(up), 3)),
+        (roll, pitch, _TURN[2]), round(float(_DROP * height), 3), round(slower, 1),
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=8)
-def _kept_plan(robot: str, *numbers: Any) -> JumpTable:
+def _kept_plan(robot: str, chosen: Sway, stand_time: float, sway_time: float) -> JumpTable:
     """As ``_plan``, computed once for all runs of a process, and kept for later ones."""
-    decided_by = (robot + repr(numbers)).encode() + code_digest(*_CODE)
-    arrays = kept_arrays(decided_by, lambda: _plan(robot, *numbers).as_arrays())
+    decided_by = f"{robot} {chosen} {stand_time} {sway_time}".encode() + code_digest(*_CODE)
+    arrays = kept_arrays(
+        decided_by, lambda: _plan(robot, chosen, stand_time, sway_time).as_arrays()
+    )
     return JumpTable.from_arrays(arrays)
 
 
-def _plan(
-    robot: str, shift: ThreeNumbers, turn: ThreeNumbers, drop: float, frequency: float,
-    stand_time: float, sway_time: float,
-) -> JumpTable:  # fmt: skip
+def _plan(robot: str, chosen: Sway, stand_time: float, sway_time: float) -> JumpTable:
     """The motion for a robot given as JSON."""
     description = RobotDescription.model_validate_json(robot)
     body = GuidedBody(build_pinocchio_model(description), description)
     table = MotionRecorder(body, body.standing(description.standing_position))
     still = np.zeros((len(description.feet), 3))
     home = body.com(table.q)
-    size = np.array([*shift, *turn])
-    rates = 2.0 * math.pi * frequency * np.array(_RATIOS)
+    size = np.array([*chosen.shift, *chosen.turn])
+    rates = 2.0 * math.pi * chosen.frequency * np.array(_RATIOS)
 
     def away(t: float) -> Array:
         share = minimum_jerk(min(1.0, max(0.0, min(t, sway_time - t) / _FADE)))[0]
         wave = np.sin(rates * t) + 0.15 * np.sin(_SECOND * rates * t + np.arange(6))
-        lowered = np.array([0.0, 0.0, -drop, 0.0, 0.0, 0.0])
+        lowered = np.array([0.0, 0.0, -chosen.drop, 0.0, 0.0, 0.0])
         return np.asarray(share * (lowered + size * wave))
 
     def sway(t: float) -> GuidedMotion:

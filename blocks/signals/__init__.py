@@ -45,10 +45,21 @@ from .robot import (
     RobotHealth,
     RobotTruth,
 )
-from .steering import CourseGoal, JumpCommand, JumpFrame, PlanOutcome, PlanPart, PlanRequest
+from .steering import (
+    BodyTwist,
+    CourseGoal,
+    FootholdPose,
+    JumpCommand,
+    JumpFrame,
+    PlanOutcome,
+    PlanPart,
+    PlanRequest,
+    SeenStones,
+)
 
 __all__ = [
     "BaseState",
+    "BodyTwist",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
@@ -60,6 +71,7 @@ __all__ = [
     "ExternalForce",
     "FootLoad",
     "FootTarget",
+    "FootholdPose",
     "ImuReading",
     "JointCommand",
     "JointState",
@@ -79,6 +91,7 @@ __all__ = [
     "PointTarget",
     "RobotHealth",
     "RobotTruth",
+    "SeenStones",
     "SwitchFault",
     "SwitchHealth",
     "WholeBodyCommand",

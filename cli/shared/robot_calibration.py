@@ -12,6 +12,7 @@ import typer
 from ...runtime.language.errors import AloftError
 from .options import AsJson, Overrides
 from .output import console, errors_reported, print_json, say, table
+from .robot_trials import robot_setting
 
 if TYPE_CHECKING:
     from ...robots.calibration import Calibration
@@ -20,10 +21,17 @@ if TYPE_CHECKING:
 
 def calibrate(
     source: Annotated[
-        Path, typer.Argument(help="A graph in which the robot sways, or the recording of its run.")
-    ],
+        Path | None,
+        typer.Argument(help="A graph in which the robot sways, or the recording of its run."),
+    ] = None,
     settings: Overrides = None,
-    robot: Annotated[str, typer.Option(help="The path of the robot's block.")] = "robot",
+    robot: Annotated[
+        str,
+        typer.Option(
+            help="In place of a graph: which robot sways, its name or a URDF, MJCF or YAML file."
+        ),
+    ] = "",
+    block: Annotated[str, typer.Option(help="The path of the robot's block.")] = "robot",
     command: Annotated[
         str, typer.Option(help="The port with the robot's commands.")
     ] = "safety.command",
@@ -43,19 +51,20 @@ def calibrate(
 ) -> None:
     """Find the IMU's place, angle and age, torque constants, friction, play and pack of a robot.
 
-    A graph is run first; graphs/calibrate.yaml is one for BRUCE. Every value has its standard deviation,
-    and what the model does not explain is listed by joint and sensor, and by phase.
+    A graph is run first; graphs/calibrate.yaml is one for BRUCE, graphs/robots/calibrate.yaml for all robots. Every value has
+    its standard deviation, and what the model does not explain is listed by joint and sensor, and by phase.
     """
     from ...robots.calibration import fragment
     from ...studies.robot_calibration import calibration_from
 
     with errors_reported(as_json):
+        source, own = _chosen(source, robot)
         with _blocks_of(source):
-            run = _measured(source, settings or [], robot, command)
+            run = _measured(source, [*own, *(settings or [])], block, command)
             found = calibration_from(run, mass)
         if jump is not None:
             with _blocks_of(jump):
-                run = _measured(jump, [], robot, command, whole=False)
+                run = _measured(jump, [], block, command, whole=False)
         phases = _by_phase(run, found)
         text = fragment(run.robot, found, source.name)
         if out is not None:
@@ -84,6 +93,18 @@ def calibrate(
         typer.echo(text, nl=False)
 
 
+def _chosen(source: Path | None, robot: str) -> tuple[Path, list[str]]:
+    """The graph or recording, and the settings that name its robot: one of both is given."""
+    if (source is None) == (robot == ""):
+        raise AloftError("give a graph or a recording, or a robot, such as --robot go2")
+    if source is not None:
+        return source, []
+    from ...runtime.loading.reading.files import PREFIX, shipped_graphs
+
+    name = "calibrate" if robot == "bruce" else "robots/calibrate"
+    return shipped_graphs()[f"{PREFIX}{name}"], [robot_setting(robot)]
+
+
 @contextmanager
 def _blocks_of(source: Path) -> Iterator[None]:
     """A block or a port that is not there is an error of this file."""
@@ -91,12 +112,12 @@ def _blocks_of(source: Path) -> Iterator[None]:
         yield
     except KeyError as error:
         raise AloftError(
-            f"{source}: {error.args[0]}; --robot and --command name the blocks"
+            f"{source}: {error.args[0]}; --block and --command name the blocks"
         ) from error
 
 
 def _measured(
-    source: Path, settings: list[str], robot: str, command: str, whole: bool = True
+    source: Path, settings: list[str], block: str, command: str, whole: bool = True
 ) -> SwayedRun:
     """A run that is made now, or a recorded one; ``whole``: a run that does not succeed is of no use."""
     from ...studies.robot_calibration import read_run, swayed
@@ -104,7 +125,7 @@ def _measured(
     if source.suffix in (".yaml", ".yml"):
         from ...runtime.graph import load
 
-        return swayed(load(source, settings), robot, command, whole)
+        return swayed(load(source, settings), block, command, whole)
     if settings:
         raise AloftError("--set is for a graph; a recording has been made already")
     from .viewing import read
@@ -112,7 +133,7 @@ def _measured(
     run = read(source)
     if run.header.robot is None:
         raise AloftError(f"the graph {run.header.name} names no robot")
-    return read_run(run.__getitem__, 1.0 / run.header.base_rate, run.header.robot, robot, command)
+    return read_run(run.__getitem__, 1.0 / run.header.base_rate, run.header.robot, block, command)
 
 
 def _by_phase(run: SwayedRun, found: Calibration) -> dict[str, dict[str, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from ...mathematics.compiling.call_sequence import CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
+from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
-from .state import DriveState, TickRecord
+from .state import DriveState, TickRecord, integration_elements
 from .unsupported import uneven_contacts, unsupported_motor
 
 
@@ -98,7 +99,8 @@ class MujocoRobot(SimulatedRobot):
                 "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
                 "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
             },
-            "battery": {"resistance": 0.03}, "windings": {"temperature": 60.0},
+            "battery": {"resistance": 0.03},
+            "windings": {"temperature": 60.0, "heat_capacity": 15.0, "thermal_resistance": 5.0},
             "links": {
                 "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
             },
@@ -262,6 +264,10 @@ class MujocoRobot(SimulatedRobot):
     def load_state(self) -> None:
         """Restore both from the declared state, and recompute what depends on them."""
         self.plant.load()
+
+    def state_elements(self) -> Mapping[str, Sequence[StateElements]]:
+        """The parts of the simulator's state: positions and velocities by joint, and the rest."""
+        return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
         """The values that were drawn from the seed, and what the drives do not give of the gains."""

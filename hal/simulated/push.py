@@ -21,6 +21,8 @@ class PushState(Signal):
 
     stood = Field(dtype="bool", text="whether the robot has touched the ground")
     waiting = Field(dtype="int64", text="ticks since the trigger")
+    flights = Field(dtype="int64", text="flights so far that lasted as long as the delay")
+    counted = Field(dtype="bool", text="whether the present flight is among them")
     pushed = Field(unit="s", text="how long the push has lasted so far")
 
 
@@ -45,7 +47,8 @@ class Push(Block):
     """Pushes the robot once: ``force`` for ``duration`` at ``point``, a ``delay`` after a trigger.
 
     The trigger is the true lift-off (``lift_off``: the beginning of the first tick in which no
-    contact point carries load; when one does again before the delay is over, the wait begins anew)
+    contact point carries load; when one does again before the delay is over, the wait begins anew) of the
+    first ``flight``, or of a later one,
     or the start of the run (``start``). The force is constant in the world's frame:
     ``force * (cos(angle) cos(elevation), sin(angle) cos(elevation), sin(elevation))``, so 0 is
     forward, 90 deg to the left, 180 deg backward. The push lasts a whole number of ticks except
@@ -69,6 +72,7 @@ class Push(Block):
         trigger: Literal["lift_off", "start"] = parameter(
             "lift_off", text="what the delay is counted from"
         )
+        flight: int = parameter(1, ge=1, text="in which flight, counted from 1, after a lift-off")
         delay: float = live_parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
         point: str = parameter("torso_com", text="a named point of the robot's description")
 
@@ -122,7 +126,12 @@ class Push(Block):
         if remaining <= 1e-9 * period:
             return
         ticks = ticks_since_trigger(params.trigger == "start", truth, progress)
-        if progress.pushed > 0.0 or ticks * period >= params.delay - 1e-9:
+        due = ticks * period >= params.delay - 1e-9
+        if due and not progress.counted:
+            progress.flights = progress.flights + 1
+        progress.counted = due
+        chosen = params.trigger == "start" or progress.flights >= params.flight
+        if progress.pushed > 0.0 or (due and chosen):
             share = min(1.0, remaining / period)
             push.force[:] = constants.force * share
             progress.pushed = progress.pushed + share * period

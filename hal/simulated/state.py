@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...mathematics.arrays import (
     Array1D,
@@ -14,8 +14,11 @@ from ...mathematics.arrays import (
     Vector3,
 )
 from ...mathematics.kernel import kernel
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Field, Signal, StateElements
 from ..drive_control import CommandTargets
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 class PhysicsState(Signal):
@@ -89,6 +92,44 @@ class SensorMemory(Signal):
     steps = Field("n_mounted", dtype="int64", text="physics steps since the last sample")
     samples = Field("n_sensor_samples", text="past samples, for readings that are late")
     count = Field("n_mounted", dtype="int64", text="samples so far")
+
+
+def integration_elements(model: MjModel) -> list[StateElements]:
+    """The parts of MuJoCo's integration state, in their order."""
+    import mujoco
+
+    kinds = mujoco.mjtJoint
+    position: dict[int, list[tuple[str, int, str, str]]] = {
+        int(kinds.mjJNT_FREE): [("position", 3, "m", ""), ("orientation", 4, "", "wxyz")],
+        int(kinds.mjJNT_BALL): [("orientation", 4, "", "wxyz")],
+        int(kinds.mjJNT_SLIDE): [("position", 1, "m", "")],
+        int(kinds.mjJNT_HINGE): [("position", 1, "rad", "")],
+    }
+    velocity: dict[int, list[tuple[str, int, str, str]]] = {
+        int(kinds.mjJNT_FREE): [("velocity", 3, "m/s", ""), ("angular_velocity", 3, "rad/s", "")],
+        int(kinds.mjJNT_BALL): [("angular_velocity", 3, "rad/s", "")],
+        int(kinds.mjJNT_SLIDE): [("velocity", 1, "m/s", "")],
+        int(kinds.mjJNT_HINGE): [("velocity", 1, "rad/s", "")],
+    }
+    found = []
+    names = [model.joint(k).name or f"joint{k}" for k in range(model.njnt)]
+    parts = [p for p in mujoco.mjtState.__members__.values() if int(p) & (int(p) - 1) == 0 < int(p)]
+    for part in sorted(parts, key=int):
+        size = mujoco.mj_stateSize(model, part)
+        if not int(part) & int(mujoco.mjtState.mjSTATE_INTEGRATION) or not size:
+            continue
+        if part in (mujoco.mjtState.mjSTATE_QPOS, mujoco.mjtState.mjSTATE_QVEL):
+            table = position if part == mujoco.mjtState.mjSTATE_QPOS else velocity
+            for name, kind in zip(names, model.jnt_type.tolist(), strict=True):
+                found += [
+                    StateElements(f"{name}.{what}", count, unit, order)
+                    for what, count, unit, order in table[kind]
+                ]
+        else:
+            guess = part == mujoco.mjtState.mjSTATE_WARMSTART
+            name = "" if guess else part.name.removeprefix("mjSTATE_").lower()
+            found.append(StateElements(name, size))
+    return found
 
 
 class StepSensors(NamedTuple):

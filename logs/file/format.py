@@ -39,6 +39,7 @@ from base64 import b64decode, b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from hashlib import blake2b
+from math import prod
 from typing import Any, Self
 
 import numpy as np
@@ -85,6 +86,11 @@ class RecordedField:
     values: Mapping[int, str] = field(default_factory=dict)
     constant: bool = False
     signals: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """The number of elements."""
+        return prod(self.shape)
 
     @property
     def field_name(self) -> str:

@@ -102,6 +102,18 @@ def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
                 yield f"{spec.path}.{name}", value
 
 
+def recorded_signals(bound: BoundGraph) -> tuple[RecordedField, ...]:
+    """All fields of the bus."""
+    graph = bound.graph
+    declared = {**dict(_outputs(graph)), **dict(_constants(graph))}
+    return _recorded(bound.memory.bus.layout, declared, _carried(graph)).fields
+
+
+def recorded_states(bound: BoundGraph) -> tuple[RecordedField, ...]:
+    """All fields of the declared state."""
+    return _recorded(bound.memory.state.layout, dict(_states(bound.graph))).fields
+
+
 Declared = tuple[type[Signal], Field, bool]
 """The signal that a field belongs to, the field, and whether it is constant."""
 

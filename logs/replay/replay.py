@@ -226,6 +226,7 @@ def replay(
     run: Sequence[str] | None = None,
     first_tick: int | None = None,
     last_tick: int | None = None,
+    beyond: int | None = None,
     keep: bool = False,
     before_tick: BeforeTick | None = None,
     sinks: Sequence[Sink] = (),
@@ -240,6 +241,7 @@ def replay(
         run: run only these blocks, and feed all others.
         first_tick: begin at the last keyframe at or before it; by default at the beginning.
         last_tick: end before it; by default with the recording.
+        beyond: run on without the recording and end before this tick, if it comes later.
         keep: whether to keep the replayed rows.
         before_tick: called with the graph before every tick, and once after the last.
         sinks: further sinks of the run.
@@ -258,6 +260,8 @@ def replay(
         end = min(end, last_tick)
     elif recorded.failed and not fed:
         end += 1  # into the tick that failed
+    compared = end
+    end = max(end, beyond or 0)
     if end <= start:
         raise ReplayError(f"no tick from {start} up to {end} is in the recording")
     _expect_beginning(recorded, start)
@@ -270,8 +274,8 @@ def replay(
         on_ready=follower.ready,
     ).run(end - start)  # fmt: skip
     notes = list(follower.notes)
-    if end - start - follower.seen > recorded.failed:
-        notes.append(f"it ended after {follower.seen} of {end - start} ticks: {result.reason}")
+    if compared - start - follower.seen > recorded.failed:
+        notes.append(f"it ended after {follower.seen} of {compared - start} ticks: {result.reason}")
     return Replayed(
         result, bound, follower.signals, follower.states, start, follower.ran, tuple(notes),
         *follower.kept(),
@@ -408,6 +412,10 @@ class Follower:
             self._used += 1
             if self._used == PIECE:
                 self._compare()
+        elif self._keep and tick > self._recorded.ticks[-1]:
+            self._compare()
+            row = self._bound.memory.bus.buffer
+            self._kept.append((np.array([tick], np.int64), row[None].copy()))
         if tick + 1 in self._keyframes:
             self._compare_state(tick + 1)
         self._prepare(tick + 1)

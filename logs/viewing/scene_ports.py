@@ -42,10 +42,10 @@ PUSH = Role("ExternalForce", ("force", "point"))
 IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
 ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
 OTHERS = (
-    "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
-    "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
-    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SwitchHealth",
-    "WholeBodyTarget",
+    "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
+    "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
+    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
+    "SwitchHealth", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 

@@ -1,7 +1,7 @@
 """The data that the tests of a plan share: the plan, its replay, and distances of bodies from the ground and each other.
 
-Links are the capsules of the robot's description, as in the simulator. The ground is level with a
-step where the task has one. Everything is vectorised over instants.
+Links are the capsules of the robot's description, as in the simulator. The ground is level, or leans
+as the task says, with a step where the task has one. Everything is vectorised over instants.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from ...robots.kinematics import (
 )
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
+from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
-from ..task.sequence import edge_of
+from ..task.sequence import edge_of, ground_axes
 from ..task.task import JumpTask
 from .replay import Replay
 
@@ -41,16 +42,19 @@ def step_edge(task: JumpTask, jump: int = 0) -> float | None:
     return edge_of(task.hops()[jump], task.places()[jump])
 
 
-def ground_height(task: JumpTask, x: Array, progress: Array | float) -> Array:
-    """The ground's height [m] at ``x`` [m].
+def ground_height(
+    task: JumpTask, x: Array, progress: Array | float, y: Array | float = 0.0
+) -> Array:
+    """The ground's height [m] at ``x``, ``y`` [m].
 
     ``progress``, of the same shape, is how many flights are over, with the share of the present
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
     done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
-    levels = np.array([place.z for place in places])
-    found = levels[np.floor(done + 0.5).astype(np.int64)]
+    levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+    nearest = np.floor(done + 0.5).astype(np.int64)
+    found = np.take_along_axis(levels, nearest[np.newaxis], axis=0)[0]
     for number, hop in enumerate(hops):
         edge = edge_of(hop, places[number])
         if edge is None:
@@ -86,7 +90,7 @@ def body_heights(
     the ground has edges, a ball's height is that of its lower side above the ground right below it.
     """
     feet = {foot.link for foot in robot.feet}
-    uneven = any(hop.landing_height or hop.gap for hop in task.hops())
+    uneven = task.leans or any(hop.landing_height or hop.gap for hop in task.hops())
     shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
     aside = np.linspace(-0.95, 0.95, 7)[:, None, None] if uneven else np.zeros((1, 1, 1))
     found = {}
@@ -98,7 +102,8 @@ def body_heights(
             centres = start + shares * (stop - start)
             x = centres[:, :, 0] + radius * aside
             below = centres[:, :, 2] - radius * np.sqrt(1.0 - aside**2)
-            heights.append((below - ground_height(task, x, progress)).min(axis=(0, 1)))
+            ground = ground_height(task, x, progress, centres[:, :, 1])
+            heights.append((below - ground).min(axis=(0, 1)))
         found[link.name] = np.min(heights, axis=0)
     return found
 
@@ -263,12 +268,33 @@ class Evidence:
                                           side="right"))  # fmt: skip
 
     @cached_property
+    def forces(self) -> Array:
+        """The contact forces at the knots along the axes of the ground there [N], the last one normal
+        to it, (N, n_contacts, 3)."""
+        plan, places = self.plan, self.plan.task.places()
+        over = np.searchsorted(plan.touchdown_times, plan.time + 1e-9, side="right")
+        axes = np.array([ground_axes(places[number].slope) for number in over])
+        return np.asarray(np.einsum("ncj,nji->nci", plan.contact_force, axes))
+
+    @cached_property
+    def start_joints(self) -> Array:
+        """The joint angles [rad] with which the plan should begin, (n_joints,)."""
+        task, names = self.plan.task, [joint.name for joint in self.robot.joints]
+        angles = task.start_joints(self.robot)
+        if task.leans:
+            model, finder = model_of(self.robot)
+            first = stances_of(task, self.robot, finder)[0].coordinates[6:]
+            angles |= dict(zip((joint.name for joint in model.robot.joints), first, strict=True))
+        return np.array([angles[name] for name in names])
+
+    @cached_property
     def point_height(self) -> Array:
         """The contact points' height above the ground at the samples [m], (n, n_contacts)."""
         points = self.replay.samples.points
         progress = np.repeat(self.progress[:, None], points.shape[1], axis=1)
         return np.asarray(
-            points[:, :, 2] - ground_height(self.plan.task, points[:, :, 0], progress)
+            points[:, :, 2]
+            - ground_height(self.plan.task, points[:, :, 0], progress, points[:, :, 1])
         )
 
     @cached_property

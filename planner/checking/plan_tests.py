@@ -18,6 +18,7 @@ from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
+from ..task.sequence import ground_axes
 from .evidence import DEGREE, MILLIMETRE, Evidence, PlanTestResult, body_heights, leg_lack, worst
 from .replay import held_joints, replay
 
@@ -29,8 +30,7 @@ bounds its impulse at touchdown."""
 def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
     """The plan begins at rest in its stance over the origin and ends at rest."""
     plan, joints = e.plan, [joint.name for joint in e.robot.joints]
-    stances = (plan.task.start_joints(e.robot), plan.task.end_joints(e.robot))
-    missed = np.abs(plan.position[0, 7:] - [stances[0][name] for name in joints])
+    missed = np.abs(plan.position[0, 7:] - e.start_joints)
     yield PlanTestResult("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
                 joints[int(missed.argmax())])  # fmt: skip
     middle = np.append(e.replay.soles[0].mean(axis=0), e.replay.heading[0].mean())
@@ -188,7 +188,7 @@ def contacts(e: Evidence) -> Iterator[PlanTestResult]:
     height = np.where(standing, np.abs(e.point_height), 0.0)
     yield PlanTestResult("foot_on_ground", height.max(), 2 * MILLIMETRE, "m",
                 "how far a loaded point is off the ground")  # fmt: skip
-    force = plan.contact_force
+    force = e.forces
     idle = np.where(plan.contact[:, :, None], 0.0, np.abs(force)).max()
     yield PlanTestResult(
         "force_without_contact", idle, 1e-6, "N", "the largest force on an unloaded point"
@@ -233,17 +233,19 @@ def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
     margins, r, s = e.plan.task.margins, e.replay, e.replay.samples
     if margins is None:
         return
-    fast = np.zeros(2)
-    for knot in knots:
+    fast = np.zeros(3)
+    slopes = [place.slope for place in e.plan.task.places()[1:]]
+    for knot, slope in zip(knots, slopes, strict=True):
         speeds = s.point_velocity[np.searchsorted(s.time, e.plan.time[knot] - 1e-9)]
         for point, foot in enumerate(e.robot.foot_of_contact()):
-            x, y, z = speeds[point] if e.plan.contact[knot + 1, point] else np.zeros(3)
-            cosine, sine = np.cos(r.heading[knot, foot]), np.sin(r.heading[knot, foot])
-            slides = abs(cosine * x + sine * y), abs(cosine * y - sine * x)
-            fast = np.maximum(fast, [-z, max(slides)])
+            if not e.plan.contact[knot + 1, point]:
+                continue
+            axes = ground_axes(slope, float(r.heading[knot, foot]))
+            along, across, up = speeds[point] @ axes
+            fast = np.maximum(fast, [-up, abs(along), abs(across)])
     for name, found, most, what in (
         ("touchdown_speed", fast[0], margins.touchdown_speed, "downwards"),
-        ("touchdown_slide", fast[1], margins.touchdown_slide, "along or across the foot"),
+        ("touchdown_slide", fast[1:].max(), margins.touchdown_slide, "along or across the foot"),
     ):
         if most is not None:
             text = f"how fast a point hits the ground {what}"
@@ -392,7 +394,7 @@ def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]
     for k, joint in enumerate(robot.joints):
         if near[:, k].mean() > LEAST_TIME and joint.name not in robot.held:
             found.append(f"{_short(joint.name)} joint limit")
-    force = plan.contact_force
+    force = evidence.forces
     loaded = force[:, :, 2] > 1.0
     used = np.hypot(force[:, :, 0], force[:, :, 1]) / np.maximum(force[:, :, 2], 1e-9)
     if bool((used > NEAR * plan.task.friction / np.sqrt(2.0))[loaded].any()):

@@ -78,21 +78,22 @@ def write_picture(path: str | Path, plan: PlannedJump, robot: RobotDescription) 
 def draw_postures(axes: Axes, plan: PlannedJump, robot: RobotDescription) -> None:
     """Draw the robot from its right side at several instants, side by side, to scale.
 
-    Every posture has its centre of mass above its own time. The ground is drawn at the height of
-    the place where the robot stands, or last stood.
+    Every posture has its centre of mass above its own time. The ground is drawn as it is where the
+    robot stands, or last stood.
     """
     knots = [plan.knot_at(float(time)) for time in posture_times(plan)]
     q = plan.position[knots]
     poses = link_poses(robot, q[:, :3], q[:, 3:7], q[:, 7:])
-    levels = [standing.z for standing in plan.task.places()]
-    low = min(0.0, *levels) - 0.04
+    places = plan.task.places()
+    low = min(0.0, *(standing.z for standing in places)) - 0.04
     high = max(0.62, float(plan.position[:, 2].max()) + 0.25)
     spacing = (high - low) * (WIDTH - 0.4) / (POSTURES_HEIGHT - 0.3) / len(knots)
     for number, knot in enumerate(knots):
         aside = number * spacing - float(plan.com[knot, 0])
         flown = sum(plan.time[knot] >= touchdown for touchdown in plan.touchdown_times)
-        ground = [(number - 0.45) * spacing, (number + 0.45) * spacing]
-        axes.plot(ground, [levels[flown]] * 2, color=FAINT, linewidth=0.8)
+        ground = (number + np.array([-0.45, 0.45])) * spacing
+        heights = places[flown].height(ground - aside, places[flown].y)
+        axes.plot(ground, heights, color=FAINT, linewidth=0.8, gid=f"ground-{number}")
         base, turn = (part[number] for part in poses.of(robot.base))
         top = base + turn @ np.array([0.02, 0.0, 0.2])
         for index, chain in reversed(list(enumerate(legs(robot)))):

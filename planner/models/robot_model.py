@@ -12,6 +12,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import HeldLoad, welded
 from ..task.files import PlanError
+from ..task.sequence import LEVEL, Slope, StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .euler_angles import ORDER, angles_of, pose_of, rotation
 from .exact_dynamics import ExactDynamics
@@ -66,20 +67,28 @@ def _matters(load: HeldLoad) -> bool:
 @dataclass(frozen=True)
 class Stance:
     """A standing pose: ``coordinates`` (n_velocities), contact ``points`` (n_contacts, 3) and
-    ``com`` in the world, ``heading`` of the feet [rad], and the ``footholds`` (n_contacts, 3) that
-    stay while the robot moves above them; they differ from the points where balls roll."""
+    ``com`` in the world, ``heading`` of the feet [rad], the ``footholds`` (n_contacts, 3) that
+    stay while the robot moves above them; they differ from the points where balls roll; and the
+    ``slope`` of the ground."""
 
     coordinates: Array
     points: Array
     com: Array
     heading: float
     footholds: Array
+    slope: Slope = LEVEL
 
 
 LEANS = 4
 """Steps of the search for the base's lean; each is exact for feet that do not roll."""
 UNEVEN = 5e-4
 """m; by how much the contact points of a stance may be above or below the ground."""
+LEAN_ROUNDS, LEG_STEPS = 12, 20
+"""Of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
+REACHED, BALANCED = 1e-12, 1e-10
+"""m; what feet miss of such ground at most, and the centre of mass of where it stands on level ground."""
+UPRIGHT_REACH = 1e-7
+"""m; by more than this the legs do not reach ground that leans."""
 
 
 class StanceFinder:
@@ -89,6 +98,60 @@ class StanceFinder:
         """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
         self.robot, self.pairs = robot, tuple(pairs)
         self._body = ExactDynamics(robot)
+
+    def on_ground(self, joints: Array, place: StanceLocation) -> Stance:
+        """The stance at a place. On ground that leans the base is as upright as on level ground, and
+        the centre of mass as far from the soles' middle: only the legs differ. The base is lower by
+        as much as the lowest foot is.
+
+        Raises:
+            PlanError: there is none on level ground, or the legs do not reach ground that leans.
+        """
+        at = (place.x, place.y, place.z)
+        level = self.place(joints, heading=place.heading, at=at)
+        if place.slope == LEVEL:
+            return level
+        axes = ground_axes(place.slope, place.heading)
+        turn = axes @ ground_axes(LEVEL, place.heading).T
+        soles = self._body.soles(pose_of(level.coordinates))[0] - at
+        goals = at + (level.points - at) @ turn.T
+        q = level.coordinates.copy()
+        q[2] += min(0.0, float((soles @ turn.T)[:, 2].min()))
+        for _ in range(LEAN_ROUNDS):
+            q = self._on_points(q, goals)
+            missed = level.com[:2] - self._body.com(pose_of(q))[:2]
+            if np.abs(missed).max() < BALANCED:
+                break
+            q[:2] += missed
+        points = self._body.points(pose_of(q))
+        off = float(np.abs(points - goals).max())
+        limits = self.robot.joint_limits
+        past = np.maximum(q[6:] - limits[:, 1], limits[:, 0] - q[6:])
+        if off > UPRIGHT_REACH or past.max() > 0.0:
+            joint = self.robot.joints[int(past.argmax())].name
+            why = (
+                f"{joint} would pass its limit" if past.max() > 0.0 else "a foot does not reach it"
+            )
+            ahead, left = np.degrees(place.slope)
+            raise PlanError(
+                f"{self.robot.name} cannot stand upright on ground that rises by {ahead:.4g} deg "
+                f"along x and {left:.4g} deg along y: {why}; ask for a smaller slope",
+                family="stance", violation=max(off, float(past.max())),
+            )  # fmt: skip
+        footholds = level.footholds - level.points + points
+        return Stance(q, points, self._body.com(pose_of(q)), place.heading, footholds, place.slope)
+
+    def _on_points(self, q: Array, goals: Array) -> Array:
+        """The coordinates with joints for which the contact points are at those places."""
+        q = q.copy()
+        for _ in range(LEG_STEPS):
+            points, jacobian = self._body.contact_jacobians(pose_of(q))
+            error = (goals - points).ravel()
+            if np.abs(error).max() < REACHED:
+                break
+            step = np.linalg.lstsq(jacobian[:, 6:], error, rcond=1e-6)[0]
+            q[6:] += step * min(1.0, 0.3 / max(np.abs(step).max(), 1e-12))
+        return q
 
     def place(
         self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
@@ -138,11 +201,7 @@ def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
     found = []
     for number, place in enumerate(places):
         angles = last if number == len(places) - 1 else first
-        stance = finder.place(
-            np.array([angles[name] for name in names]),
-            heading=place.heading,
-            at=(place.x, place.y, place.z),
-        )
+        stance = finder.on_ground(np.array([angles[name] for name in names]), place)
         turned = stance.coordinates.copy()
         turned[3] += place.turned
         found.append(replace(stance, coordinates=turned))

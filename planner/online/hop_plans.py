@@ -16,9 +16,9 @@ from ..task.plan import PlannedJump
 from .plan_samples import PlanSamples, read_samples
 
 
-def samples_path(robot: str) -> Path:
-    """Where the plans of hops of a robot ship."""
-    return SHIPPED / "hops" / f"{robot}.npz"
+def samples_path(robot: str, *, steps: bool = False) -> Path:
+    """Where the plans of hops of a robot ship: those on level ground, or those up and down."""
+    return SHIPPED / "hops" / f"{robot}{'_steps' if steps else ''}.npz"
 
 
 def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
@@ -26,7 +26,8 @@ def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
     path = samples_path(robot.name)
     if path.is_file():
         return
-    there = sorted(file.stem for file in path.parent.glob("*.npz"))
+    names = (file.stem for file in path.parent.glob("*.npz"))
+    there = sorted(name for name in names if not name.endswith("_steps"))
     yield UnmetRequirement(
         f"there are no stored plans of hops for {robot.name}",
         expected=f"a robot with such plans: {', '.join(there)}",
@@ -36,13 +37,13 @@ def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
 
 
 @lru_cache(maxsize=4)
-def shipped_samples(robot: str) -> PlanSamples:
-    """The plans of hops of a robot.
+def shipped_samples(robot: str, *, steps: bool = False) -> PlanSamples:
+    """The plans of hops of a robot on level ground, or of those up and down.
 
     Raises:
         PlanFileError: there are none, or the file is broken.
     """
-    return read_samples(samples_path(robot))
+    return read_samples(samples_path(robot, steps=steps))
 
 
 def hop_table(plan: PlannedJump, robot: RobotDescription) -> JumpTable:

@@ -1,13 +1,15 @@
 """Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples``.
 
-Hops are spread evenly over all requests by a Halton sequence, half of them ahead and half of them back. They are
-solved from the shortest to the longest, each from the nearest of those before it or from nothing; those
-without a valid plan are left out. It takes five minutes of one core.
+Hops are spread evenly over all requests by a Halton sequence. On level ground half of them go ahead and half
+back. They are solved from the shortest to the longest, each from the nearest of those before it or from nothing. Those up and
+down all go ahead, and are solved in the same way, the first from its neighbour on level ground. Those without a
+valid plan are left out. Either takes five minutes of one core.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,14 +19,16 @@ from ..solving.solve import solve_jump
 from ..task.files import PlanError
 from ..task.plan import PlannedJump
 from .hop_plans import samples_path
-from .hop_request import REACH, HopRequest, coarse, task_of
-from .plan_samples import PlanSamples, differences, samples_of, write_samples
+from .hop_request import REACH, STEP_REACH, HopRequest, coarse, task_of
+from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
 
 COUNT = 96
 """Requests that are tried."""
 MARGIN = 1.08
 """How much further than the reach they go, so that requests at its edge lie between them."""
-BASES = (2, 3, 5)
+STEPPED = 80
+"""The same of jumps up and down."""
+BASES = (2, 3, 5, 7)
 STILL = HopRequest(0.0, 0.0, 0.0)
 
 
@@ -40,7 +44,7 @@ def halton(index: int, base: int) -> float:
 
 def request(index: int) -> HopRequest:
     """A request of the sequence."""
-    distance, direction, turn = (halton(index // 2 + 1, base) for base in BASES)
+    distance, direction, turn = (halton(index // 2 + 1, base) for base in BASES[:3])
     radius, angle = MARGIN * math.sqrt(distance), math.pi * (direction - 0.5)
     along = REACH["ahead"] if index % 2 == 0 else -REACH["back"]
     return HopRequest(
@@ -50,21 +54,48 @@ def request(index: int) -> HopRequest:
     )
 
 
+def step_request(index: int) -> HopRequest:
+    """A request of the sequence of jumps up and down."""
+    distance, aside, turn, up = (2.0 * halton(index + 1, base) - 1.0 for base in BASES)
+    r = STEP_REACH
+    middle, half = 0.5 * (r["ahead"] + r["least"]), 0.5 * (r["ahead"] - r["least"])
+    return HopRequest(
+        round(middle + MARGIN * half * distance, 4), round(MARGIN * r["aside"] * aside, 4),
+        round(MARGIN * r["turn"] * turn, 4), round(MARGIN * r["up"] * up, 4),
+    )  # fmt: skip
+
+
 def find_samples(robot: RobotDescription, count: int = COUNT) -> PlanSamples:
-    """Plan them all."""
-    asked: list[HopRequest] = []
-    plans: list[PlannedJump] = []
-    for wanted in sorted((STILL, *map(request, range(count))), key=lambda one: apart(one, STILL)):
+    """Plan those on level ground."""
+    return _find(robot, (STILL, *map(request, range(count))), [], [])
+
+
+def find_steps(robot: RobotDescription, level: PlanSamples, count: int = STEPPED) -> PlanSamples:
+    """Plan those up and down, the first from its neighbour on level ground."""
+    rows = range(len(level.requests))
+    near = [HopRequest(*level.requests[row].tolist()) for row in rows]
+    wanted = tuple(one for one in map(step_request, range(count)) if not one.level)
+    return _find(robot, wanted, near, [level.plan(row) for row in rows])
+
+
+def _find(
+    robot: RobotDescription, requests: Sequence[HopRequest], near: Sequence[HopRequest],
+    there: Sequence[PlannedJump],
+) -> PlanSamples:  # fmt: skip
+    """Plan all requests, from plans that are there and from each other."""
+    asked, plans = [*near], [*there]
+    for wanted in sorted(requests, key=lambda one: apart(one, STILL)):
         found = _plan(wanted, robot, _nearest(wanted, asked, plans))
         if found is not None:
             asked.append(wanted)
             plans.append(found)
-    return samples_of(robot.name, plans, asked)
+    own = slice(len(near), None)
+    return samples_of(robot.name, plans[own], asked[own])
 
 
 def apart(one: HopRequest, other: HopRequest) -> float:
     """The distance between two requests, in units of ``SCALES``."""
-    return math.hypot(*differences(np.array(one), other).tolist())
+    return math.hypot(*((np.array(one) - np.array(other)) / SCALES).tolist())
 
 
 def _nearest(
@@ -98,4 +129,7 @@ def _plan(
 
 
 if __name__ == "__main__":
-    print(write_samples(samples_path("bruce"), find_samples(find_robot("bruce"))))
+    ROBOT = find_robot("bruce")
+    ON_LEVEL = find_samples(ROBOT)
+    print(write_samples(samples_path(ROBOT.name), ON_LEVEL))
+    print(write_samples(samples_path(ROBOT.name, steps=True), find_steps(ROBOT, ON_LEVEL)))

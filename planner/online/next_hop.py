@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from ...blocks.signals import PlanOutcome
@@ -43,15 +44,20 @@ class HopPlan:
 class HopPlanner:
     """Plans hops of one robot; each plan follows from its request alone."""
 
-    def __init__(self, robot: RobotDescription, samples: PlanSamples) -> None:
+    def __init__(self, robot: RobotDescription, samples: PlanSamples, steps: PlanSamples) -> None:
         self.robot = robot
-        self.samples = samples
+        self._level, self._steps = samples, steps
         self._correctors: dict[object, Corrector] = {}
 
     def prepare(self) -> None:
         """Load compiled functions and make the correctors, so that no later plan has to wait for them."""
-        for ahead in (0.0, -0.05):  # feet land in another way after a jump back
-            self.plan(HopRequest(ahead, 0.0, 0.0))
+        # Feet land in another way after a jump back; a step up has other bounds than one down.
+        for ahead, up in ((0.0, 0.0), (-0.05, 0.0), (0.2, 0.03), (0.2, -0.03)):
+            self.plan(HopRequest(ahead, 0.0, 0.0, up))
+
+    def samples(self, wanted: HopRequest) -> PlanSamples:
+        """The stored plans of jumps of its kind."""
+        return self._level if wanted.level else self._steps
 
     def plan(self, wanted: HopRequest) -> HopPlan:
         """The plan of a request, or of what is nearest to it."""
@@ -77,9 +83,10 @@ class HopPlanner:
         solve_s: float,
         check_s: float,
     ) -> HopPlan:
-        row = self.samples.nearest(wanted)
-        done = HopRequest(*self.samples.requests[row].tolist())
-        stored = self.samples.plan(row)
+        samples = self.samples(wanted)
+        row = samples.nearest(wanted)
+        done = HopRequest(*samples.requests[row].tolist())
+        stored = samples.plan(row)
         plan = replace(stored, task=coarse(stored.task.resolved(self.robot)))
         return HopPlan(plan, done, outcome, steps, failed, solve_s, check_s)
 
@@ -88,16 +95,24 @@ class HopPlanner:
         started = time.process_time()
         task = coarse(task_of(wanted, self.robot.name).resolved(self.robot))
         problem = make_problem(task, self.robot, coordinates="full")
-        near = self.samples.interpolated(wanted)
-        if not can_start(problem, near):
-            return None, 0, time.process_time() - started
-        guess = pack(problem, near, ballistic_guess(problem))
-        found = self._corrector(problem).correct(problem, guess)
-        plan = None
-        if found.solved:
-            plan = PlannedJump(task=task, **unpack(problem, found.values))
-            plan = replace(plan, statistics={"coordinates": "full"})
-        return plan, found.steps, time.process_time() - started
+        plan, steps = None, 0
+        for near in self._guesses(wanted):
+            if not can_start(problem, near):
+                continue
+            guess = pack(problem, near, ballistic_guess(problem))
+            found = self._corrector(problem).correct(problem, guess)
+            steps += found.steps
+            if found.solved:
+                plan = PlannedJump(task=task, **unpack(problem, found.values))
+                plan = replace(plan, statistics={"coordinates": "full"})
+                break
+        return plan, steps, time.process_time() - started
+
+    def _guesses(self, wanted: HopRequest) -> Iterator[PlannedJump]:
+        """Motions near that of a request: between the stored plans, and where that leads to none the nearest of them."""
+        samples = self.samples(wanted)
+        yield samples.interpolated(wanted)
+        yield samples.plan(samples.nearest(wanted))
 
     def _corrector(self, problem: FullProblem) -> Corrector:
         key = problem.assembly.signature

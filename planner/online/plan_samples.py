@@ -24,8 +24,8 @@ from ..task.files import write_whole
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
 from .hop_request import HopRequest, task_of, within_reach
 
-FILE_FORMAT = "aloft hop plans 1"
-SCALES = np.array([0.1, 0.1, 0.4])
+FILE_FORMAT = "aloft hop plans 2"
+SCALES = np.array([0.1, 0.1, 0.4, 0.05])
 """What difference of each part of a request counts as a distance of 1."""
 NEAR = 0.3
 """Within this distance plans count alike."""
@@ -34,11 +34,11 @@ KEPT_EXACTLY = ("contact", "phase")
 
 @dataclass(frozen=True)
 class PlanSamples:
-    """Valid plans of one robot.
+    """Valid plans of one robot, all on level ground, or all up or down.
 
     Attributes:
         robot: its name.
-        requests: (n, 3), one row a plan in the order of ``HopRequest``.
+        requests: (n, 4), one row a plan in the order of ``HopRequest``.
         arrays: those of ``PlannedJump``, each with a first axis of n.
         flights: lift-off and touchdown [s], (n, 2).
     """
@@ -55,9 +55,11 @@ class PlanSamples:
         square = (apart * apart).sum(axis=1)
         alike = (self.requests[:, 0] < 0.0) == (wanted.ahead < 0.0)
         trust = alike / (square + NEAR * NEAR) ** 3
-        # w = trust (a + b . apart) with sum w = 1 and sum w apart = 0.
-        basis = np.concatenate([np.ones((len(apart), 1)), apart], axis=1)
-        goal = np.array([1.0, 0.0, 0.0, 0.0])
+        # w = trust (a + b . apart) with sum w = 1 and sum w apart = 0, for what differs among the plans.
+        varied = apart[:, np.ptp(self.requests, axis=0) > 0.0]
+        basis = np.concatenate([np.ones((len(apart), 1)), varied], axis=1)
+        goal = np.zeros(basis.shape[1])
+        goal[0] = 1.0
         solve_positive(product((basis * trust[:, None]).T, basis), goal)
         return np.asarray(trust * (basis * goal).sum(axis=1))
 
@@ -100,8 +102,10 @@ class PlanSamples:
 
 
 def differences(requests: Array, wanted: HopRequest) -> Array:
-    """What requests (..., 3) differ from the wanted one by, in units of ``SCALES``."""
-    return np.asarray((requests - np.array(wanted)) / SCALES)
+    """What requests (..., 4) differ from the wanted one by, in units of ``SCALES``."""
+    # A difference of height that no plan is made for is no distance between plans on level ground.
+    other = np.array(wanted if not wanted.level else (*wanted[:3], 0.0))
+    return np.asarray((requests - other) / SCALES)
 
 
 def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:

@@ -18,7 +18,7 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
-from ..task.sequence import Hop
+from ..task.sequence import Hop, StanceLocation, step_of
 from .layout import ProblemPhase
 
 Vector3 = tuple[float, float, float]
@@ -81,16 +81,22 @@ def heights_above_step(
 ) -> list[Any]:
     """Heights of ``obstacle_points``, less their radii, above ground that changes by ``step`` at
     ``edge`` on the way ``onwards`` (+1 or -1); within ``early`` of the edge, and a point's radius,
-    the higher ground still, or already, counts for all but 0.25 % of the step."""
+    the higher ground still, or already, counts for all but 0.25 % of the step. Ground that leans, and
+    its step, are planes, and ``higher`` says which side is the higher one."""
     import casadi as ca
 
     frames = model.frames(coordinates.expand(q), coordinates.limbs)
     rows = []
-    higher = ca.sign(w["step"])
+    higher = w["higher"] if "higher" in w else ca.sign(w["step"])
     for _, point, radius in obstacle_points(model, coordinates):
         place = model.point(frames, *point)
         way = w["onwards"] * (place[0] - w["edge"]) + higher * (w["early"] + radius)
         whole = 0.5 * (1.0 + ca.tanh(3.0 * way / w["early"]))
+        if "higher" in w:
+            here = ca.vertcat(1.0, place[:2])
+            below = ca.dot(w["ground"], here) + ca.dot(w["step"], here) * whole
+            rows.append(place[2] - radius - below)
+            continue
         rows.append(place[2] - radius - w["ground"] - w["step"] * whole)
     return rows
 
@@ -117,7 +123,7 @@ class ObstacleRows:
         if self._knees_fold and not stretch.flies and not turns:
             # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
             return self._folding
-        landed = not stretch.flies and stretch.place > 0 and bool(hop.landing_height)
+        landed = not stretch.flies and stretch.place > 0 and edge is not None
         if edge is None and not turns:
             return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
@@ -128,11 +134,23 @@ class ObstacleRows:
         return np.concatenate([self._of_kind[kind] for kind in kinds])
 
 
-def step_parameters(hop: Hop, edge: float | None, ground: float, share: float) -> dict[str, float]:
-    """The piece's parameters where a jump begins at a height of ``ground``. With no edge the ground
-    changes its height in the middle of the flight; ``share`` of its time is past."""
-    step = hop.landing_height or 0.0
+def step_parameters(
+    hop: Hop, edge: float | None, start: StanceLocation, end: StanceLocation, share: float,
+    leans: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """The piece's parameters under a jump from ``start`` to ``end``. With no edge the ground changes
+    in the middle of the flight; ``share`` of its time is past. Planes if it ``leans``."""
+    ground, step = start.z, hop.landing_height or 0.0
     onwards = 1.0 if (hop.distance_x or 0.0) >= 0.0 else -1.0
+    if leans:
+        before, after = np.array(start.plane), np.array(end.plane)
+        planes = {"ground": before, "step": after - before}
+        if edge is None:
+            planes = {"ground": after if share >= 0.5 else before, "step": np.zeros(3)}
+        return {
+            **planes, "edge": edge or 0.0, "onwards": onwards, "early": ROUNDING,
+            "higher": 1.0 if step_of(hop, start) > 0.0 else -1.0,
+        }  # fmt: skip
     if edge is None:
         ground, step, edge = ground + (step if share >= 0.5 else 0.0), 0.0, 0.0
     return {"ground": ground, "step": step, "edge": edge, "onwards": onwards, "early": ROUNDING}

@@ -20,6 +20,7 @@ from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
+from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
@@ -114,7 +115,8 @@ class ProblemBuilder:
         self.structure = Structure(task, model, coordinates, pieces, stances)
         self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
         self.stances, self.hops = self.structure.stances, self.structure.hops
-        self.margins = task.margins or Margins()
+        self.margins, self.leans = task.margins or Margins(), task.leans
+        self.sizes = parameter_sizes(coordinates, self.leans)
         self.n, self.m = coordinates.size, len(coordinates.joints)
         self.forces = coordinates.forces
         self.steps = np.concatenate(
@@ -223,7 +225,7 @@ class ProblemBuilder:
 
     def _set(self, name: str, k: int, **values: Any) -> None:
         start = self.assembly.parameter_start[name, k]
-        for key, size in parameter_sizes(self.coordinates)[name].items():
+        for key, size in self.sizes[name].items():
             if key in values:
                 self.parameters[start : start + size] = values[key]
             start += size
@@ -290,11 +292,17 @@ class ProblemBuilder:
         self._set(
             stretch.piece, k, step=self.steps[k], share=self.steps[k],
             force=weights.force * share, friction=self.task.friction / np.sqrt(2.0),
-            pressure=self.margins.pressure, **self._interval(k),
+            pressure=self.margins.pressure, **self._interval(k), **self._axes(stretch),
         )  # fmt: skip
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
         pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
         self._rows(stretch.piece, k, [base, *self._motor_rows(k), self._cones(), pressure])
+
+    def _axes(self, stretch: ProblemPhase, heading: float = 0.0) -> dict[str, Array]:
+        """The parameter of a piece on ground that leans: the axes of forces, and of feet where these
+        have that heading."""
+        axes = ground_axes(self.stances[stretch.place].slope, heading)
+        return {"axes": axes.ravel(order="F")} if self.leans else {}
 
     def _cones(self) -> Rows:
         cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
@@ -304,7 +312,7 @@ class ProblemBuilder:
         top = self._top_speed(k)
         self._set(
             "impact", k, impulse=self.task.weights.impulse,
-            friction=self.task.friction / np.sqrt(2.0),
+            friction=self.task.friction / np.sqrt(2.0), **self._axes(self.of_knot[k]),
         )  # fmt: skip
         balance = ("impact", self.n, 0.0, 0.0)
         speeds = rows_of_each("motor speed", -top, top)
@@ -320,7 +328,9 @@ class ProblemBuilder:
         stance = self.stances[stretch.place]
         places = stance.footholds[list(self.coordinates.contacts)].ravel()
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
-        self._set("contact", k, place=places, heading=heading)
+        self._set(
+            "contact", k, place=places, heading=heading, **self._axes(stretch, stance.heading)
+        )
         feet = self.pieces["contact"].rows // 2
         speeds = [("foot velocity", feet, 0.0, 0.0)]
         if stretch.impact:  # hits the ground from above
@@ -334,7 +344,8 @@ class ProblemBuilder:
         hop, place, edge = self.structure.hop_at(k)
         stretch, obstacles = self.structure.phase_at(k), self.structure.obstacles
         share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
-        self._set("obstacle", k, **step_parameters(hop, edge, place.z, share))
+        end = self.structure.places[min(stretch.place + 1, len(self.hops))]
+        self._set("obstacle", k, **step_parameters(hop, edge, place, end, share, self.leans))
         floor = self.task.foot_clearance * np.sin(np.pi * share)
         apart = BODY_CLEARANCE if self.margins.step is None else self.margins.step
         self._rows("obstacle", k, [
@@ -359,7 +370,9 @@ class ProblemBuilder:
         it is under them, and at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the
         flight's time, also on the lower side of the edge."""
         task, points = self.task, body_points(self.model, self.coordinates)
-        n_feet, low = len(self.coordinates.contacts), self.structure.places[self.of_knot[k].place].z
+        n_feet, place = len(self.coordinates.contacts), self.of_knot[k].place
+        here = self.structure.places[place]
+        low = self._ground_of_air(k, here) if self.leans else here.z
         if not self.of_knot[k].flies:
             self._rows("air", k, [("ground clearance", len(points), low, np.inf),
                                   ("ground clearance", 2 * len(points), -np.inf, np.inf)])  # fmt: skip
@@ -367,11 +380,15 @@ class ProblemBuilder:
         share = self.structure.flight_share(k)
         step, edge = self.structure.step_under(k)
         higher, lower_side = self.structure.over_step(k)
-        ground = low + (max(step, 0.0) if higher else min(step, 0.0))
+        if self.leans:
+            behind = higher is (step > 0.0)
+            ground = self._ground_of_air(k, self.structure.places[place + 1] if behind else here)
+        else:
+            ground = low + (max(step, 0.0) if higher else min(step, 0.0))
         floor = ground + task.foot_clearance * np.sin(np.pi * share)
         ahead = (-np.inf, np.inf)
         if lower_side and edge is not None:
-            forward = (self.hops[self.of_knot[k].place].distance_x or 0.0) > 0.0
+            forward = (self.hops[place].distance_x or 0.0) > 0.0
             apart = self.margins.step or 0.0
             ahead = (-np.inf, edge - apart) if (step > 0.0) is forward else (edge + apart, np.inf)
         free = ("ground clearance", len(points) - n_feet, -np.inf, np.inf)
@@ -383,3 +400,8 @@ class ProblemBuilder:
             *(("leg clearance", 1, 0.5 * task.leg_clearance if side else -np.inf, np.inf)
               for _, _, side in points),
         ])  # fmt: skip
+
+    def _ground_of_air(self, k: int, place: StanceLocation) -> float:
+        """Let the piece's heights count from the ground under a place; that height is 0 then."""
+        self._set("air", k, ground=np.array(place.plane))
+        return 0.0

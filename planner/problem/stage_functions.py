@@ -23,6 +23,10 @@ reduced coordinates of ``Coordinates``:
 ``obstacle`` z = q.             Rows: how high the points of ``obstacle_points`` are above ground
             with a step, rounded, less their radii.
 
+On ground that leans the same pieces, ``sloped_stance`` and so on, have its axes or its plane among their
+parameters. Forces and impulses are then along these axes, the last one normal to the ground, and so are
+place errors; heights are above the planes.
+
 Over an interval of h seconds accelerations are constant: v+ = v + h a, q+ = q + h v + h^2 a / 2, and
 on the ground the dynamics hold in its middle (second order). Gap rows hold minus the next state. ``w`` is named
 by ``Parameters``. Not modelled: friction in the joints and the rotors' gyroscopic moment.
@@ -216,6 +220,9 @@ DRIFT_RATE = 10.0
 """1/s, how fast the place error of a foot on the ground dies out."""
 
 PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air", "obstacle")
+SLOPED = "sloped_"
+"""Before the names of these pieces where the ground leans."""
+SLOPED_PIECES = ("stance", "free_stance", "impact", "contact", "air", "obstacle")
 
 
 @dataclass(frozen=True)
@@ -233,14 +240,18 @@ class StageFunction:
         return int(self.value.size1_out(1))
 
 
-def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
-    """The parameters ``w`` of every piece: name -> size, in order."""
+def parameter_sizes(coordinates: Coordinates, sloped: bool = False) -> dict[str, dict[str, int]]:
+    """The parameters ``w`` of every piece, or of those for ``sloped`` ground: name -> size, in order.
+
+    ``axes`` are columns of the ground's axes, of the ``contact`` piece along and across the feet.
+    Planes are c0, c1, c2 of heights c0 + c1 x + c2 y.
+    """
     n, joints = coordinates.size, len(coordinates.joints)
     contacts = len(coordinates.contacts)
     interval = {
         "nominal": n, "posture": n, "velocity": n, "acceleration": n, "slope": joints,
     }  # fmt: skip
-    return {
+    level = {
         "stance": {"step": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
         "free_stance": {"share": 1, "friction": 1, "force": 1, "pressure": 1, **interval},
         "flight": {"share": 1, **interval},
@@ -249,6 +260,14 @@ def parameter_sizes(coordinates: Coordinates) -> dict[str, dict[str, int]]:
         "take_off": {},
         "air": {},
         "obstacle": {"ground": 1, "step": 1, "edge": 1, "onwards": 1, "early": 1},
+    }
+    if not sloped:
+        return level
+    more = {name: {"axes": 9} for name in ("stance", "free_stance", "impact")}
+    return {name: sizes | more.get(name, {}) for name, sizes in level.items()} | {
+        "contact": {"place": 3 * contacts, "heading": 2, "axes": 9},
+        "air": {"ground": 3},
+        "obstacle": {"ground": 3, "step": 3, "edge": 1, "onwards": 1, "early": 1, "higher": 1},
     }
 
 
@@ -279,7 +298,8 @@ def piece_expressions(
     import casadi as ca
 
     lift = IntermediateExpressions() if lifted is None else lifted
-    sizes = parameter_sizes(coordinates)[name]
+    sloped, name = name.startswith(SLOPED), name.removeprefix(SLOPED)
+    sizes = parameter_sizes(coordinates, sloped)[name]
     w = {key: ca.SX.sym(key, size) for key, size in sizes.items()}
     q, v = ca.SX.sym("q", coordinates.size), ca.SX.sym("v", coordinates.size)
     cost: Any = ca.SX(0)
@@ -290,14 +310,14 @@ def piece_expressions(
     elif name == "impact":
         z, cost, rows = _impact(model, coordinates, q, v, w)
     elif name == "contact":
-        errors = _place_errors(model, coordinates, q, w["place"], w["heading"])
+        errors = _place_errors(model, coordinates, q, w)
         rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
     elif name == "take_off":
         whole = centroidal_momentum(model, coordinates.expand(q), coordinates.expand(v))
         rise = whole.linear[2] / model.robot.total_mass
         rows = [whole.com[2] + rise * rise / (2.0 * GRAVITY), rise, whole.angular]
     elif name == "air":
-        z, rows = [q], _air_rows(model, coordinates, q)
+        z, rows = [q], _air_rows(model, coordinates, q, w)
     else:
         z, rows = [q], heights_above_step(model, coordinates, q, w)
     rows_of_all = ca.vertcat(*rows)
@@ -331,7 +351,7 @@ def _interval(
         half_q, half_v = lift(half_q), lift(half_v)
     all_forces: Any = ca.mtimes(ca.DM(coordinates.force_matrix), F) if forces else None
     named = {
-        model.robot.contacts[c].name: all_forces[3 * c : 3 * c + 3]
+        model.robot.contacts[c].name: _in_world(all_forces[3 * c : 3 * c + 3], w)
         for c in coordinates.contacts
         if forces
     }
@@ -379,11 +399,18 @@ def _impact(
     pushes = ca.mtimes(ca.DM(coordinates.force_matrix), F)
     rows = [
         -q, -(v + change),
-        _impulse_balance(model, coordinates, q, change, pushes),
+        _impulse_balance(model, coordinates, q, change, pushes, w),
         _motor_speeds(model, coordinates, v),
         *_cones(coordinates, pushes, w["friction"]),
     ]  # fmt: skip
     return [q, v, change, F], w["impulse"] * ca.dot(F, F), rows
+
+
+def _in_world(force: Any, w: Mapping[str, Any]) -> Any:
+    """A force along the ground's axes in the world."""
+    import casadi as ca
+
+    return ca.mtimes(ca.reshape(w["axes"], 3, 3), force) if "axes" in w else force
 
 
 def _motor_speeds(model: SymbolicModel, coordinates: Coordinates, velocity: Any) -> Any:
@@ -419,14 +446,15 @@ def _pressures(
 
 
 def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
-                     impulses: Any) -> Any:  # fmt: skip
+                     impulses: Any, w: Mapping[str, Any]) -> Any:  # fmt: skip
     """M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a
     mirrored motion are held."""
     import casadi as ca
 
     still = ca.SX.zeros(model.size)
     named = {
-        model.robot.contacts[c].name: impulses[3 * c : 3 * c + 3] for c in coordinates.contacts
+        model.robot.contacts[c].name: _in_world(impulses[3 * c : 3 * c + 3], w)
+        for c in coordinates.contacts
     }
     sums = []
     # Gravity has no impulse: what holds the robot at rest is taken off again.
@@ -469,16 +497,21 @@ def derived(
     )
 
 
-def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place: Any, heading: Any
+def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
                   ) -> Any:  # fmt: skip
-    """Of every contact point its error along and across the foot and upwards, in the heading that
-    the foot stands with."""
+    """Of every contact point its error along and across the foot and upwards, or normal to the
+    ground, in the heading that the foot stands with."""
     import casadi as ca
 
+    place, heading = w["place"], w["heading"]
+    axes = ca.vertsplit(ca.reshape(w["axes"], 3, 3).T) if "axes" in w else None
     points = model.footholds(coordinates.expand(q), coordinates.limbs, heading)
     errors = []
     for i in range(len(coordinates.contacts)):
         off = points[i] - place[3 * i : 3 * i + 3]
+        if axes is not None:
+            errors += [ca.mtimes(axes[axis], off) for axis in coordinates.axes]
+            continue
         along = heading[0] * off[0] + heading[1] * off[1]
         across = heading[0] * off[1] - heading[1] * off[0]
         sideways = [across] if 1 in coordinates.axes else []
@@ -486,7 +519,9 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, place:
     return ca.vertcat(*errors)
 
 
-def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any) -> list[Any]:
+def _air_rows(
+    model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
+) -> list[Any]:
     """Heights, distances ahead and sides of the points."""
     import casadi as ca
 
@@ -495,7 +530,10 @@ def _air_rows(model: SymbolicModel, coordinates: Coordinates, q: Any) -> list[An
     left = base_rotation(whole[3:6])[:, 1]
     points = body_points(model, coordinates)
     places = [model.point(frames, *point) for point, _, _ in points]
-    heights = [place[2] - radius for place, (_, radius, _) in zip(places, points, strict=True)]
+    heights = [
+        place[2] - radius - (ca.dot(w["ground"], ca.vertcat(1.0, place[:2])) if w else 0.0)
+        for place, (_, radius, _) in zip(places, points, strict=True)
+    ]
     sides = [
         sign * ca.dot(left, place - whole[0:3]) - radius
         for place, (_, radius, sign) in zip(places, points, strict=True)

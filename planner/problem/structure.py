@@ -24,7 +24,7 @@ from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
-from ..task.sequence import Hop, StanceLocation, edge_of
+from ..task.sequence import Hop, StanceLocation, edge_of, ground_axes, step_of
 from ..task.task import JumpTask
 from .assembly import Knot
 from .layout import ProblemPhase, layout
@@ -130,10 +130,8 @@ must be drawn up to the falling body first, and then stretched at once."""
 
 
 def _along_feet(stance: Stance) -> Array:
-    """The contact points of a stance in axes along its heading, across it and upwards."""
-    cosine, sine = np.cos(stance.heading), np.sin(stance.heading)
-    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(stance.points @ turn.T)
+    """The contact points of a stance in axes along its heading, across it and normal to the ground."""
+    return np.asarray(stance.points @ ground_axes(stance.slope, stance.heading))
 
 
 class Structure:
@@ -325,7 +323,7 @@ class Structure:
         """The step's height and its edge under a flight."""
         place = self.of_knot[k].place
         hop = self.hops[place]
-        return hop.landing_height or 0.0, edge_of(hop, self.places[place])
+        return step_of(hop, self.places[place]), edge_of(hop, self.places[place])
 
     def over_step(self, k: int) -> tuple[bool, bool]:
         """Of a flight's knot whether feet are above the higher ground there, and whether they are

@@ -14,6 +14,7 @@ from ...mathematics.arrays import Array
 from ..models.euler_angles import coordinates_of, pose_of, twist_of
 from ..models.symbolic_model import SymbolicModel, centroidal_momentum
 from ..task.plan import PlannedJump
+from ..task.sequence import LEVEL, ground_axes
 from .problem import FullProblem
 
 Phases = Sequence[int]
@@ -101,6 +102,7 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
                 pushed = values[control + n : control + n + coordinates.forces]
                 force[k] = coordinates.force_matrix @ pushed
                 force[k].reshape(-1, 3)[~grounded[k]] = 0.0
+                _turn_forces(problem, k, force[k], to_world=True)
     phases = [int(phase) for phase in problem.phases]
     for array in (bend, force, grounded):
         array[-1] = array[-2]
@@ -131,6 +133,15 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
         "touchdown_time": flights[0][1],
         "later_flights": tuple(flights[1:]),
     }
+
+
+def _turn_forces(problem: FullProblem, k: int, force: Array, *, to_world: bool) -> None:
+    """Turn the forces at a knot (3 n_contacts) from the axes of the ground that it stands on to the
+    world's, or back, in place."""
+    slope = problem.stances[problem.stretch_at(k).place].slope
+    if slope != LEVEL:
+        axes = ground_axes(slope)
+        force[:] = (force.reshape(-1, 3) @ (axes.T if to_world else axes)).ravel()
 
 
 def _middles_in_flight(
@@ -190,6 +201,9 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
     means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
     values = guess.copy()
     place, rate = coordinates.reduce(q), coordinates.reduce(v)
+    force = force.copy()
+    for k in range(len(force)):
+        _turn_forces(problem, k, force[k], to_world=False)
     pushes = coordinates.reduce_forces(force)
     for k in range(problem.knots):
         start, control = assembly.state_start[k], assembly.control_start[k]

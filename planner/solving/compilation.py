@@ -35,6 +35,9 @@ OPTIMISED = ("stance", "free_stance", "contact")
 """The pieces of most knots. Others are compiled without optimisation, which takes a fifth of the time:
 their functions are long and have no loops, so the compiler spends it on assigning registers. Results are
 the same."""
+LONG = 75_000
+"""A piece of so many instructions is not optimised in any case: it would take a minute, because the time for
+registers grows faster than their number."""
 
 SOURCES = (
     "models/symbolic_model.py",
@@ -209,7 +212,8 @@ def _compile(compiler: str, piece: StageFunction, library: Path) -> bool:
             for kind in KINDS:
                 generator.add(getattr(piece, kind))
             generator.generate(f"{made.parent}/")
-            flags = () if library.stem in OPTIMISED else ("-O0",)
+            short = sum(getattr(piece, kind).n_instructions() for kind in KINDS) < LONG
+            flags = () if short and library.stem in OPTIMISED else ("-O0",)
             run_compiler(compiler, made.with_suffix(".c"), made, *flags)
     except (OSError, subprocess.CalledProcessError):
         return False

@@ -27,13 +27,13 @@ from ..models.symbolic_model import SymbolicModel
 from ..problem.guess import USUAL_TIMES, ballistic_guess, displaced_guess
 from ..problem.layout import ProblemPhase, layout
 from ..problem.problem import FullProblem, ProblemBuilder
-from ..problem.stage_functions import PIECES, make_coordinates
+from ..problem.stage_functions import PIECES, SLOPED, SLOPED_PIECES, make_coordinates
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
 from ..task.files import JumpTaskError, PlanError
 from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
-from ..task.sequence import PHASES
+from ..task.sequence import PHASES, Hop
 from ..task.task import JumpTask, Knots
 from .compilation import Progress, SolveOptions, load_pieces
 from .outcome import failure, for_all_joints, for_moving_joints, versions
@@ -199,6 +199,12 @@ def solve_jump(
         task = task.resolved(robot)
     except JumpTaskError as error:
         raise PlanError(str(error), family="motor torque") from error
+    if task.leans and task.formulation != "full":
+        raise PlanError(
+            f"formulation {task.formulation} knows level ground only; use formulation: full, or a "
+            "task without slopes",
+            family="stance",
+        )
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
     start = warm_start and for_moving_joints(warm_start, part)
@@ -317,7 +323,10 @@ def make_problem(
         return make_problem(given, robot, compiled=compiled, progress=progress)
     used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
-    pieces = load_pieces(model, chosen, names=names, compiled=compiled, progress=progress)
+    if task.leans:
+        names = tuple(SLOPED + name if name in SLOPED_PIECES else name for name in names)
+    loaded = load_pieces(model, chosen, names=names, compiled=compiled, progress=progress)
+    pieces = {name.removeprefix(SLOPED): piece for name, piece in loaded.items()}
     return ProblemBuilder(task, model, chosen, pieces, stances, exact).build()
 
 
@@ -374,10 +383,19 @@ def with_times(task: JumpTask, times: list[float]) -> JumpTask:
 
 
 def straight_ahead(task: JumpTask) -> JumpTask:
-    """The same jumps without their sideways displacements and twists."""
-    ahead = {"distance_y": 0.0, "twist": 0.0}
-    jumps = task.jumps and tuple(hop.model_copy(update=ahead) for hop in task.jumps)
-    return task.model_copy(update={**ahead, "jumps": jumps})
+    """The same jumps without their sideways displacements and twists, on ground that does not lean
+    sideways."""
+
+    def changed(jump: JumpTask | Hop) -> dict[str, object]:
+        slopes = {
+            name: (slope[0], 0.0)
+            for name in ("slope", "landing_slope")
+            if (slope := getattr(jump, name, None)) is not None
+        }
+        return {"distance_y": 0.0, "twist": 0.0, **slopes}
+
+    jumps = task.jumps and tuple(hop.model_copy(update=changed(hop)) for hop in task.jumps)
+    return task.model_copy(update={**changed(task), "jumps": jumps})
 
 
 def _barrier(problem: FullProblem) -> float:

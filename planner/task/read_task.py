@@ -105,11 +105,17 @@ def describe_task(task: JumpTask) -> str:
         (task.distance_y, "to the left", "to the right"),
         (task.landing_height, "up", "down"),
     )
+    leaning = (("on", task.slope), ("onto", task.landing_slope))
     told += [f"{_cm(abs(value))} {plus if value > 0 else minus}" for value, plus, minus in pairs
              if value]  # fmt: skip
     for angle, what in ((task.twist, "turned"), (task.rotation, "over")):
         if angle:
             told.append(f"{what} {math.degrees(angle):.4g} deg")
+    told += [
+        f"{where} a slope of {' and '.join(f'{math.degrees(angle):.4g}' for angle in slope)} deg"
+        for where, slope in leaning
+        if slope is not None
+    ]
     return ", ".join(told) or "jump"
 
 
@@ -126,7 +132,12 @@ Contradiction = tuple[str, str]
 
 def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradiction]:
     """Everything about the task that cannot be, in the order of its parameters."""
-    return [*_unknown_names(task, robot), *_flight(task, robot), *_edge(task, robot)]
+    return [
+        *_unknown_names(task, robot),
+        *_flight(task, robot),
+        *_edge(task, robot),
+        *_slopes(task),
+    ]
 
 
 def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
@@ -215,6 +226,20 @@ def leg_travel(robot: RobotDescription) -> tuple[float, float]:
     )  # fmt: skip
     standing, straight = np.min([poses.of(foot.link)[0][:, 2] for foot in robot.feet], axis=0)
     return 0.8 * float(standing), float(standing - straight) + LENIENCE
+
+
+def _slopes(task: JumpTask) -> Iterator[Contradiction]:
+    """Feet hold on all ground that they stand on."""
+    where = [("slope", task.places()[0])]
+    where += [(f"{path}landing_slope", end) for path, _, _, end in _jumps(task)]
+    for key, place in where:
+        steep = math.hypot(*(math.tan(angle) for angle in place.slope))
+        if steep >= task.friction:
+            needed = (
+                f"ground that rises {100.0 * steep:.0f} cm a metre needs a friction of more than "
+            )
+            said = f"{steep:.2g}, and the task says friction: {task.friction:g}; "
+            yield key, needed + said + "ask for a smaller slope"
 
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:

@@ -10,22 +10,38 @@ Ground that nobody chose: for a row of jumps, levels and gaps drawn by a seed.
 repeat: 10
 distance_x: 14 cm
 rough: {seed: 1, steps: 3 cm, gaps: 6 cm}
+
+Ground that leans, and stairs that lead up:
+
+distance_x: 20 cm
+landing_slope: [8 deg, 0]
+
+distance_x: 25 cm
+stairs: {x: 12 cm, rise: 4 cm, run: 25 cm, steps: 3}
 """
 
 from __future__ import annotations
 
+import math
 import random
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import model_validator
 
 from ...blocks.signals import Phase
+from ...mathematics.arrays import Array
 from ...runtime.language.parameters import Parameters, parameter
 
 FREE = "free"
+Slope = tuple[float, float]
+"""Angles [rad] by which ground rises along the world's x and y axes, as those of a scene's boxes."""
+LEVEL: Slope = (0.0, 0.0)
+STEEPEST = math.radians(45.0)
+"""rad; a scene's boxes lean no more."""
 SHORTEST_JUMP_OVER_AN_EDGE = 0.03
 """Start and landing closer together than this [m] have no room for a step's edge between them."""
 PHASES = {
@@ -80,6 +96,9 @@ class Hop(FreeTimes):
         le=2.0,
         text="where the ground changes its height, along x from the start of this jump",
     )
+    landing_slope: Slope | None = parameter(
+        None, unit="rad", text="angles by which the ground at landing rises along x and y"
+    )
     gap: float | None = parameter(
         None, unit="m", ge=0.0, le=1.0, text="width of a gap in the ground, midway or at the edge"
     )
@@ -128,19 +147,46 @@ def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
 
 @dataclass(frozen=True)
 class StanceLocation:
-    """Where the robot stands between jumps: the soles' middle [m], their heading and how far the
-    body has turned in pitch [rad]."""
+    """Where the robot stands between jumps: the soles' middle [m], their heading, how far the body
+    has turned in pitch [rad], and how the ground leans there."""
 
     x: float
     y: float
     z: float
     heading: float
     turned: float
+    slope: Slope = LEVEL
+
+    @property
+    def plane(self) -> tuple[float, float, float]:
+        """The ground under it as c of its height c0 + c1 x + c2 y [m, world]."""
+        a, b = (math.tan(angle) for angle in self.slope)
+        return self.z - a * self.x - b * self.y, a, b
+
+    def height(self, x: Any, y: Any) -> Any:
+        """How high the ground under it would be there [m], if it went on; of numbers or arrays."""
+        if self.slope == LEVEL:
+            return self.z + 0.0 * x
+        c, a, b = self.plane
+        return c + a * x + b * y
 
 
-def places_of(hops: Sequence[Hop]) -> tuple[StanceLocation, ...]:
-    """Where the robot stands before the first jump and after each of them."""
-    found = [StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0)]
+def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
+    """Axes along feet of that ``heading``, across them and normal to ground that leans, as the
+    columns of a matrix (3, 3)."""
+    cosine, sine = np.cos(heading), np.sin(heading)
+    if slope == LEVEL:
+        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    a, b = np.tan(slope)
+    along = np.array([cosine, sine, a * cosine + b * sine])
+    normal = np.array([-a, -b, 1.0])
+    along, normal = along / np.linalg.norm(along), normal / np.linalg.norm(normal)
+    return np.column_stack([along, np.cross(normal, along), normal])
+
+
+def places_of(hops: Sequence[Hop], slope: Slope = LEVEL) -> tuple[StanceLocation, ...]:
+    """Where the robot stands before the first jump, on ground of that ``slope``, and after each."""
+    found = [StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)]
     for hop in hops:
         last = found[-1]
         found.append(
@@ -150,21 +196,90 @@ def places_of(hops: Sequence[Hop]) -> tuple[StanceLocation, ...]:
                 last.z + (hop.landing_height or 0.0),
                 last.heading + (hop.twist or 0.0),
                 last.turned + (hop.rotation or 0.0),
+                hop.landing_slope or LEVEL,
             )
         )
     return tuple(found)
 
 
+def on_slopes(hops: Sequence[Hop], slope: Slope) -> tuple[Hop, ...]:
+    """The jumps from ground of that ``slope``. Where a jump says nothing else, ground goes on as it
+    leans where the jump begins, and its ``landing_height`` is above that."""
+    found = list[Hop]()
+    for hop in hops:
+        here = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)
+        rise = float(here.height(hop.distance_x or 0.0, hop.distance_y or 0.0))
+        slope = hop.landing_slope or slope
+        up = round((hop.landing_height or 0.0) + rise, 9)
+        found.append(hop.model_copy(update={"landing_height": up, "landing_slope": slope}))
+    return tuple(found)
+
+
 def edge_of(hop: Hop, start: StanceLocation) -> float | None:
     """The x [m, world] at which the ground changes height under a jump that begins there; ``None``
-    if the ground is level, or if the robot lands where it stood, so that there can be no edge and
-    the ground is taken to move in flight."""
-    if not hop.landing_height:
+    if the ground goes on as it is, or if the robot lands where it stood, so that there can be no edge
+    and the ground is taken to move in flight."""
+    if not changes_ground(hop, start):
         return None
     if hop.step_edge is not None:
         return start.x + hop.step_edge
     ahead = hop.distance_x or 0.0
     return start.x + 0.5 * ahead if abs(ahead) >= SHORTEST_JUMP_OVER_AN_EDGE else None
+
+
+def changes_ground(hop: Hop, start: StanceLocation) -> bool:
+    """Whether a jump lands on other ground than that on which it begins, going on as it leans."""
+    end = places_of([hop], start.slope)[1]
+    goes_on = start.height(start.x + end.x, start.y + end.y) - start.z
+    return (hop.landing_slope or LEVEL) != start.slope or abs(end.z - goes_on) > 1e-8
+
+
+def step_of(hop: Hop, start: StanceLocation) -> float:
+    """By how much the ground is higher behind the edge under a jump than before it [m], in the line
+    of the jump; where there is no edge, how much higher it lands."""
+    edge, up = edge_of(hop, start), hop.landing_height or 0.0
+    if edge is None or (start.slope == LEVEL and not hop.landing_slope):
+        return up
+    ahead, aside = hop.distance_x or 0.0, hop.distance_y or 0.0
+    end = StanceLocation(
+        start.x + ahead, start.y + aside, start.z + up, 0.0, 0.0, hop.landing_slope or LEVEL
+    )
+    y = start.y + aside * (edge - start.x) / (ahead or 1.0)
+    return round(float(end.height(edge, y) - start.height(edge, y)), 9)
+
+
+class KnownStairs(Parameters):
+    """Stairs ahead that the task knows of, as a scene describes them: the ground is level before the
+    first edge, on each step, and behind the last one."""
+
+    x: float = parameter(text="the first edge, ahead of where the robot starts", unit="m", gt=0.0)
+    rise: float = parameter(
+        text="height of each step; negative: they lead down", unit="m", ge=-0.5, le=0.5
+    )
+    run: float = parameter(text="depth of each step", unit="m", gt=0.0, le=2.0)
+    steps: int = parameter(text="how many there are", ge=1, le=100)
+
+    def passed(self, x: float) -> int:
+        """How many of their edges are behind a place."""
+        return min(self.steps, max(0, math.floor((x - self.x) / self.run + 1.0 + 1e-9)))
+
+    def under(self, hops: Sequence[Hop]) -> tuple[Hop, ...]:
+        """The jumps over these stairs. Of several edges under one jump the first one up, or the last
+        one down, counts for all of them, so that feet clear every one."""
+        found, x = list[Hop](), 0.0
+        for hop in hops:
+            ahead = hop.distance_x or 0.0
+            before, after = self.passed(x), self.passed(x + ahead)
+            up = (after - before) * self.rise
+            changed: dict[str, Any] = {"landing_height": round(up, 9)}
+            if after != before:
+                low, high = min(before, after), max(before, after) - 1
+                # The higher ground lies behind the edges where they lead up, else before them.
+                edge = self.x + self.run * (low if self.rise > 0.0 else high)
+                changed["step_edge"] = round(edge - x, 9)
+            found.append(hop.model_copy(update=changed))
+            x += ahead
+        return tuple(found)
 
 
 class RoughGround(Parameters):

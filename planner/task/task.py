@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -22,7 +23,20 @@ from .files import JumpTaskError, PlacedFile
 from .margins import Margins
 from .recipe import choices, chosen_fields
 from .scaling import scaled_defaults
-from .sequence import FreeTimes, Hop, PhaseSpec, RoughGround, StanceLocation, check_spans, places_of
+from .sequence import (
+    LEVEL,
+    STEEPEST,
+    FreeTimes,
+    Hop,
+    KnownStairs,
+    PhaseSpec,
+    RoughGround,
+    Slope,
+    StanceLocation,
+    check_spans,
+    on_slopes,
+    places_of,
+)
 
 __all__ = ["JumpTask", "JumpTaskError", "Knots", "Weights", "make_task"]
 
@@ -97,7 +111,15 @@ class JumpTask(FreeTimes):
         0.0, unit="rad", ge=-6.3, le=6.3, text="heading at landing, to the left; world frame"
     )
     landing_height: float = parameter(
-        0.0, unit="m", ge=-2.0, le=2.0, text="ground at landing above the ground at the start"
+        0.0, unit="m", ge=-2.0, le=2.0,
+        text="ground at landing above the ground at the start, which goes on as its slope says",
+    )  # fmt: skip
+    slope: Slope | None = parameter(
+        None, unit="rad",
+        text="angles by which the ground at the start rises along x and y; None: it is level",
+    )  # fmt: skip
+    landing_slope: Slope | None = parameter(
+        None, unit="rad", text="the same at landing; None: the ground leans as at the start"
     )
     step_edge: float | None = parameter(
         None, unit="m", ge=-2.0, le=2.0,
@@ -109,6 +131,9 @@ class JumpTask(FreeTimes):
     )  # fmt: skip
     rough: RoughGround | None = parameter(
         None, text="uneven ground under all the jumps, drawn by a seed; None: what they say"
+    )
+    stairs: KnownStairs | None = parameter(
+        None, text="stairs under all the jumps, which set their landing heights and edges"
     )
     rotation: float = parameter(
         0.0, unit="rad", ge=-12.6, le=12.6,
@@ -192,12 +217,22 @@ class JumpTask(FreeTimes):
         if self.rise is not None and self.take_off_speed is not None:
             raise ValueError("give rise or take_off_speed, not both: one follows from the other")
         own: tuple[JumpTask | Hop, ...] = (self, *(self.jumps or ()))
-        if self.rough is not None and any(
-            one.landing_height or one.gap or one.step_edge is not None for one in own
-        ):
-            raise ValueError(
-                "rough draws the ground: give rough, or landing_height, step_edge and gap, not both"
-            )
+        for name in ("rough", "stairs"):
+            says = {"landing_height", "gap", "step_edge", "slope", "landing_slope", "rough"} - {
+                name
+            }
+            more = [key for key in sorted(says) for one in own if getattr(one, key, None)]
+            if getattr(self, name) is not None and more:
+                raise ValueError(
+                    f"{name} says what the ground is: give {name}, or {more[0]}, not both"
+                )
+        for angle in (a for one in own for a in (*(getattr(one, "slope", None) or ()),
+                                                 *(one.landing_slope or ()))):  # fmt: skip
+            if not abs(angle) <= STEEPEST:
+                raise ValueError(
+                    f"a slope is at most {math.degrees(STEEPEST):.0f} deg, not "
+                    f"{math.degrees(angle):.4g} deg"
+                )
         for number, hop in enumerate(self.hops()):
             which = f"jump {number + 1}: " if self.jumps else ""
             up = hop.landing_height or 0.0
@@ -229,11 +264,19 @@ class JumpTask(FreeTimes):
                 Hop(**{k: v for k, v in own.items() if not (k in how and how & set(given))} | given)
             )
         row = tuple(found) * (self.repeat or 1)
-        return row if self.rough is None else self.rough.under(row)
+        if self.slope or any(hop.landing_slope for hop in row):
+            return on_slopes(row, self.slope or LEVEL)
+        drawn = self.rough or self.stairs
+        return row if drawn is None else drawn.under(row)
 
     def places(self) -> tuple[StanceLocation, ...]:
         """Where the robot stands at the start, between its jumps, and at the end."""
-        return places_of(self.hops())
+        return places_of(self.hops(), self.slope or LEVEL)
+
+    @property
+    def leans(self) -> bool:
+        """Whether the ground leans anywhere where the robot stands."""
+        return any(place.slope != LEVEL for place in self.places())
 
     def spans(self) -> tuple[PhaseSpec, ...]:
         """The sequence of contacts, with all times that are given and numbers of knots."""

@@ -42,7 +42,8 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
     robot, fitted = fit_to_ground(robot, False, imported.model.pose)
     notes = [*more, *imported.notes, *fitted]
     name = os.path.relpath(file, target.parent)
-    return yaml_text(Path(name).as_posix(), robot, feet, held, notes), notes
+    estimated = not any(joint.rotor_inertia for joint in imported.built.raw_joints.values())
+    return yaml_text(Path(name).as_posix(), robot, feet, held, notes, estimated), notes
 
 
 def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
@@ -186,7 +187,7 @@ def _sole(
 
 def yaml_text(
     file: str, robot: RobotDescription, feet: list[dict[str, Any]], held: Mapping[str, float],
-    notes: list[str],
+    notes: list[str], estimated: bool,
 ) -> str:  # fmt: skip
     """The YAML's text.
 
@@ -195,6 +196,7 @@ def yaml_text(
         robot: as it was read with these feet.
         feet, held: that were guessed, as ``guess`` gives them.
         notes: what the file lacks, which become comments.
+        estimated: whether the inertia of rotors is no file's.
     """
     lines = [
         f"# What {Path(file).name} does not say of the robot. Everything here was guessed or found by",
@@ -206,7 +208,7 @@ def yaml_text(
         "",
     ]
     lines += [f"# {note}." for note in notes]
-    lines += ["", *_feet(feet), "", *_profile(robot), "", *_sensors(robot)]
+    lines += ["", *_feet(feet), "", *_profile(robot, estimated), "", *_sensors(robot)]
     if feet:
         lines += ["", *_angles("standing", robot.standing)]
     lines += [
@@ -240,14 +242,15 @@ def _feet(feet: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _profile(robot: RobotDescription) -> list[str]:
+def _profile(robot: RobotDescription, estimated: bool) -> list[str]:
     rated = robot.profiles["rated"]
     keys = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque")
     lines = [
         "# From the file: peak torques (effort limits) and no-load speeds (speed limits). ASSUMED: the",
         "# torque falls from 0.6 of the no-load speed on, and two fifths of it can be held for long.",
-        "# MISSING where zero: rotor inertia at the gearbox output, friction, damping. A value given",
-        "# here counts for all motors; `motors: {NAME or PATTERN: {peak_torque: ...}}` for some.",
+        "# MISSING where zero: rotor inertia at the gearbox output, friction, damping. ESTIMATED where it",
+        "# is in a comment: rotor inertia, from torque and speed. A value given here counts for all",
+        "# motors; `motors: {NAME or PATTERN: {peak_torque: ...}}` for some.",
         "profiles:",
         "  rated:",
     ]
@@ -257,7 +260,9 @@ def _profile(robot: RobotDescription) -> list[str]:
     else:
         lines += [f"    {key}: {number(value)}" for key, value in values.items()]
     for key in ("rotor_inertia", "friction", "damping"):
-        lines.append(f"    {key}: {number(getattr(rated, key))}")
+        # An estimate for each motor must not become one that counts for all.
+        mark = "# " if key == "rotor_inertia" and estimated and rated.rotor_inertia else ""
+        lines.append(f"    {mark}{key}: {number(getattr(rated, key))}")
     return lines
 
 

@@ -209,7 +209,7 @@ class BackgroundBlock(Block):
         if not self._in_real_time and is_under_way:
             worker.wait_for(slot, job, self._hangs_after)
         elif not (is_under_way and worker.memory.is_finished(slot, job)):
-            self._be_late(slot, due)
+            self._be_late(due)
             return
         if self._late_in_a_row:
             self._late_in_a_row = 0
@@ -262,7 +262,7 @@ class BackgroundBlock(Block):
             if self._sampled[slot] < before:
                 self._sampled[slot] = -1
 
-    def _be_late(self, slot: int, due: int) -> None:
+    def _be_late(self, due: int) -> None:
         """Count the late result and do what the policy says; an older one may have come meanwhile."""
         worker, background = self._worker, self._background
         assert worker is not None
@@ -277,13 +277,15 @@ class BackgroundBlock(Block):
                 tick=self.tick,
             )
         oldest = newest = -1
-        for back in range(self._slots):
-            other = (slot - back) % self._slots
-            if 0 <= self._sampled[other] <= due:
-                if worker.memory.is_finished(other, self._numbers[other]):
-                    newest = other
-                    break
-                oldest = other
+        for slot in range(self._slots):
+            sampled = self._sampled[slot]
+            if not 0 <= sampled <= due:
+                continue
+            if worker.memory.is_finished(slot, self._numbers[slot]):
+                if newest < 0 or sampled > self._sampled[newest]:
+                    newest = slot
+            elif oldest < 0 or sampled < self._sampled[oldest]:
+                oldest = slot
         if oldest >= 0:
             worker.expect_alive(oldest)
             if self._late_in_a_row * self.context.period > self._hangs_after:

@@ -41,7 +41,7 @@ from .context import Context as Context  # noqa: PLC0414
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters
 from .quantities import InputQuantities, OutputQuantities
-from .signals import Signal
+from .signals import Signal, StateElements
 from .steps import PythonCall, declare_steps
 
 S = TypeVar("S", bound=Signal)
@@ -387,6 +387,10 @@ class Block:
 
     def load_state(self) -> None:
         """After a restore: read back from the declared state what ``save_state`` wrote there."""
+
+    def state_elements(self) -> Mapping[str, Sequence[StateElements]]:
+        """What the elements are of state fields that mix quantities, in order, by ``state.field``."""
+        return {}
 
     def metrics(self) -> Mapping[str, Metric]:
         """The block's results at the end of a run, with units in their names."""

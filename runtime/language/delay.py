@@ -142,9 +142,12 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
 def ring_signal(signal: type[Signal], k: int) -> type[Signal]:
     """A signal with room for ``k`` values of every field of ``signal``."""
     entries = {
-        name: Field((k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text)
+        name: Field(
+            (k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text,
+            ring="ring_position.oldest",
+        )
         for name, field in signal.fields.items()
-    }
+    }  # fmt: skip
     return type(
         f"Past{signal.__name__}{k}", (Signal,), {"__doc__": "Entries of a ring.", **entries}
     )

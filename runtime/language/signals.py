@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from math import prod
-from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,19 @@ DTYPES: Mapping[str, np.dtype[Any]] = {
 """The element types a field may have. Floats are checked for finiteness on every tick."""
 
 
+class StateElements(NamedTuple):
+    """Some neighbouring elements of a state whose field mixes quantities; see ``Block.state_elements``.
+
+    ``quaternion`` is the order of a unit quaternion's four elements, ``xyzw`` or ``wxyz``; else empty.
+    ``name`` is empty for a solver's initial guess, which changes no result beyond its tolerance.
+    """
+
+    name: str
+    size: int
+    unit: str = ""
+    quaternion: str = ""
+
+
 class Field:
     """One named array of a signal.
 
@@ -52,6 +65,8 @@ class Field:
         values: what the numbers of an ``"int64"`` field stand for; shown by name in recordings.
         inferred: unit and frame are those of whatever the graph wires to the block: an input takes
             any, and ``Block.infer_units`` says what an output has.
+        ring: of a state that is a ring buffer along its first axis: the field with the place of its
+            oldest entry, ``name`` of the same signal or ``state.name`` of the same block.
 
     Raises:
         DeclarationError: the dtype or the unit is unknown, a size is not positive, or an inferred
@@ -68,6 +83,7 @@ class Field:
         text: str = "",
         values: type[IntEnum] | None = None,
         inferred: bool = False,
+        ring: str = "",
     ) -> None:
         self.shape: tuple[Dimension, ...] = shape if isinstance(shape, tuple) else (shape,)
         if dtype not in DTYPES:
@@ -84,6 +100,7 @@ class Field:
         if inferred and (unit is not None or frame is not None):
             raise DeclarationError("an inferred field has no unit and no frame of its own")
         self.inferred = inferred
+        self.ring = ring
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:

@@ -211,6 +211,53 @@ function tuneAll() {
   panel.append(seek, save, said, ...found);
   if (!found.length) panel.append(make("p", "This graph has no parameter that can be changed while it runs."));
 }
+
+// A pad for each block that takes a velocity from the page. It springs back, and beats as long as it is held.
+const BEAT = 200, PAD = {ahead: 0.16, aside: 0.08, turn: 0.3};
+function pad(path) {
+  const box = make("div", "", "pad"), field = make("div", "", "field"), knob = make("div", "", "knob");
+  const turn = input("range", 0), said = make("div", path, "soft");
+  field.setAttribute("aria-label", path + ", ahead and aside"); field.tabIndex = 0;
+  turn.setAttribute("aria-label", path + ", turn to the left"); turn.dir = "rtl";
+  turn.min = -1; turn.max = 1; turn.step = "any";
+  field.append(knob); box.append(said, field, turn);
+  let beat = Date.now() % 1e9, x = 0, y = 0, held = false, timer = null, busy = false;
+  async function send() {
+    if (busy) return;
+    busy = true; beat += 1;
+    const values = {ahead: held ? y * PAD.ahead : 0, aside: held ? -x * PAD.aside : 0, turn: held ? turn.value * PAD.turn : 0, beat};
+    try { await call("set", {settings: Object.entries(values).map(([name, value]) => path + "." + name + "=" + value)}); said.textContent = path; }
+    catch (refused) { said.textContent = refused.message; }
+    busy = false;
+    if (!held && (values.ahead || values.aside || values.turn)) send();
+  }
+  function hold() { if (!held) { held = true; timer = setInterval(send, BEAT); } send(); }
+  function release() {
+    if (!held) return;
+    held = false; clearInterval(timer); x = y = 0; turn.value = 0; place(); send();
+  }
+  const place = () => { knob.style.left = 50 + 42 * x + "%"; knob.style.top = 50 - 42 * y + "%"; };
+  const clip = value => Math.max(-1, Math.min(1, value));
+  function drag(event) {
+    const area = field.getBoundingClientRect();
+    x = clip(2 * (event.clientX - area.left) / area.width - 1);
+    y = clip(1 - 2 * (event.clientY - area.top) / area.height);
+    place(); hold();
+  }
+  field.onpointerdown = event => { field.setPointerCapture(event.pointerId); drag(event); };
+  field.onpointermove = event => { if (event.buttons) drag(event); };
+  const keys = {ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0]};
+  field.onkeydown = event => {
+    if (!keys[event.key]) return;
+    event.preventDefault(); [x, y] = keys[event.key]; place(); hold();
+  };
+  turn.oninput = hold;
+  field.onpointerup = field.onpointercancel = field.onkeyup = field.onblur = turn.onchange = release;
+  place();
+  return box;
+}
+if (data.live.tuning)
+  document.body.append(...Object.keys(data.blocks).filter(path => data.blocks[path].use === "blocks.Pad").map(pad));
 const numbers = document.getElementById("numbers");
 numbers.onchange = () => drawing.classList.toggle("plain", !numbers.checked);
 const tune = document.getElementById("tune");

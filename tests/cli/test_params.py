@@ -98,28 +98,29 @@ def test_nothing_runs(sockets: Path, call: Call, call_json: CallJson) -> None:
     assert "cannot name a run" in call("run", "count.yaml", "--params", "a/b", code=2).stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "shown"),
-    [
-        (("params", "web", "--save", "fast.yaml"), '"opened": "parameters"'),
-        (("graph", "--live"), '"opened": "diagram"'),
-        (("graph", "tune.yaml", "--live"), "tune-tuned.yaml"),
-    ],
-)
-def test_a_page_of_it(
-    running: subprocess.Popen[str], start: Start, words: tuple[str, ...], shown: str
-) -> None:
-    page = start(*words)
-    assert page.stdout is not None
+PAGES = [
+    (("params", "web", "--save", "fast.yaml"), '"opened": "parameters"'),
+    (("graph", "--live"), '"opened": "diagram"'),
+    (("graph", "tune.yaml", "--live"), "tune-tuned.yaml"),
+]
+
+
+def test_pages_of_it(running: subprocess.Popen[str], start: Start) -> None:
+    pages = [start(*words) for words, _ in PAGES]
     try:
-        address = page.stdout.readline().strip()
-        assert re.fullmatch(r"http://127\.0\.0\.1:[0-9]+/\?token=[\w-]{32,}", address)
-        with urllib.request.urlopen(address, timeout=60) as answer:
-            assert shown in answer.read().decode()
+        for page, (words, shown) in zip(pages, PAGES, strict=True):
+            assert page.stdout is not None
+            address = page.stdout.readline().strip()
+            assert re.fullmatch(r"http://127\.0\.0\.1:[0-9]+/\?token=[\w-]{32,}", address), words
+            with urllib.request.urlopen(address, timeout=60) as answer:
+                assert shown in answer.read().decode(), words
     finally:
-        page.send_signal(signal.SIGINT)
-        _, errors = page.communicate(timeout=60)
-    assert (page.returncode, errors) == (0, "")
+        ended = []
+        for page in pages:
+            page.send_signal(signal.SIGINT)
+            _, errors = page.communicate(timeout=60)
+            ended.append((page.returncode, errors))
+    assert ended == [(0, "")] * len(PAGES)
 
 
 def test_pages_of_what_does_not_run(sockets: Path, call: Call) -> None:

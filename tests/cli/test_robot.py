@@ -295,3 +295,18 @@ def test_a_recording_that_does_not_tell_it_is_refused(tmp_path: Path) -> None:
     assert "--robot, --base and --command say which blocks to read" in result.output
     result = identify(str(tmp_path / "nothing.rrd"))
     assert result.exit_code != 0 and "there is no such file" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "give a graph or a recording, or a robot, such as --robot go2"),
+        (["graph.yaml", "--robot", "go2"], "give a graph or a recording, or a robot"),
+        (["--robot", "nobody"], "--robot nobody: no robot called 'nobody'; there is bruce"),
+        (["run.rrd", "--set", "a=1"], "--set is for a graph; a recording has been made already"),
+    ],
+)
+def test_a_calibration_says_what_it_needs(words: list[str], said: str) -> None:
+    result = CliRunner().invoke(make_app(), ["robot", "calibrate", *words])
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())

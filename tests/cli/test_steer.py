@@ -29,7 +29,7 @@ def test_what_is_no_list_of_commands_is_refused(tmp_path: Path) -> None:
     assert "is no YAML" in reason("[{ahead: 1")
     wrong = reason("[{ahed: 10 cm}]")
     assert "ahed" in wrong and "ahead" in wrong
-    assert "5 m" in reason("[{ahead: 5 m}]")
+    assert "500 m" in reason("[{ahead: 500 m}]")
 
 
 def test_without_a_terminal_it_asks_for_a_file() -> None:

@@ -17,8 +17,11 @@ from aloft.runtime.running.executor import Executor
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 NEED_DRIVES = ("jump_robot", "bring_up_stand", "bring_up_hop")
 NEED_A_TERMINAL = ("steer_by_keys",)
+NEED_A_PAD = ("steer_by_gamepad", "steer_by_ros2")
 EXAMPLES = sorted(
-    path for path in GRAPHS.glob("*.yaml") if path.stem not in NEED_DRIVES + NEED_A_TERMINAL
+    path
+    for path in GRAPHS.glob("*.yaml")
+    if path.stem not in NEED_DRIVES + NEED_A_TERMINAL + NEED_A_PAD
 )
 SHORT = 0.1
 """Seconds of each graph: the replay takes another process, and bytes differ early or never."""

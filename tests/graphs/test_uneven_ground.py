@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -38,6 +39,18 @@ def test_a_foot_that_has_not_touched_goes_on_down_and_does_not_turn_the_torso(
     result = land(tmp_path, LEFT_FOOT_HIGHER)
     assert result.success, result.reason
     assert result.metrics["peak_tilt_deg"] < 14.0
+
+
+@pytest.mark.long
+def test_a_slope_that_the_task_knows_is_the_scenes_and_is_landed_on(tmp_path: Path) -> None:
+    task = {"rise": "12 cm", "distance_x": "20 cm", "landing_slope": ["12 deg", 0]}
+    files = [str(GRAPHS / file) for file in ("jump.yaml", "trials/robust.yaml")]
+    told = {"include": files, "set": {"plan.task": task, "robot.seed": 500}}
+    (tmp_path / "told.yaml").write_text(yaml.safe_dump(told))
+    result = aloft.load(tmp_path / "told.yaml").run()
+    assert result.success, result.reason
+    heights = result.signal("robot.truth.ground_height")[-1]
+    assert np.ptp(heights) == pytest.approx(0.0833 * np.sin(np.radians(12.0)), abs=2e-3)
 
 
 @pytest.mark.long

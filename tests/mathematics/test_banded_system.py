@@ -50,5 +50,16 @@ def test_rows_that_repeat_each_other_or_leave_the_band_have_no_correction() -> N
     matrix = chain(rng)
     every, weights = np.ones(len(matrix), dtype=bool), np.ones(matrix.shape[1])
     assert not correct(matrix, np.ones(len(matrix)), weights, every, band=HEIGHT)[1]
-    matrix[0] = 0.0
+    matrix[1] = matrix[0]
     assert not correct(matrix, np.ones(len(matrix)), weights, every)[1]
+
+
+def test_a_row_without_a_variable_that_may_change_holds_nothing() -> None:
+    rng = np.random.default_rng(7)
+    matrix, wanted = chain(rng), rng.standard_normal(BLOCKS * HEIGHT)
+    every, weights = np.ones(len(matrix), dtype=bool), np.ones(matrix.shape[1])
+    matrix[4] = 0.0
+    out, found = correct(matrix, wanted, weights, every)
+    others = np.arange(len(matrix)) != 4
+    assert found
+    assert (matrix @ out)[others] == pytest.approx(wanted[others])

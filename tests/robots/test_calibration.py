@@ -17,13 +17,16 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 import aloft
+from aloft.blocks.jumping.guided_motion import GuidedBody, GuidedMotion
 from aloft.hal.simulated.variation import draw_variation
-from aloft.robots.calibration import Calibration, fragment
+from aloft.robots.calibration import Calibration, calibration_of, fragment
 from aloft.robots.description import find_robot
-from aloft.robots.identification import IdentificationError, MeasuredRun
-from aloft.robots.motor_identification import EVERY, PERIODS, most_alike, waves_of
+from aloft.robots.identification import Estimate, IdentificationError, MeasuredRun
+from aloft.robots.motor_identification import EVERY, PERIODS, IdentifiedMotors, most_alike, waves_of
+from aloft.robots.pinocchio_model import build_pinocchio_model
 from aloft.robots.sensor_identification import (
     EDGE,
+    IdentifiedSensors,
     base_motion,
     contact_jacobians,
     fit,
@@ -145,6 +148,41 @@ def test_the_base_moves_as_least_squares_says() -> None:
         own = np.linalg.lstsq(jacobians[k, :, :6], -jacobians[k, :, 6:] @ speeds[k])[0]
         np.testing.assert_allclose(moves[k], own, rtol=1e-10)
     np.testing.assert_allclose(places, points.mean(axis=1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["bruce", "go2", "g1"])
+def test_the_base_moves_as_it_was_guided(name: str) -> None:
+    """Feet that are balls roll: another model of the feet, by which sways are planned, says the same."""
+    robot = find_robot(name)
+    body = GuidedBody(build_pinocchio_model(robot), robot)
+    q = body.standing(robot.standing_position)
+    zero, still = np.zeros(3), np.zeros((len(robot.feet), 3))
+    motion = GuidedMotion(
+        zero, np.array([0.05, 0.03, -0.08]), zero, np.array([0.3, 0.4, 0.2]), zero, (False,) * 3, still
+    )  # fmt: skip
+    for _ in range(20):
+        v = body.velocity(q, motion)
+        moves, _ = base_motion(robot, q[None, 7:], v[None, 6:])
+        np.testing.assert_allclose(moves[0], v[:6], atol=1e-4)
+        q = body.integrate(q, 0.01 * v)
+
+
+def test_joints_that_are_held_tell_nothing() -> None:
+    robot = find_robot("g1")
+    names = [joint.name for joint in robot.joints]
+    one, three = Estimate(0.5, 0.1), (Estimate(0.0, 0.1),) * 3
+    every = dict.fromkeys(names, one)
+    sensors = IdentifiedSensors(three, three, one, one, one, every, one, {})
+    motors = IdentifiedMotors(
+        dict.fromkeys(robot.transmission.motors, one), one, one, one, every, every, one, {}, ()
+    )
+    found = calibration_of(robot, sensors, motors, None, None)
+    for name, friction, play in zip(
+        names, robot.motors.friction, robot.motors.gear_play, strict=True
+    ):
+        held = name in robot.held
+        assert found.friction[name].value == (friction if held else 0.5)
+        assert found.play[name].value == (play if held else 0.5)
 
 
 def test_the_vertical_turns_against_the_base() -> None:

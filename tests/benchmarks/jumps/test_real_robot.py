@@ -68,6 +68,18 @@ def test_a_row_whose_place_is_measured_is_that_row_with_a_sensor() -> None:
     assert graph.checked.block("capture").block_type.__name__ == "MotionCapture"
 
 
+def test_other_robots_have_their_own_jumps_and_the_same_margin() -> None:
+    in_place, ahead = asked_of(97000, "go2").values()
+    checked = graph_of(97000, "nothing", ahead, ahead.task, 1).checked
+    assert checked.robot is not None
+    assert checked.robot.name == "go2"
+    assert checked.block("plan").params.task == {"effort": EFFORT, "rise": 0.1, "distance_x": 0.2}
+    assert in_place.alone
+    assert ahead.before(first=False) == [{"rise": 0.1, "distance_x": 0.1}]
+    with pytest.raises(AloftError, match="there is no robot 'a1'; there is 'bruce', 'go2'"):
+        real_robot.real_robot(range(97000, 97001), robot="a1")
+
+
 def test_smaller_jumps_come_first_and_later_only_half_as_far() -> None:
     ahead = ASKED["ahead 20 cm"]
     assert [task["rise"] for task in ahead.before(first=True)] == [0.02, 0.05, 0.08, 0.12, 0.12]

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 from tests.robots.limbed_robots import quadruped
 
 from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter, tracked_points
@@ -224,6 +223,7 @@ def test_a_flight_is_an_integration_of_the_imu():
 def test_it_is_as_wrong_as_it_says():
     """Normalised estimation error squared of 12 runs whose errors are drawn as the filter assumes,
     within the chi-squared distribution's 99.9 % from above; and not idly pessimistic."""
+    from scipy.stats import chi2  # an import of a second
 
     total, late = 0.0, 9
     for seed in range(12):

@@ -45,6 +45,12 @@ def test_impulse_is_exact(duration: Any) -> None:
     assert impulse[0] == pytest.approx(70.0 * push.block.params.duration, rel=1e-12)
 
 
+def test_a_later_flight_is_pushed_and_short_ones_do_not_count() -> None:
+    jump = [True] * 10 + [False] * 40
+    forces = run(bench(flight=2), jump + [True] + [False] * 5 + jump + jump)
+    assert np.nonzero(forces[:, 0])[0].tolist() == list(range(80, 85))
+
+
 def test_contact_within_the_delay_begins_the_wait_anew() -> None:
     forces = run(bench(), [True] * 3 + [False] * 14 + [True] + [False] * 30)
     assert np.nonzero(forces[:, 0])[0][0] == 3 + 14 + 1 + 14

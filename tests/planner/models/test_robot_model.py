@@ -6,6 +6,7 @@ from tests.robots.limbed_robots import quadruped
 
 from aloft.planner.models.robot_model import Stance, model_of
 from aloft.planner.task.files import PlanError
+from aloft.planner.task.sequence import StanceLocation, ground_axes
 from aloft.robots.description import RobotDescription, find_robot
 
 
@@ -43,6 +44,44 @@ def test_one_leg_that_is_too_short_is_said_with_heights() -> None:
     except PlanError as error:
         assert error.family == "stance"
         assert "choose angles that put all feet on the ground" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("slope", "heading"),
+    [((0.2, 0.0), 0.0), ((-0.2, 0.0), 0.0), ((0.0, 0.2), 0.0), ((0.1, 0.15), 0.6)],
+)
+def test_on_ground_that_leans_only_the_legs_lean(
+    slope: tuple[float, float], heading: float
+) -> None:
+    robot = find_robot("bruce")
+    finder = model_of(robot)[1]
+    place = StanceLocation(0.1, -0.2, 0.05, heading, 0.0, slope)
+    stance = finder.on_ground(robot.standing_position, place)
+    level = finder.place(robot.standing_position, heading=heading, at=(0.1, -0.2, 0.05))
+    below = place.height(stance.points[:, 0], stance.points[:, 1])
+    np.testing.assert_allclose(stance.points[:, 2], below, atol=1e-9)
+    assert np.ptp(stance.points[:, 2]) > 0.01
+    np.testing.assert_allclose(stance.points.mean(axis=0), (0.1, -0.2, 0.05), atol=1e-9)
+    np.testing.assert_allclose(stance.com[:2], level.com[:2], atol=1e-8)
+    np.testing.assert_allclose(stance.coordinates[3:6], level.coordinates[3:6], atol=1e-12)
+    # Feet are turned with the ground and not bent: their points keep their distances along it.
+    axes, flat = ground_axes(slope, heading), ground_axes((0.0, 0.0), heading)
+    np.testing.assert_allclose(
+        (stance.points - (0.1, -0.2, 0.05)) @ axes,
+        (level.points - (0.1, -0.2, 0.05)) @ flat,
+        atol=1e-9,
+    )
+
+
+def test_ground_that_the_legs_do_not_reach_is_said() -> None:
+    robot = find_robot("bruce")
+    steep = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, (0.75, 0.0))
+    with pytest.raises(
+        PlanError,
+        match=r"bruce cannot stand upright on ground that rises by 42\.97 deg along x and 0 deg along y: "
+        r".*ankle.* would pass its limit; ask for a smaller slope",
+    ):
+        model_of(robot)[1].on_ground(robot.standing_position, steep)
 
 
 def test_nothing_to_stand_on() -> None:

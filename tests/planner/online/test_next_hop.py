@@ -17,7 +17,7 @@ from aloft.planner.task.plan import plan_bytes
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-PLANNER = HopPlanner(ROBOT, shipped_samples("bruce"))
+PLANNER = HopPlanner(ROBOT, shipped_samples("bruce"), shipped_samples("bruce", steps=True))
 
 
 @pytest.mark.long
@@ -33,13 +33,30 @@ def test_a_plan_is_valid_and_does_not_depend_on_those_before() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("up", [0.045, -0.045])
+def test_a_plan_up_or_down_lands_at_its_height(up: float) -> None:
+    wanted = HopRequest(0.2, 0.02, 0.1, up)
+    found = PLANNER.plan(wanted)
+    assert (found.outcome, found.done) == (PlanOutcome.PLANNED, wanted)
+    require_valid(found.plan, ROBOT)
+    assert found.plan.com[-1, 2] - found.plan.com[0, 2] == pytest.approx(up, abs=3e-3)
+
+
+@pytest.mark.long
+def test_where_the_motion_between_plans_leads_to_none_one_near_the_nearest_is_looked_for() -> None:
+    found = PLANNER.plan(HopRequest(-0.0909, -0.1334, 0.3953))
+    assert found.outcome in (PlanOutcome.PLANNED, PlanOutcome.NEAREST)
+    require_valid(found.plan, ROBOT)
+
+
+@pytest.mark.long
 def test_where_the_solver_does_not_end_a_stored_plan_is_followed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(correction, "STEPS", 1)
     found = PLANNER.plan(HopRequest(0.17, -0.06, -0.3))
     assert found.outcome == PlanOutcome.UNSOLVED
-    assert np.abs(np.array(found.done) - [0.17, -0.06, -0.3]).max() < 0.3
+    assert np.abs(np.array(found.done) - [0.17, -0.06, -0.3, 0.0]).max() < 0.3
     require_valid_but_for_rounding(found.plan)
 
 

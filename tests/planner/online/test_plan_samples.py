@@ -13,18 +13,27 @@ from aloft.planner.online.plan_samples import read_samples, write_samples
 from aloft.planner.task.plan import ARRAYS, PlanFileError
 
 SAMPLES = shipped_samples("bruce")
+STEPS = shipped_samples("bruce", steps=True)
 
 
 def test_a_request_within_reach_is_left_and_another_comes_to_the_edge() -> None:
     near = HopRequest(0.2, 0.1, -0.3)
     assert within_reach(near) == near
     far = within_reach(HopRequest(3.0, 0.0, 2.0))
-    assert far == pytest.approx((REACH["ahead"], 0.0, REACH["turn"]))
+    assert far == pytest.approx((REACH["ahead"], 0.0, REACH["turn"], 0.0))
     back = within_reach(HopRequest(-1.0, 1.0, 0.0))
     assert (back.ahead / REACH["back"]) ** 2 + (back.aside / REACH["aside"]) ** 2 == pytest.approx(
         1.0
     )
     assert back.ahead == pytest.approx(-back.aside)
+
+
+def test_a_jump_up_goes_ahead_and_not_too_high() -> None:
+    near = HopRequest(0.2, 0.05, -0.3, 0.05)
+    assert within_reach(near) == near
+    assert within_reach(HopRequest(-0.2, 0.0, 0.0, -0.2)) == pytest.approx((0.12, 0.0, 0.0, -0.06))
+    level = HopRequest(-0.05, 0.2, 0.0, 0.004)
+    assert level.level and within_reach(level) == level, "landing takes so little without a plan"
 
 
 def test_weights_reproduce_every_linear_function() -> None:
@@ -34,6 +43,8 @@ def test_weights_reproduce_every_linear_function() -> None:
         weights = SAMPLES.weights(wanted)
         assert weights.sum() == pytest.approx(1.0)
         assert weights @ SAMPLES.requests == pytest.approx(np.array(wanted), abs=1e-9)
+        up = HopRequest(0.2 + wanted.aside / 2, wanted.ahead / 2, 0.3 * wanted.turn, 0.03)
+        assert STEPS.weights(up) @ STEPS.requests == pytest.approx(np.array(up), abs=1e-9)
 
 
 def test_an_interpolated_motion_lands_about_where_it_should() -> None:
@@ -48,12 +59,14 @@ def test_the_nearest_plan_is_one_within_reach() -> None:
     assert within_reach(found) == found
 
 
-def test_the_file_gives_what_was_written(tmp_path: Path) -> None:
-    path = write_samples(tmp_path / "hops.npz", SAMPLES)
+@pytest.mark.parametrize("steps", [False, True])
+def test_the_file_gives_what_was_written(tmp_path: Path, steps: bool) -> None:
+    samples = STEPS if steps else SAMPLES
+    path = write_samples(tmp_path / "hops.npz", samples)
     again = read_samples(path)
-    assert path.read_bytes() == samples_path("bruce").read_bytes()
+    assert path.read_bytes() == samples_path("bruce", steps=steps).read_bytes()
     for name in ARRAYS:
-        np.testing.assert_array_equal(again.arrays[name], SAMPLES.arrays[name])
+        np.testing.assert_array_equal(again.arrays[name], samples.arrays[name])
 
 
 def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
@@ -63,5 +76,5 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(PlanFileError, match="has no plans of hops"):
         read_samples(tmp_path / "text.npz")
     np.savez(tmp_path / "other.npz", header=np.array('{"format": "another"}'))
-    with pytest.raises(PlanFileError, match="is of format 'another', expected 'aloft hop plans 1'"):
+    with pytest.raises(PlanFileError, match="is of format 'another', expected 'aloft hop plans 2'"):
         read_samples(tmp_path / "other.npz")

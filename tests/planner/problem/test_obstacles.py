@@ -1,5 +1,8 @@
 """Legs and body keep above a step."""
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
@@ -34,13 +37,14 @@ def toe_ahead() -> float:
     return float(np.array(place(standing(0.0)))[0, 0])
 
 
-def heights(x: float, **hop: float) -> dict[str, float]:
+def heights(x: float, **hop: Any) -> dict[str, float]:
     """The standing robot's points with its base at ``x``, by index and kind."""
     import casadi as ca
 
     coordinates = full_coordinates(MODEL)
-    task = make_task({"recipe": "paper", "name": "step", "rise": 0.15, **hop}).hops()[0]
-    w = step_parameters(task, hop.get("step_edge"), 0.0, 0.3)
+    task = make_task({"recipe": "paper", "name": "step", "rise": 0.15, **hop})
+    start, end = task.places()
+    w = step_parameters(task.hops()[0], hop.get("step_edge"), start, end, 0.3, task.leans)
     q = ca.SX.sym("q", coordinates.size)
     rows = ca.vertcat(*heights_above_step(MODEL, coordinates, q, w))
     found = np.array(ca.Function("rows", [q], [rows])(standing(x))).ravel()
@@ -72,6 +76,16 @@ def test_a_step_counts_from_its_edge_on_and_the_higher_ground_a_little_further(
     at_edge = heights(0.2 * way - toe_ahead(), **hop)[toe]
     higher = min(before[toe], after[toe])
     assert at_edge == pytest.approx(higher, abs=0.01 * abs(step))
+
+
+def test_ground_that_leans_is_a_plane_on_either_side_of_its_edge() -> None:
+    way = {"distance_x": 0.4, "step_edge": 0.2, "slope": [0.0, 0.0], "landing_slope": [0.2, 0.0]}
+    before, after = heights(-0.3, **way), heights(0.7, **way)
+    level = heights(0.7, distance_x=0.4)
+    name = "foot 0"
+    assert before[name] == pytest.approx(level[name], abs=1e-6)
+    rise = math.tan(0.2) * (0.7 + toe_ahead() - 0.4)
+    assert level[name] - after[name] == pytest.approx(rise, abs=1e-6)
 
 
 def test_which_points_are_watched() -> None:

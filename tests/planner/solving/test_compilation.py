@@ -100,3 +100,24 @@ def test_a_cache_that_cannot_be_written_is_done_without(
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert values(load()) == [[4.5, 6.0]] * 2
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("long", "flags"), [(10**6, {"slow": "-O0", "quick": ""}), (1, {"slow": "-O0", "quick": "-O0"})]
+)
+def test_what_is_long_is_not_optimised_and_the_same(
+    long: int, flags: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: dict[str, str] = {}
+    real = compilation.run_compiler
+
+    def run(compiler: str, source: Path, library: Path, *more: str) -> None:
+        found[library.stem] = " ".join(more)
+        real(compiler, source, library, *more)
+
+    monkeypatch.setattr(compilation, "run_compiler", run)
+    monkeypatch.setattr(compilation, "OPTIMISED", ("quick",))
+    monkeypatch.setattr(compilation, "LONG", long)
+    assert values(load()) == [[4.5, 6.0]] * 2
+    assert found == flags

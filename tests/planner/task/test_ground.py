@@ -1,12 +1,16 @@
 """The ground of a task: every jump finds its own height, and what cannot be built is said."""
 
+import math
 from typing import Any
 
 import pytest
 
+from aloft.hal.simulated.scenes import SceneParameters
 from aloft.planner.task.ground import scene_of
+from aloft.planner.task.sequence import ground_axes
 from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
+from aloft.runtime.language.terrain import Terrain
 
 BRUCE = find_robot("bruce")
 
@@ -57,6 +61,67 @@ def test_up_and_down_in_a_row_is_a_platform_between_two_edges() -> None:
 def test_stairs_are_one_box_each() -> None:
     found = boxes(distance_x=0.2, landing_height=0.04, repeat=2)
     assert found == [(0.1, 0.3, 0.04, 0.0), (0.3, 1.9, 0.08, 0.0)]
+
+
+def built(**values: Any) -> Terrain:
+    """The simulator's ground of a task."""
+    return SceneParameters.model_validate(scene(**values)).build()
+
+
+@pytest.mark.parametrize(
+    "jumps",
+    [
+        [["10 deg", 0]],
+        [[0, "-12 deg"]],
+        [["8 deg", "3 deg"], None],
+        [["-8 deg", 0], ["8 deg", "5 deg"]],
+    ],
+)
+def test_the_simulators_ground_is_where_the_planner_has_it(jumps: list[Any]) -> None:
+    values = {"distance_x": 0.2, "jumps": [{"landing_slope": slope} for slope in jumps]}
+    task, ground = make_task({"name": "odd", "rise": 0.12, **values}), built(**values)
+    for place in task.places():
+        for x, y in ((0.0, 0.0), (0.06, 0.1), (-0.06, -0.1)):
+            at = place.x + x, place.y + y
+            assert ground.height(*at) == pytest.approx(float(place.height(*at)), abs=1e-6)
+            assert ground.normal(*at) == pytest.approx(ground_axes(place.slope)[:, 2], abs=1e-9)
+
+
+def test_the_score_is_told_what_the_ground_rises_under_the_feet_alone() -> None:
+    tangent = math.tan(math.radians(10.0))
+    found = built(distance_x=0.2, landing_slope=["10 deg", 0]).uneven
+    assert found == pytest.approx((0.0425 + 0.02) * tangent, abs=1e-4)
+    level_again = [{"landing_slope": ["10 deg", 0]}, {"landing_slope": [0, 0]}]
+    assert built(distance_x=0.2, jumps=level_again).uneven == 0.0
+
+
+def test_no_robot_is_put_down_where_the_ground_leans() -> None:
+    with pytest.raises(
+        JumpTaskError, match="slope: robots in simulation are put down on level ground"
+    ):
+        scene(distance_x=0.2, slope=["5 deg", 0])
+
+
+def test_where_it_stood_the_ground_cannot_lean_otherwise() -> None:
+    with pytest.raises(
+        JumpTaskError,
+        match="landing_slope: it lands where it stood, and the ground leans otherwise",
+    ):
+        scene(landing_slope=["5 deg", 0])
+
+
+@pytest.mark.parametrize("rise", ["3 cm", "-3 cm"])
+def test_known_stairs_are_the_scenes(rise: str) -> None:
+    values = {"distance_x": 0.3, "stairs": {"x": 0.15, "rise": rise, "run": 0.3, "steps": 2},
+              "repeat": 3}  # fmt: skip
+    task, ground = make_task({"name": "odd", "rise": 0.12, **values}), built(**values)
+    assert len({place.z for place in task.places()}) == 3
+    for place in task.places():
+        assert ground.height(place.x, place.y) == pytest.approx(place.z, abs=1e-9)
+    with pytest.raises(
+        JumpTaskError, match=r"stairs: at place 1 a foot at x = 0\.\d+ m is on another"
+    ):
+        scene(distance_x=0.2, stairs={"x": 0.18, "rise": rise, "run": 0.3, "steps": 2})
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,21 @@ Uneven ground under a row of jumps, drawn by a seed.
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
 from aloft.planner.task.ground import scene_of
-from aloft.planner.task.sequence import Hop, StanceLocation, edge_of
+from aloft.planner.task.sequence import (
+    LEVEL,
+    Hop,
+    StanceLocation,
+    changes_ground,
+    edge_of,
+    step_of,
+)
 from aloft.planner.task.task import JumpTask, JumpTaskError, make_task
 from aloft.robots.description import find_robot
 
@@ -164,9 +172,68 @@ def test_one_gap_alone() -> None:
     assert [box["x"] for box in scene["boxes"]] == [[-1.5, 0.075], [0.225, 1.8]]
 
 
+def test_ground_goes_on_as_it_leans_unless_a_jump_says_otherwise() -> None:
+    up = task(rise=0.15, distance_x=0.2, slope=["10 deg", 0], repeat=2)
+    rise = 0.2 * math.tan(math.radians(10.0))
+    assert [place.z for place in up.places()] == pytest.approx([0.0, rise, 2.0 * rise])
+    assert {place.slope for place in up.places()} == {(math.radians(10.0), 0.0)}
+    assert not any(changes_ground(*both) for both in zip(up.hops(), up.places(), strict=False))
+    top = task(
+        rise=0.15, distance_x=0.2, slope=["10 deg", 0],
+        jumps=[{}, {"landing_slope": [0, 0], "landing_height": "-1 cm"}],
+    )  # fmt: skip
+    assert [place.slope for place in top.places()][1:] == [(math.radians(10.0), 0.0), LEVEL]
+    hops, places = top.hops(), top.places()
+    assert [changes_ground(*both) for both in zip(hops, places, strict=False)] == [False, True]
+    assert places[2].z == pytest.approx(2.0 * rise - 0.01)
+    assert edge_of(hops[1], places[1]) == pytest.approx(0.3)
+    # Level ground that ends where the slope would be 1 cm higher begins half a rise and 1 cm lower.
+    assert step_of(hops[1], places[1]) == pytest.approx(0.5 * rise - 0.01)
+
+
+def test_what_leans_is_part_of_the_content_and_what_does_not_is_not() -> None:
+    level = task(rise=0.15, distance_x=0.2)
+    assert {"slope", "landing_slope", "stairs"}.isdisjoint(level.content())
+    leaning = task(rise=0.15, distance_x=0.2, landing_slope=["5 deg", 0])
+    assert leaning.hash(BRUCE) != level.hash(BRUCE)
+    assert leaning.leans and not level.leans
+
+
+def test_stairs_set_heights_and_edges() -> None:
+    stairs = {"x": "9 cm", "rise": "3 cm", "run": "20 cm", "steps": 3}
+    up = task(rise=0.12, distance_x=0.2, stairs=stairs, repeat=4)
+    assert [place.z for place in up.places()] == pytest.approx([0.0, 0.03, 0.06, 0.09, 0.09])
+    edges = [edge_of(hop, at) for hop, at in zip(up.hops(), up.places(), strict=False)]
+    assert edges[:3] == pytest.approx([0.09, 0.29, 0.49])
+    assert edges[3] is None
+    # Over two edges at once the first one up, or the last one down, counts for both.
+    for rise, edge in (("3 cm", 0.09), ("-3 cm", 0.29)):
+        far = task(rise=0.16, distance_x=0.4, stairs=stairs | {"rise": rise})
+        assert edge_of(far.hops()[0], far.places()[0]) == pytest.approx(edge)
+        assert abs(far.places()[1].z) == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"landing_slope": ["50 deg", 0]}, "a slope is at most 45 deg, not 50 deg"),
+        ({"slope": ["5 cm", 0]}, r"slope\.0: expected a number in rad, found '5 cm'"),
+        ({"landing_slope": ["5 deg"]}, r"landing_slope\.1: is missing"),
+        (
+            {"slope": ["5 deg", 0], "stairs": {"x": 0.1, "rise": 0.03, "run": 0.2, "steps": 2}},
+            "stairs says what the ground is: give stairs, or slope, not both",
+        ),
+        ({"stairs": {"x": 0.1, "rise": 0.03, "run": 0.2}}, r"stairs\.steps: is missing"),
+    ],
+)
+def test_ground_that_cannot_be_is_refused(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(JumpTaskError, match=words):
+        task(rise=0.1, distance_x=0.2, **values)
+
+
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(
-        JumpTaskError, match=r"rough draws the ground: give rough, or landing_height"
+        JumpTaskError, match=r"rough says what the ground is: give rough, or landing_height"
     ):
         row(landing_height=0.02)
     with pytest.raises(

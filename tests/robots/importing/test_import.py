@@ -150,7 +150,8 @@ def notes_of(folder: Path, content: str) -> tuple[RobotDescription, list[str]]:
     """The robot of a URDF, and what is said of joints and masses in it."""
     (folder / "robot.urdf").write_text(content)
     found = read(folder / "robot.urdf")
-    return found.description, [n for n in found.notes if "mesh" not in n and "assumed" not in n]
+    others = ("mesh", "assumed", "rotor inertia")
+    return found.description, [n for n in found.notes if not any(o in n for o in others)]
 
 
 def test_a_link_without_mass_at_the_end_is_part_of_what_carries_it(tmp_path: Path) -> None:
@@ -192,3 +193,27 @@ def test_joints_without_a_range_are_free_or_fixed(tmp_path: Path) -> None:
     robot, notes = notes_of(tmp_path, ARM.replace('lower="-2" upper="2" ', 'lower="0" upper="0" '))
     assert [joint.name for joint in robot.joints] == ["shoulder"]
     assert notes == ["joint elbow has a range of 0 to 0 in the URDF and is fixed here"]
+
+
+def test_rotors_are_estimated_from_torque_and_speed(tmp_path: Path) -> None:
+    limits = '<limit lower="-1" upper="1" effort="{effort}" velocity="{speed}"/>'
+    joints = "".join(
+        f"""<link name="l{k}">{INERTIAL}</link><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>
+        <child link="l{k}"/><axis xyz="0 1 0"/>{limits.format(effort=effort, speed=speed)}</joint>"""
+        for k, (effort, speed) in enumerate(((24, 30), (48, 15), (10, 0)), start=1)
+    )
+    text = f'<robot name="r"><link name="l0">{INERTIAL}</link>{joints}</robot>'
+    robot = robot_of(tmp_path, text)
+    assert robot.motors.rotor_inertia == pytest.approx([0.0048, 0.0192, 0.0]), (
+        "the last has no speed"
+    )
+    notes = read(tmp_path / "robot.urdf").notes
+    assert (
+        "rotor inertia is estimated from peak torque and no-load speed: 0.0048 to 0.0192 kg m^2, which may as "
+        "well be 0.0028 to 0.064; write rotor_inertia under profiles"
+    ) in notes
+    for told in ({"rotor_inertia": 0.01}, {"motors": {"j1": {"rotor_inertia": 0.01}}}):
+        robot = robot_of(tmp_path, text, {"profiles": {"rated": told}})
+        assert robot.motors.rotor_inertia[0] == 0.01
+        assert robot.motors.rotor_inertia[1] == told.get("rotor_inertia", 0.0)
+        assert not [note for note in read(tmp_path / "robot.urdf").notes if "estimated" in note]

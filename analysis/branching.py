@@ -1,0 +1,142 @@
+"""A recorded run goes on from its exact state at one instant, with other parameters.
+
+Up to the instant the run is repeated from the last keyframe before it, as it was; its memory then is that of
+the recorded run to the byte. From there a graph with other parameters goes on. The same graph goes on as the
+recorded run did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.replay.replay import Replayable, Replayed, ReplayError, replay
+from ..runtime.language.layout import Layout
+from ..runtime.language.parameter_change import ParameterChange
+from ..runtime.language.stages import CheckedGraph
+from ..runtime.running.memory import BoundGraph, Snapshot
+from ..runtime.running.sinks import Sink
+
+
+@dataclass(frozen=True)
+class RunWithKeyframe:
+    """A recorded run with one keyframe more."""
+
+    run: Replayable
+    taken: Snapshot
+
+    @property
+    def graph(self) -> CheckedGraph:
+        """The graph that ran."""
+        return self.run.graph
+
+    @property
+    def bus(self) -> Layout:
+        """The layout of the rows."""
+        return self.run.bus
+
+    @property
+    def state(self) -> Layout:
+        """The layout of the keyframes' state."""
+        return self.run.state
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """All recorded ticks."""
+        return self.run.ticks
+
+    @property
+    def keyframes(self) -> Sequence[int]:
+        """The ticks before which the whole memory is known."""
+        return sorted({*self.run.keyframes, self.taken.tick})
+
+    @property
+    def changes(self) -> Sequence[ParameterChange]:
+        """The parameters that were changed while it ran."""
+        return self.run.changes
+
+    @property
+    def failed(self) -> bool:
+        """Whether a block failed in the tick after the last row."""
+        return self.run.failed
+
+    @property
+    def late(self) -> Sequence[str]:
+        """The background blocks of which a result was late."""
+        return self.run.late
+
+    def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+        """The ticks from ``first`` up to ``last``, and their rows."""
+        return self.run.rows(first, last)
+
+    def keyframe(self, tick: int) -> Snapshot:
+        """What the graph remembered before ``tick``. Raises ``KeyError``."""
+        return self.taken if tick == self.taken.tick else self.run.keyframe(tick)
+
+
+def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:
+    """What the recorded graph remembered before a tick, found by running it up to there.
+
+    Raises:
+        ReplayError: the recording does not reach it, or the run does not repeat itself.
+        RunError: a block could not be set up.
+    """
+    first, last = int(recorded.ticks[0]), int(recorded.ticks[-1])
+    if not first < tick <= last:
+        raise ReplayError(f"tick {tick} lies not within the recording: it has {first} to {last}")
+    found: list[Snapshot] = []
+
+    def take(bound: BoundGraph, now: int) -> None:
+        if now == tick:
+            taken = bound.snapshot()  # the clock has not gone on yet
+            found.append(Snapshot(tick, taken.bus, taken.state))
+
+    done = replay(recorded, inputs="seed", first_tick=tick - 1, last_tick=tick, before_tick=take)
+    if done.first is not None:
+        raise ReplayError(
+            f"the run does not repeat itself up to tick {tick}, so no run can go on from there: "
+            f"{done.first}"
+        )
+    done.result.raise_if_failed() if not found else None
+    return found[-1]
+
+
+def branch(
+    recorded: Replayable,
+    tick: int,
+    graph: CheckedGraph | None = None,
+    *,
+    until: int | None = None,
+    sinks: Sequence[Sink] = (),
+) -> Replayed:
+    """Let a recorded run go on from a tick with another graph.
+
+    Args:
+        recorded: the run.
+        tick: the tick before which it leaves the recorded one.
+        graph: what goes on: the recorded graph with other parameters, by default none. Its blocks must
+            remember the same.
+        until: the tick before which it ends; by default as the graph says, at least with the recording.
+        sinks: further sinks.
+
+    Returns:
+        The run and its differences from the recorded one, with its rows.
+
+    Raises:
+        ReplayError: the recording does not reach the tick, does not repeat itself up to it, or the graph
+            remembers something else.
+        RunError: a block could not be set up.
+    """
+    chosen = graph or recorded.graph
+    if any(spec.block_type.outside == "real" for spec in chosen.blocks):
+        raise ReplayError(
+            "the run of a real robot cannot go on in another way; branch a simulation"
+        )
+    known = RunWithKeyframe(recorded, snapshot_at(recorded, tick))
+    return replay(
+        known, graph=chosen, inputs="seed", first_tick=tick, last_tick=until,
+        beyond=until or chosen.ticks, keep=True, sinks=sinks,
+    )  # fmt: skip

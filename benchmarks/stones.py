@@ -1,0 +1,65 @@
+"""Random stepping stones of 12 x 20 cm, of which the robot sees one jump ahead.
+
+A course has ten stones with gaps of 2 to 14 cm, up to 3 cm aside of each other, level or up to 5 cm higher or lower
+(``graphs/steer_stones.yaml``), in the robust trial, with the position sensor and without. A stone holds both feet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..studies.summary import wilson_interval
+from .courses import JUMPS, LONGEST, fell, run_seed
+from .rows import Row
+
+SEEDS = range(31800, 31820)
+"""Of stones and robots; nothing is tuned on them."""
+MISSED_GOAL = 0.1
+"""The largest good share of courses that do not come to the last stone."""
+LEVEL, STEPPED = 0.0, 0.05
+"""How much higher or lower than the one before a stone may be [m]."""
+KINDS = (
+    ("stones, 5 cm up or down", STEPPED, True),
+    ("level stones", LEVEL, True),
+    ("level stones without the sensor", LEVEL, False),
+)
+
+
+def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
+    """Rows for each kind of stones: the share of courses that do not come to the last stone, and of those that fail a criterion."""
+    rows = []
+    for name, height, sensor in KINDS:
+        found = [run_stones(seed, height, sensor) for seed in seeds]
+        n, lost = len(found), [one for one in found if not passed(one)]
+        low, high = wilson_interval(len(lost), n)
+        worst = [float(one["worst_place_error_m"]) for one in found if one.get("jumps")]
+        why = "; ".join(
+            f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"]
+        )
+        rows += [
+            Row(f"{name}: courses lost", len(lost) / n, "", goal=MISSED_GOAL,
+                note=f"{n} courses of {JUMPS} jumps, 95 % interval {low:.2f} to {high:.2f}"),
+            Row(f"{name}: courses that are no success",
+                sum(not one["success"] for one in found) / n, "", note=why),
+            Row(f"{name}: largest error of place, median", float(np.median(worst)), "m"),
+        ]  # fmt: skip
+    return rows
+
+
+def passed(metrics: dict[str, Any]) -> bool:
+    """Whether it stood on every stone, and only toes and heels ever touched them."""
+    return bool(
+        metrics.get("jumps") == JUMPS and not fell(metrics) and metrics["forbidden_contacts"] == 0
+    )
+
+
+def run_stones(seed: int, height: float, sensor: bool) -> dict[str, Any]:
+    """The metrics of a course of stones, with its ``seed``. Without the sensor all of its measurements are lost."""
+    sets = {
+        "commands.random": {"count": JUMPS, "seed": seed, "height": height}, "duration": LONGEST,
+        "capture.dropout": 0.0 if sensor else 1.0,
+    }  # fmt: skip
+    return run_seed(seed, "steer_stones.yaml", (), sets)

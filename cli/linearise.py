@@ -1,0 +1,115 @@
+"""``aloft linearise``: the linear model of a graph about one instant, and the margins of an opened loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..runtime.language.errors import AloftError
+from .shared.options import AsJson, Overrides
+from .shared.output import console, errors_reported, number, print_json, say, table
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..analysis import Linearisation, Margins
+
+MOST_POLES = 12
+
+
+def linearise(
+    graph: Annotated[str, typer.Argument(help="The graph file.")],
+    inputs: Annotated[
+        list[str],
+        typer.Option("--from", help="A signal, such as pd.command.torque[*_knee]. Repeatable."),
+    ],
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option("--to", help="A signal that is observed; by default those of --from."),
+    ] = None,
+    at: Annotated[float | None, typer.Option(help="The instant [s].")] = None,
+    when: Annotated[
+        str, typer.Option(help="The first instant at which it holds: 'phase.phase == STAND'.")
+    ] = "",
+    opened: Annotated[
+        bool,
+        typer.Option("--open", help="Open the loop at --from. Without --to this gives margins."),
+    ] = False,
+    png: Annotated[Path | None, typer.Option(help="Draw Bode and Nyquist diagrams here.")] = None,
+    svg: Annotated[Path | None, typer.Option(help="The same as SVG.")] = None,
+    overrides: Overrides = None,
+    as_json: AsJson = False,
+) -> None:
+    """Linearise a whole graph about an instant: A, B, C, D, poles, and the margins of an opened loop."""
+    from ..analysis import linearise as linearise_graph
+    from ..analysis import margins
+    from ..runtime.graph import load
+
+    with errors_reported(as_json):
+        if at is None and not when:
+            raise AloftError("say about which instant: --at 0.4 or --when 'phase.phase == STAND'")
+        loop = opened and (outputs is None or outputs == inputs)
+        if (png or svg) and not loop:
+            raise AloftError("diagrams show an opened loop: give --open and no --to")
+        model = linearise_graph(
+            load(graph, overrides or []), inputs=inputs, outputs=outputs or inputs, at=at,
+            when=when, opened=opened,
+        )  # fmt: skip
+        found = margins(model) if loop else None
+        if found is not None:
+            draw(found, f"{Path(graph).stem} at {model.tick * model.base_period:.3f} s", png, svg)
+    if as_json:
+        about = {} if found is None else {"margins": found.as_data()}
+        print_json({"success": True, "graph": graph, **model.as_data(), **about})
+        return
+    show(console(), model, found)
+
+
+def draw(found: Margins, title: str, png: Path | None, svg: Path | None) -> None:
+    """Write the diagrams. Raises ``AloftError`` if a file cannot be written."""
+    from ..analysis.loop_margins import margins_figure
+    from ..plotting import image, style, svg_text
+
+    if png is None and svg is None:
+        return
+    with style():
+        figure = margins_figure(found, title)
+        try:
+            if svg is not None:
+                svg.write_text(svg_text(figure), encoding="utf-8")
+            if png is not None:
+                image(figure).save(png, format="PNG")
+        except OSError as error:
+            raise AloftError(f"cannot write the diagrams: {error}") from error
+
+
+def show(out: Console, model: Linearisation, found: Margins | None) -> None:
+    """Print what matters of a model, and what it leaves out."""
+    say(out, f"at {model.tick * model.base_period:.3f} s: {len(model.states)} states, "
+        f"{len(model.inputs)} inputs, {len(model.outputs)} outputs, period {model.period * 1e3:g} ms "
+        f"({model.unused} elements of state do not lie between them)")  # fmt: skip
+    poles = model.poles if found is None else found.poles
+    rows = [(f"{p.real:.6f}", f"{p.imag:.6f}", f"{abs(p):.6f}") for p in poles[:MOST_POLES]]
+    title = "slowest poles" if found is None else "slowest poles of the closed loop"
+    out.print(table(title, (">real", ">imaginary", ">size"), rows))
+    if found is not None:
+        loops = {**found.channels, "all at once": found.together}
+        lines = [
+            (name, number(m.gain_up), number(m.gain_down), number(m.phase), number(m.delay * 1e3),
+             number(m.crossover), number(m.disk), number(m.sensitivity_peak))
+            for name, m in loops.items()
+        ]  # fmt: skip
+        columns = ("loop", ">gain up", ">gain down", ">phase [deg]", ">delay [ms]",
+                   ">crossover [rad/s]", ">disk", ">peak of S")  # fmt: skip
+        out.print(table("margins, each channel with the others closed", columns, lines))
+        state = "stable" if found.stable else "unstable"
+        say(out, f"the closed loop is {state}; its fastest mode grows by {found.growth:.3g} 1/s")
+    for each in model.held:
+        say(out, f"held: {each}")
+    for name, error in model.uncertain.items():
+        say(
+            out,
+            f"uncertain: {name}: the slope is not the same on both sides, or rounded ({error:.2g})",
+        )

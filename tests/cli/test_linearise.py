@@ -1,0 +1,51 @@
+"""``aloft linearise`` on the command line."""
+
+from pathlib import Path
+
+import pytest
+
+from .conftest import run_for_json, run_here
+
+GRAPH = """
+rate: 100 Hz
+blocks:
+  k: {use: blocks.Gain, with: {gain: -30.0, unit: 1/s}, in: {u: x.y}}
+  x: {use: blocks.Integrator, with: {initial: [1.0]}, in: {u: {from: k.y, delay: 1}}}
+"""
+
+
+@pytest.fixture
+def loop(tmp_path: Path) -> str:
+    (tmp_path / "loop.yaml").write_text(GRAPH)
+    return str(tmp_path / "loop.yaml")
+
+
+def test_margins_of_an_opened_loop_as_json_and_pictures(loop: str, tmp_path: Path) -> None:
+    png, svg = tmp_path / "loop.png", tmp_path / "loop.svg"
+    drawn = ("--png", str(png), "--svg", str(svg))
+    told = run_for_json("linearise", loop, "--from", "k.y", "--open", "--at", "0.1", *drawn)
+    assert told["states"] == ["x/u~delay.past.value[0, 0]", "x.x.value[0]"]
+    # with one tick of delay the phase is -180 deg where w T = 60 deg, and there |L| = K T
+    assert told["margins"]["together"]["gain_up"] == pytest.approx(1.0 / 0.3, rel=1e-2)
+    assert told["margins"]["stable"] is True
+    assert list(told["margins"]["channels"]) == ["k.y.value[0]"]
+    assert png.read_bytes()[:4] == b"\x89PNG"
+    assert "phase [deg]" in svg.read_text()
+
+
+def test_a_model_as_a_table(loop: str) -> None:
+    out = run_here("linearise", loop, "--from", "k.y", "--to", "x.y", "--when", "x.y < 0.9").stdout
+    assert "2 states, 1 inputs, 1 outputs, period 10 ms" in out
+    assert "slowest poles" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--from", "k.y"], "say about which instant: --at 0.4 or --when"),
+        (["--from", "k.y", "--to", "x.y", "--at", "1", "--png", "a.png"], "diagrams show an opened loop"),
+        (["--from", "k.z", "--at", "1"], "there is no signal 'k.z'"),
+    ],
+)  # fmt: skip
+def test_wrong_questions(loop: str, arguments: list[str], text: str) -> None:
+    assert text in run_here("linearise", loop, *arguments, code=2).stderr
