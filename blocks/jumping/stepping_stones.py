@@ -173,5 +173,6 @@ class SteppingStones(Block):
         command.ahead, command.aside = rows[last, 0], rows[last, 1]
         command.turn, command.up = 0.0, rows[last, 2]
         seen.count = min(params.seen, rows.shape[0] - last)
+        seen.place[:] = 0.0
         for k in range(seen.count):
             seen.place[k, :] = rows[last + k]

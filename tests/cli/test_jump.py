@@ -114,7 +114,10 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
     )
     assert standard.model_dump()["mass_spread"] == 0.0
     assert standard.model_dump()["gyro_noise"] == 0.02
-    with pytest.raises(AloftError, match="--trial windy: there is nominal, real, robust, standard"):
+    with pytest.raises(
+        AloftError,
+        match="--trial windy: there is nominal, pushed, real, robust, standard, uneven, warm",
+    ):
         trial_settings("windy")
 
 

@@ -363,7 +363,8 @@ def test_the_collector_is_quiet_while_running_and_as_before_afterwards(frozen_be
     try:
         run(checked_graph({"w": BlockUse(Witness)}, ticks=2))
         assert seen == [False, False]
-        assert gc.isenabled() and gc.get_freeze_count() == frozen
+        # what is freed meanwhile, such as an entry of a cache, is frozen no more
+        assert gc.isenabled() and 0.999 * frozen <= gc.get_freeze_count() <= frozen
     finally:
         gc.freeze()  # as tests/conftest.py leaves it
 
