@@ -100,7 +100,8 @@ def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:
             f"the run does not repeat itself up to tick {tick}, so no run can go on from there: "
             f"{done.first}"
         )
-    done.result.raise_if_failed() if not found else None
+    if not found:
+        done.result.raise_if_failed()
     return found[-1]
 
 

@@ -73,6 +73,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "link_delays",
         "real_robot",
         "known_effects",
+        "identification",
         "courses",
         "pushed_courses",
         "stones",

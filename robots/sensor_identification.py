@@ -24,6 +24,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
+from ..mathematics.linear_systems import first_order, second_order
 from .identification import Estimate, IdentificationError, MeasuredRun
 from .kinematics import ball_feet
 from .pinocchio_model import build_pinocchio_model
@@ -94,23 +95,16 @@ def smooth(values: Array, period: float, cutoff: float = CUTOFF) -> Array:
     """
     ends = 2.0 * values[0] - values[PADDING:0:-1], 2.0 * values[-1] - values[-2 : -PADDING - 2 : -1]
     columns = np.asfortranarray(np.concatenate([ends[0], values, ends[1]]))
-    sections = _butterworth(math.tan(math.pi * cutoff * period))
+    low, resonant = np.empty(5), np.empty(5)
+    first_order(cutoff, period, False, low)
+    second_order(cutoff, 0.5, period, False, resonant)
     for _ in range(2):
         first = columns[0].copy()  # at rest at the first values
         columns = columns - first
-        for numerator, denominator in sections:
-            columns = _filtered(numerator, denominator, columns)
+        for section in (low, resonant):
+            columns = _filtered(section[:3], np.array([1.0, *section[3:]]), columns)
         columns = np.asfortranarray((columns + first)[::-1])
     return np.ascontiguousarray(columns[PADDING:-PADDING])
-
-
-def _butterworth(wide: float) -> tuple[tuple[Array, Array], ...]:
-    """Numerators and denominators, in the powers of the shift, of a section of the first and one of the second
-    order, by the bilinear transform; ``wide`` is tan(pi cutoff period)."""
-    low = np.array([wide, wide]) / (1.0 + wide), np.array([1.0, (wide - 1.0) / (wide + 1.0)])
-    size = 1.0 + wide + wide**2
-    poles = np.array([size, 2.0 * (wide**2 - 1.0), 1.0 - wide + wide**2]) / size
-    return low, (np.array([1.0, 2.0, 1.0]) * wide**2 / size, poles)
 
 
 def _filtered(numerator: Array, denominator: Array, columns: Array) -> Array:

@@ -24,7 +24,7 @@ ROBOT = find_robot("bruce")
 PERIOD = 0.002
 
 
-class Held:
+class HoldingDrives:
     """Drives that hold a pose with the plant's own gains, written without any of hal's drives."""
 
     def __init__(self, plant: Plant) -> None:
@@ -53,7 +53,7 @@ def plant_of(robot: RobotDescription, **params: object) -> Plant:
 
 def test_stands_with_any_drives_and_counts_its_steps() -> None:
     plant = plant_of(ROBOT, timestep=0.001)
-    drives = Held(plant)
+    drives = HoldingDrives(plant)
     step = plant.simulating(drives, 1)
     plant.stand(step, drives.hold)
     assert plant.physics.step == 0
@@ -69,7 +69,7 @@ def test_stands_with_any_drives_and_counts_its_steps() -> None:
 
 def test_loaded_it_goes_on_bit_for_bit() -> None:
     plant = plant_of(ROBOT, seed=3, timestep=0.001, gyro_noise=0.02, joint_velocity_noise=0.05)
-    drives = Held(plant)
+    drives = HoldingDrives(plant)
     step = plant.simulating(drives, 1)
     plant.stand(step, drives.hold)
     plant.simulating(drives, 10).run()
