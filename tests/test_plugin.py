@@ -105,6 +105,7 @@ def test_its_mistakes_are_reported_as_those_of_our_own_blocks(installed: Path) -
     assert report["problems"][0]["nearest"] == ["springs.Spring"]
 
 
+@pytest.mark.long
 def test_it_is_listed_and_its_contract_is_shown(installed: Path) -> None:
     assert "springs.Spring" in aloft(installed, "blocks")
     assert "The force of a spring." in aloft(installed, "blocks", "springs.Spring")

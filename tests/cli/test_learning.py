@@ -24,6 +24,7 @@ def test_a_ladder_begins_small_and_ends_half_as_far() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_it_jumps_twice_and_the_second_is_corrected(folder: Path, call_json: CallJson) -> None:
     words = ("jump", "--learn", "mine.json", "--trial", "standard")
     found = call_json(*words, "--times", "2", "--seed", "3")

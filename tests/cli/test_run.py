@@ -95,6 +95,7 @@ def test_exit_codes_of_a_run(
     assert f"success: {reason}" in done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_seeds_give_a_row_each_in_order(folder: Path, call: Call, call_json: CallJson) -> None:
     options = ("--seeds", "3:6,0", "--set", "counter.goal=104")
     result = call_json("run", "count.yaml", *options, code=1)

@@ -97,6 +97,7 @@ def alone(*settings: str) -> dict[str, Any]:
     return run_for_json("run", "graph.yaml", "--no-record", *settings, code=0)
 
 
+@pytest.mark.long
 def test_one_result_and_one_recording_with_the_bytes_of_one_process(here: Path) -> None:
     together = run_for_json("run", "graph.yaml", "--local")
     expected = run_for_json("run", "graph.yaml", "--record", "alone.rrd")

@@ -32,6 +32,7 @@ def test_what_is_no_list_of_commands_is_refused(tmp_path: Path) -> None:
     assert "500 m" in reason("[{ahead: 500 m}]")
 
 
+@pytest.mark.long
 def test_without_a_terminal_it_asks_for_a_file() -> None:
     shown = run_here("steer", "--no-record", code=3).stderr
     assert "standard input is no terminal" in shown

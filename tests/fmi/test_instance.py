@@ -48,6 +48,7 @@ BY_FMPY = WATCHED + "for _ in range(2): fmpy.simulate_fmu('wave.fmu', stop_time=
 BY_ALOFT = WATCHED + "aloft.load('user.yaml').run().raise_if_failed()\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("program", [BY_FMPY, BY_ALOFT])
 def test_each_of_two_libraries_is_released_once_before_the_exit(
     program: str, tmp_path: Path

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import aloft
 
@@ -25,6 +26,7 @@ def test_a_jump_driven_by_the_invariant_filter() -> None:
         assert isinstance(value, float) and 0.0 < value < bound, name
 
 
+@pytest.mark.long
 def test_every_onlooker_sees_the_same_jump() -> None:
     path = GRAPH.with_name("estimator_watching.yaml")
     onlookers = ({}, {"estimator.use": "blocks.ComplementaryFilter", "contacts.hold": "0 s"})

@@ -23,6 +23,7 @@ def place_of(link, robot, joints, position, orientation):
     return position + rotation @ poses[link][1]
 
 
+@pytest.mark.long
 def test_the_hand_of_a_standing_g1_follows_a_circle():
     """Within 15 mm of the target in the simulator's truth, and within 10 mm in the last second."""
     result = aloft.load(GRAPHS / "robots" / "g1_hand.yaml").run()

@@ -23,6 +23,7 @@ def each_label_once(expanded: list[Cell]) -> list[Cell]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
 def test_every_graph_takes_what_is_set(path: Path) -> None:
     if path.stem.endswith(".tuned"):

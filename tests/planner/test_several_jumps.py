@@ -57,6 +57,7 @@ def test_up_a_step_and_down_again_without_standing_still() -> None:
     assert plan.com_velocity[between, 0].min() > 0.05, "it goes on forwards"
 
 
+@pytest.mark.long
 def test_every_flight_is_checked() -> None:
     plan = steps()
     knot = plan.knot_at(plan.lift_off_times[1])

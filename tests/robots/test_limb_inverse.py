@@ -57,6 +57,7 @@ def error(limb, pose, target):
     return math.sqrt(foot_error(limb.tip, pose, target, WEIGHTS, np.zeros(6)))
 
 
+@pytest.mark.long
 @kinds
 def test_every_place_that_can_be_reached_is_found(name):
     """Targets drawn from all joint positions, from a start that knows nothing of them."""

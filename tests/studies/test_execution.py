@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from aloft.studies.execution import Run, make_runs
 from aloft.studies.expansion import cells, checked_cells
 from aloft.studies.journal import Journal, Outcome
@@ -28,6 +30,7 @@ def runs_of(found: Study) -> list[Run]:
     return [Run(cell, seed) for cell in checked for seed in found.seeds]
 
 
+@pytest.mark.long
 def test_a_process_that_dies_is_an_error_now_and_tried_again_next_time(
     folder: Path, study: Read
 ) -> None:

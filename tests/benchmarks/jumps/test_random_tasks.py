@@ -57,6 +57,7 @@ def test_what_fails_is_counted_and_named(monkeypatch: pytest.MonkeyPatch) -> Non
     assert share.met is False
 
 
+@pytest.mark.long
 def test_one_task_is_planned_and_checked() -> None:
     robot = find_robot("bruce")
     assert plan_one(random_tasks(1, 5)[0].model_copy(update={"twist": 0.0}), robot) == ""

@@ -49,6 +49,7 @@ def test_rows_are_complete_and_say_what_is_missing() -> None:
     json.dumps([row.to_json() for row in rows.values()], allow_nan=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("plain", [False, True])
 def test_the_recorded_controller_repeats_the_jump(jump: RecordedJump, plain: bool) -> None:
     controller = RecordedController(jump, plain=plain)

@@ -48,6 +48,7 @@ class Strike:
         pass
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_viewer_that_fails_is_a_warning(
     tmp_path: Path, number: signal.Signals, capfd: pytest.CaptureFixture[str]
@@ -79,6 +80,7 @@ def test_a_viewer_that_fails_is_a_warning(
         viewer.stop()
 
 
+@pytest.mark.long
 def test_a_viewer_that_is_not_there_is_a_warning(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -79,6 +79,7 @@ def test_where_nothing_can_be_kept_the_earlier_recording_stays(aloft: Any, tmp_p
         assert not (tmp_path / "old.part.rrd").exists()
 
 
+@pytest.mark.long
 def test_a_run_that_fails_keeps_its_own_exit_code(aloft: Any, tmp_path: Path) -> None:
     bound = "  low: {use: blocks.Assertion, with: {n: 32, upper: 0.0}, in: {u: noise.y}}\n"
     (tmp_path / "noise.yaml").write_text(GRAPH + bound)
@@ -87,6 +88,7 @@ def test_a_run_that_fails_keeps_its_own_exit_code(aloft: Any, tmp_path: Path) ->
     assert "error: no recording: " in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="needs a file system of its own")
 def test_a_full_disk(aloft: Any, tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()

@@ -142,6 +142,7 @@ def test_virtual_time_waits_for_room(tmp_path: Path) -> None:
     assert len(recorded.notes) == 4
 
 
+@pytest.mark.long
 def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", ring_time=0.01, when_full="drop")
     freeze = At(1000, lambda: os.kill(process_of(recorder), signal.SIGSTOP))
@@ -231,6 +232,7 @@ Executor(graph(1_000_000), sinks=[recorder, tell], clock=ClockSpec("paced"), log
 """
 
 
+@pytest.mark.long
 def test_the_recorder_finishes_when_the_run_is_killed(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     script = SCRIPT.format(folder=str(Path(__file__).parent), path=str(path))
@@ -266,6 +268,7 @@ def _lives(number: int) -> bool:
     return state != "Z"
 
 
+@pytest.mark.long
 def test_overruns_and_faults_are_noted(tmp_path: Path) -> None:
     class Slow(Walk):
         def step(self) -> None:
@@ -307,6 +310,7 @@ def test_two_runs_into_one_file_spoil_nothing(tmp_path: Path) -> None:
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a-2.rrd", "a.rrd"]
 
 
+@pytest.mark.long
 def test_a_file_that_somebody_removes_is_written_again(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd")
     remove = At(500, lambda: (tmp_path / "a.part.rrd").unlink())

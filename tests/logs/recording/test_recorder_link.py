@@ -185,6 +185,7 @@ def test_a_sink_that_hangs_without_waiting_ends_the_run() -> None:
     )
 
 
+@pytest.mark.long
 def test_a_recorder_that_ends_between_two_looks_is_not_stuck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,6 +207,7 @@ def test_a_recorder_that_ends_between_two_looks_is_not_stuck(
     assert recorder.report is not None and recorder.report.rows == 5
 
 
+@pytest.mark.long
 def test_a_process_that_was_started_early_records_the_run(tmp_path: Path) -> None:
     link = RecorderLink()
     recorder = Recorder(tmp_path / "a.rrd", link=link)
@@ -222,6 +224,7 @@ def test_a_process_that_was_started_early_for_nothing_ends() -> None:
     assert not link.is_alive()
 
 
+@pytest.mark.long
 def test_a_process_ends_with_one_that_died_before_it_had_a_task() -> None:
     code = "from aloft.logs.recording.recorder_link import RecorderLink; import os; "
     code += "link = RecorderLink(); os._exit(0)"

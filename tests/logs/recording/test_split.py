@@ -50,6 +50,7 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
     return recorder, result
 
 
+@pytest.mark.long
 def test_every_tick_is_in_one_of_the_files(tmp_path: Path) -> None:
     recorder, result = recorded(tmp_path, split=5.0)
     names = ["run.rrd", "run-part002.rrd", "run-part003.rrd"]
@@ -79,12 +80,14 @@ def test_each_file_can_be_replayed_by_itself(tmp_path: Path) -> None:
         assert (done.identical, done.first_tick) == (True, first)
 
 
+@pytest.mark.long
 def test_a_short_run_is_in_one_file(tmp_path: Path) -> None:
     recorder, _ = recorded(tmp_path, split=60.0)
     assert recorder.files == ()
     assert [path.name for path in tmp_path.glob("*.rrd")] == ["run.rrd"]
 
 
+@pytest.mark.long
 def test_the_recorder_is_killed_in_the_second_file(tmp_path: Path) -> None:
     recorder, _ = recorded(tmp_path, split=5.0, on_tick=800)
     assert read(tmp_path / "run.rrd").whole

@@ -153,6 +153,7 @@ def test_another_c_library_is_named(opened: OpenedRun, monkeypatch: pytest.Monke
     assert opened.changed_dependencies() == [f"C library was {ours} and is glibc 2.5"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names kernels of x86-64 processors")
 def test_another_kernel_of_blas_is_named(made: tuple[Path, RunResult]) -> None:
     """With other routines BLAS rounds otherwise, which a replay must be able to say."""

@@ -189,6 +189,7 @@ def test_there_is_no_impact_but_where_two_knots_have_one_time() -> None:
     assert error == np.inf and kept.tolist() == [0.0] * len(JOINTS)
 
 
+@pytest.mark.long
 def test_the_lowest_point_of_feet_and_body_is_named_with_its_time(by_hand: PlannedJump) -> None:
     sunk = shifted(by_hand, "position", -0.3, (slice(None), 2))
     at = sunk.position.copy()

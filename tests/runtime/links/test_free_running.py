@@ -148,6 +148,7 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
     assert far.lost == 0
 
 
+@pytest.mark.long
 def test_a_part_with_actuators_does_not_join_by_itself() -> None:
     Counter.LOG.clear()
     placed = place(free(LinkPolicy(None, "hold"), ticks=20_000))
@@ -209,6 +210,7 @@ def test_the_clocks_of_the_others_are_estimated() -> None:
             assert clock.uncertainty >= 0 and abs(clock.offset) <= clock.uncertainty
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("policy", ["hold", "safe"])
 def test_a_part_that_is_gone_does_not_end_the_others(policy: str) -> None:
     graph = free(LinkPolicy(0.05, policy), ticks=250)  # type: ignore[arg-type]

@@ -71,6 +71,7 @@ def stack() -> Iterator[ExitStack]:
         yield made
 
 
+@pytest.mark.long
 def test_statuses_and_signals_of_all_parts(stack: ExitStack) -> None:
     placed = placed_at("tcp")
     observer = stack.enter_context(Observer(placed))

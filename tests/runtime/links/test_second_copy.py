@@ -23,6 +23,7 @@ def lockstep() -> CheckedGraph:
     return ring({"factor": 1.0}, ticks=1_000_000)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("graph", [lambda: free(ticks=100_000), lockstep])
 def test_the_run_goes_on_and_the_newcomer_says_why(
     graph: Callable[[], CheckedGraph], monkeypatch: pytest.MonkeyPatch

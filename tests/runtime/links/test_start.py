@@ -54,6 +54,7 @@ def test_parts_of_different_graphs_refuse_to_start() -> None:
     assert Counter.LOG == []
 
 
+@pytest.mark.long
 def test_a_part_that_does_not_come_is_named_with_its_endpoint() -> None:
     Counter.LOG.clear()
     results = run_parts({"onboard": ring(), "near": ring()}, timeout=2.0)

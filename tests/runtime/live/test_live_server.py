@@ -184,6 +184,7 @@ LINE = "document.getElementById('line').textContent"
 STATE = "document.getElementById('state').textContent"
 
 
+@pytest.mark.long
 def test_a_run_is_watched_and_tuned(server: LiveServer, running: Running, tmp_path: Path) -> None:
     wave: Any = running.bound.blocks["wave"]
     with Browser(tmp_path / "profile", (1200, 800)) as browser:

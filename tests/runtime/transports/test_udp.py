@@ -162,6 +162,7 @@ def test_a_machine_that_is_silent_is_lost_after_a_while() -> None:
         second.close()
 
 
+@pytest.mark.long
 def test_who_acknowledges_nothing_is_lost_after_a_bounded_number_of_attempts() -> None:
     first, second, lost = pair_of(UdpTransport)
     try:

@@ -47,6 +47,7 @@ def test_it_is_the_workers_that_work(cluster: str, monkeypatch: pytest.MonkeyPat
     assert [found[k].value for k in (0, 1)] == [None, "1"]
 
 
+@pytest.mark.long
 def test_a_job_that_kills_its_workers_is_given_up_and_the_others_are_done(cluster: str) -> None:
     found = results(signal.raise_signal, [signal.SIGKILL, *[0] * 10], cluster)
     assert found[0].error.startswith("the cluster gave up: ")
