@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
@@ -62,6 +63,9 @@ LEAST_COMPLIANCE = 3e-4
 """No compliance is claimed to be known better [rad/(N m)]: play that is not seated looks like one."""
 LEAST_AGE, LEAST_PLAY = 1.5e-4, 1.5e-3
 """No age [s] and no play [rad] is claimed to be known better."""
+
+STOOD = 3.0
+"""The shortest stance that tells enough [s]."""
 
 
 @dataclass(frozen=True)
@@ -130,25 +134,32 @@ def shifted(values: Array, ticks: float) -> Array:
 
 
 def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
-    """The longest time in which every foot has a closed switch, up to bounces of some ticks."""
-    window = max(3, round(0.2 / motion.period))
-    feet = sorted({contact.foot for contact in robot.contacts})
-    loaded = np.ones(len(motion.closed), dtype=np.bool_)
-    for foot in feet:
-        own = [k for k, contact in enumerate(robot.contacts) if contact.foot == foot]
-        loaded &= motion.closed[:, own].any(axis=1)
+    """The longest time in which every foot has a closed switch, up to bounces of some ticks.
+
+    Where that is too short the switches are too heavy for their loads, as a sway lifts no foot, and a closed
+    switch of any foot counts.
+    """
+    owners = np.array([contact.foot for contact in robot.contacts])
+    closed = [motion.closed[:, owners == foot].any(axis=1) for foot in dict.fromkeys(owners)]
+    for loaded in (np.all(closed, axis=0), np.any(closed, axis=0)):
+        start, end = _longest(loaded, motion.period)
+        if (end - start) * motion.period >= STOOD:
+            return slice(start, end)
+    if end == start:
+        raise IdentificationError("the robot never stands on its feet")
+    raise IdentificationError(
+        f"the robot stands for less than {STOOD:g} s on its feet: let it sway (blocks.SwayReference)"
+    )
+
+
+def _longest(loaded: NDArray[np.bool_], period: float) -> tuple[int, int]:
+    """The first tick of the longest stance and the one after its last."""
+    window = max(3, round(0.2 / period))
     share = np.convolve(loaded, np.ones(window) / window, mode="same")
     firm = np.concatenate([[False], share > 0.3, [False]])
-    edges = np.flatnonzero(np.diff(firm.astype(np.int64)))
-    spans = edges.reshape(-1, 2)
-    if not len(spans):
-        raise IdentificationError("the robot never stands on all its feet")
-    start, end = max(spans.tolist(), key=lambda s: s[1] - s[0])
-    if (end - start) * motion.period < 3.0:
-        raise IdentificationError(
-            "the robot stands for less than 3 s on all its feet: let it sway (blocks.SwayReference)"
-        )
-    return slice(start, end)
+    spans = np.flatnonzero(np.diff(firm.astype(np.int64))).reshape(-1, 2).tolist()
+    start, end = max(spans, key=lambda span: int(span[1] - span[0]), default=(0, 0))
+    return start, end
 
 
 def identify_sensors(robot: RobotDescription, motion: MeasuredRun) -> IdentifiedSensors:

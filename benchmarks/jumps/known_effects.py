@@ -101,7 +101,10 @@ def landed(job: EffectJob) -> dict[str, str]:
     include = [str(graphs / "sway.yaml"), *(str(file) for file in jumps[0].include)]
     sway.parent.mkdir(parents=True, exist_ok=True)
     sway.write_text(yaml.safe_dump({"include": include, "set": effect}), encoding="utf-8")
-    fragment = calibrated(sway, job.seed, name)
+    try:
+        fragment = calibrated(sway, job.seed, name)
+    except AloftError as error:
+        return {cell.task: f"not calibrated: {error}" for cell in jumps}
     for cell in jumps:
         sets = {
             **cell.overrides,

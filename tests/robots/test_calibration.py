@@ -119,6 +119,16 @@ def test_one_bouncing_switch_ends_no_stance() -> None:
     assert standing_span(ROBOT, motion) == slice(0, 2000)
 
 
+def test_switches_too_heavy_for_their_loads_end_no_stance() -> None:
+    motion = standing(4000)
+    of_foot = np.array([contact.foot for contact in ROBOT.contacts]) == ROBOT.feet[0].name
+    motion.closed[:, of_foot] = np.arange(4000)[:, None] % 1000 < 500  # the load sways to and fro
+    motion.closed[:, ~of_foot] = np.arange(4000)[:, None] % 1000 > 400
+    assert standing_span(ROBOT, motion) == slice(0, 4000)
+    motion.closed[2400:] = False
+    assert standing_span(ROBOT, motion).stop < 2500
+
+
 def test_the_filter_is_not_late_and_a_shift_is() -> None:
     time = 0.002 * np.arange(2000)
     wave = np.sin(2.0 * math.pi * time)[:, None]

@@ -73,3 +73,15 @@ def test_a_late_gyroscope_is_found_and_told(
         ("in place 12 cm", 1),
         ("ahead 20 cm", 1),
     ]
+
+
+def test_a_robot_that_cannot_be_calibrated_lands_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def refuse(graph: Path, seed: int, name: str) -> Path:
+        raise AloftError("it never stands")
+
+    monkeypatch.setattr(known_effects, "FOLDER", tmp_path)
+    monkeypatch.setattr(known_effects, "calibrated", refuse)
+    reasons = landed(EffectJob(3, "cable of 1 N"))
+    assert {*reasons.values()} == {"not calibrated: it never stands"}
