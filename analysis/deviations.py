@@ -137,12 +137,16 @@ def mean(values: Array, size: int) -> Array:
     total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     first = np.clip(np.arange(n) - size // 2, 0, n)
     last = np.clip(np.arange(n) - size // 2 + size, 0, n)
-    return (total[last] - total[first]) / (last - first).reshape(-1, *[1] * (values.ndim - 1))
+    averaged: Array = (total[last] - total[first]) / (last - first).reshape(
+        -1, *[1] * (values.ndim - 1)
+    )
+    return averaged
 
 
 def length(vectors: Array) -> Array:
     """Euclidean norms of (n, k) vectors."""
-    return np.linalg.norm(vectors, axis=-1)
+    norms: Array = np.linalg.norm(vectors, axis=-1)
+    return norms
 
 
 def _disturbances(run: RobotRun) -> Iterator[Measure]:

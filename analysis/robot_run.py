@@ -71,7 +71,7 @@ class RobotRun:
     @cached_property
     def time(self) -> Array:
         """Of every tick [s], (n,)."""
-        return self.run.ticks * self.period
+        return np.asarray(self.run.ticks * self.period, np.float64)
 
     @cached_property
     def rows(self) -> NDArray[np.uint8]:
