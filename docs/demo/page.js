@@ -253,7 +253,7 @@ function plot(canvas2) {
 
 // Running
 
-let world = null, before = 0, owed = 0, since = 0;
+let world = null, before = 0, owed = 0, since = 0, stale = true;
 
 async function begin() {
   const next = await makeWorld(
@@ -288,6 +288,7 @@ function frame(now) {
     renderer.setSize(box.clientWidth, box.clientHeight, false);
     camera.aspect = box.clientWidth / box.clientHeight;
     camera.updateProjectionMatrix();
+    stale = true;
   }
   const passed = Math.min(0.05, (now - before) / 1000);
   before = now;
@@ -301,10 +302,12 @@ function frame(now) {
     since += 1;
     if (since % 4 === 0 || world.ended) plots.forEach(plot);
   }
-  if (world) draw(world);
   showing -= 1;
-  controls.update();
-  renderer.render(scene, camera);
+  if (controls.update() || stale || (world && !world.ended)) {
+    if (world) draw(world);
+    renderer.render(scene, camera);
+  }
+  stale = world && !world.ended;
 }
 
 for (const [name, text] of Object.entries(jumps)) fields.jump.add(new Option(text, name));

@@ -11,11 +11,10 @@ from __future__ import annotations
 import ctypes
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +51,7 @@ ARRAYS = {
 """What a page shows or changes, by block, port or state, and field; and the whole memory of the graph."""
 
 
-@dataclass
-class World:
+class World(NamedTuple):
     """A graph whose robot, drawn by a seed, stands, and its module; ``programs`` are the calls of the robot
     in a tick: functions of the module, steps of the simulator, and draws ``[kind, place, count]``."""
 
