@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from ..blocks.signals import BodyTwist
@@ -18,6 +19,27 @@ JUMP, END = 0, 6
 """Buttons: A and back."""
 LOOK = 0.01
 """So often the reader looks for events [s]."""
+
+_sdl_lock = threading.Lock()
+_sdl_users = 0
+
+
+@contextmanager
+def sdl_video(pygame: Any) -> Iterator[None]:
+    """Keep SDL's events and joysticks, which a process has once, until their last user leaves."""
+    global _sdl_users
+    with _sdl_lock:
+        _sdl_users += 1
+        pygame.display.init()
+        pygame.joystick.init()
+    try:
+        yield
+    finally:
+        with _sdl_lock:
+            _sdl_users -= 1
+            if not _sdl_users:
+                pygame.joystick.quit()
+                pygame.display.quit()
 
 
 class Gamepad(Block):
@@ -112,19 +134,17 @@ class Gamepad(Block):
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
         os.environ.setdefault("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        import pygame
-
-        pygame.display.init()
-        pygame.joystick.init()
-        self._ready.set()
         try:
-            while not self._ends.is_set():
-                for event in pygame.event.get():
-                    self._take(pygame, event)
-                time.sleep(LOOK)
+            import pygame
+
+            with sdl_video(pygame):
+                self._ready.set()
+                while not self._ends.is_set():
+                    for event in pygame.event.get():
+                        self._take(pygame, event)
+                    time.sleep(LOOK)
         finally:
-            pygame.joystick.quit()
-            pygame.display.quit()
+            self._ready.set()  # also where SDL failed, or ``start`` would wait for ever
 
     def _take(self, pygame: Any, event: Any) -> None:
         """Take one event."""

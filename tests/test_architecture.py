@@ -100,7 +100,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "logs": ("logs/file",),
     "studies": ("processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
-    "analysis": ("mathematics", "runtime", "logs", "plotting"),
+    "analysis": ("mathematics", "robots", "runtime", "blocks/signals", "logs", "plotting"),
     "benchmarks": (
         "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
     ),

@@ -72,7 +72,7 @@ class StepParams(Parameters):
         text="height up to which the other points of a foot carry load while another foot steps",
     )
     seek_speed: float = live_parameter(
-        1.0, unit="m/s", ge=0.0, le=2.0,
+        0.3, unit="m/s", ge=0.0, le=2.0,
         text="downward speed of a foot that has not touched after the touchdown of another; 0: it is "
         "left to its inverse kinematics",
     )  # fmt: skip

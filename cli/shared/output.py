@@ -202,7 +202,9 @@ def compiling_shown(progress: Progress) -> Iterator[None]:
 def stopped_by_signals() -> Iterator[list[signal.Signals]]:
     """Leave the block at the first SIGINT or SIGTERM; the list then holds that signal.
 
-    Within the block it is a ``KeyboardInterrupt``, so what is under way can clean up.
+    Within the block it is a ``KeyboardInterrupt``, so what is under way can clean up. Compiled code
+    that calls back makes another error of it (pydantic a ``PydanticSerializationError``), so once a
+    signal came, any error that leaves the block counts as its consequence.
     """
     received: list[signal.Signals] = []
 
@@ -213,7 +215,7 @@ def stopped_by_signals() -> Iterator[list[signal.Signals]]:
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield received
-    except KeyboardInterrupt:
+    except (Exception, KeyboardInterrupt):
         if not received:
             raise
     finally:

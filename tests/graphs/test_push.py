@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 import aloft
 from aloft.runtime.loading import check
@@ -52,6 +53,20 @@ def test_steps_after_touchdown_keep_the_robot_from_that_fall():
         assert metrics["steps"] >= 1
         stays += metrics["peak_tilt_deg"] < 45.0 and metrics.get("final_tilt_deg", 90.0) < 5.0
     assert stays >= 4
+
+
+@pytest.mark.long
+def test_a_strong_push_aside_is_landed_as_feet_seek_the_ground_slowly(tmp_path: Path):
+    graph = tmp_path / "aside.yaml"
+    files = [str(PUSH), str(PUSH.parent / "trials" / "robust.yaml")]
+    graph.write_text(yaml.safe_dump({"include": files}))
+    push = {"push.force": 120.0, "push.angle": np.pi / 2.0}
+    landed = {0.3: 0, 1.0: 0}
+    for speed in landed:
+        for seed in (9132, 9136, 9138):
+            settings = push | {"robot.seed": seed, "step.seek_speed": speed}
+            landed[speed] += aloft.load(graph, settings).run(log=False).success
+    assert landed[0.3] == 3 > landed[1.0]
 
 
 def test_the_parametric_jump_goes_higher():

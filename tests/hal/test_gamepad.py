@@ -67,3 +67,16 @@ def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(AloftError, match=r"pip install 'aloft-robotics\[gamepad\]'"):
         load(shipped_folder() / "steer_by_gamepad.yaml")
+
+
+def test_a_gamepad_that_closes_leaves_another_its_events() -> None:
+    pygame = pytest.importorskip("pygame")
+    kept, closed = (BlockBench(Gamepad, {}) for _ in range(2))
+    try:
+        kept.step()
+        closed.step()
+        closed.close()
+        pygame.event.post(pygame.event.Event(pygame.JOYBUTTONDOWN, instance_id=0, button=0))
+        wait(kept, lambda: float(kept.get("twist").linear[2]) > 0.0)
+    finally:
+        kept.close()

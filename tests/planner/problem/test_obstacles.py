@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.robots.limbed_robots import quadruped
 
 from aloft.planner.library.library import solve_and_check
 from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
@@ -104,7 +103,7 @@ def test_which_points_are_watched() -> None:
 
 def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
     """While they stand: a leg with no ankle can fold until its knee touches."""
-    for robot, watched in ((quadruped(), True), (ROBOT, False)):
+    for robot, watched in ((find_robot("go2"), True), (ROBOT, False)):
         model = SymbolicModel(robot)
         coordinates = full_coordinates(model)
         task = make_task({"recipe": "paper", "name": "up", "robot": robot.name, "rise": 0.1})
@@ -121,7 +120,7 @@ def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
 
 def test_knees_keep_off_the_ground_also_at_the_end() -> None:
     """Where only the base is given: the last knot has no interval, and its joints are free."""
-    for robot, watched in ((quadruped(), True), (ROBOT, False)):
+    for robot, watched in ((find_robot("go2"), True), (ROBOT, False)):
         task = make_task({"name": "up", "robot": robot.name, "rise": 0.1})
         last = make_problem(task, robot, compiled=False).assembly.knots[-1]
         assert ("obstacle" in last.pieces) is watched
