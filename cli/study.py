@@ -14,6 +14,7 @@ from .shared.output import console, errors_reported, print_json, print_warning, 
 from .shared.studies import (
     check_cells,
     make_all,
+    print_comparisons,
     print_rows,
     report_stop,
     study_json,
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from ..studies.comparison import Comparing
     from ..studies.study import CellFilter, Study
 
 
@@ -46,6 +48,21 @@ def study(
     ] = None,
     workers: Workers = 0,
     cluster: Cluster = "",
+    compared: Annotated[
+        str,
+        typer.Option(
+            "--compare",
+            help="The axis whose settings are compared seed by seed, and the base: arm=paper. "
+            "By default the arms, or the first axis, with the first value.",
+        ),
+    ] = "",
+    detect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="For which difference the seeds needed are said: 5%, or peak_tilt_deg=2. "
+            "By default the measured one. Repeatable."
+        ),
+    ] = None,
     number: Annotated[
         int,
         typer.Option("--open", help="Record run N of the worst runs (worst.md), and show it."),
@@ -58,12 +75,14 @@ def study(
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
     Runs that were made before are not made again, so a study that was stopped or killed goes on
-    where it was. 'aloft tune' searches the parameters of a study's arms. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+    where it was. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
+    study's arms, 'aloft falsify' the worst case. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
     """
     from ..studies.batch.seeds import parse_seeds
+    from ..studies.comparison import Comparing, compared_axis, read_detect
     from ..studies.reading import part_of, read_study
     from .shared.paper import NAME, draw_paper
 
@@ -87,9 +106,11 @@ def study(
             raise typer.Exit(
                 open_run(found, part, chosen, folder, number, screen, as_json, show=not no_show)
             )
+        comparing = Comparing(*compared_axis(found, compared), read_detect(detect or []))
         code = run_study(
-            found, part, chosen, folder, workers, cluster, screen, as_json, dry_run=dry_run
-        )
+            found, part, chosen, folder, workers, cluster, screen, as_json, comparing,
+            dry_run=dry_run,
+        )  # fmt: skip
     raise typer.Exit(code)
 
 
@@ -102,11 +123,13 @@ def run_study(
     cluster: str,
     screen: Console,
     as_json: bool,
+    comparing: Comparing,
     *,
     dry_run: bool = False,
 ) -> ExitCode:
     """Make the study's runs; write and print the results."""
     from ..studies.charts import write_plots
+    from ..studies.comparison import compare
     from ..studies.execution import Run
     from ..studies.expansion import cells as expand
     from ..studies.journal import Journal
@@ -133,14 +156,17 @@ def run_study(
             return report_stop(stopped, runs, journal, screen, as_json)
         done = stopped
     rows = summarise(found, done)
+    comparisons = compare(found, done, comparing)
     write_table(folder / "runs.parquet", make_table(done))
     page = write_page(found, done, folder / "worst.md")
     result = study_json(found, rows, seeds, folder)
     plots, undrawn = write_plots(found, done, rows, folder)
+    result["comparisons"] = [each.to_json() for each in comparisons]
     result["tuned"], result["worst"] = tuned, str(page)
     result["plots"] = {name: str(path) for name, path in plots.items()}
     (folder / "summary.json").write_text(json_text(result), encoding="utf-8")
     print_rows(screen, found, rows, seeds)
+    print_comparisons(screen, comparisons)
     say(screen, f"table: {folder / 'runs.parquet'}; summary: {folder / 'summary.json'}")
     say(screen, f"worst runs: {page}; to see the first: aloft study {found.path} --open 1")
     for path in plots.values():

@@ -16,6 +16,7 @@ from .viewing import draw, how_to_view, show
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ...studies.comparison import Comparison
     from ...studies.execution import Run
     from ...studies.expansion import Cell
     from ...studies.journal import Journal, Outcome
@@ -154,6 +155,45 @@ def print_rows(
     screen.print(table(study.title, columns, cells))
     if len(rows) > MOST_ROWS:
         screen.print(f"... and {len(rows) - MOST_ROWS} more cells, in the summary")
+
+
+MOST_COMPARISONS = 40
+
+
+def print_comparisons(screen: Console, comparisons: Sequence[Comparison]) -> None:
+    """Print success and, of the metrics, those whose difference is clear of chance.
+
+    A metric is shown if its p times the number of all metrics that are compared (Bonferroni) is below 0.05.
+    """
+    from ...studies.comparison import SUCCESS
+
+    metrics = sum(each.metric != SUCCESS for each in comparisons)
+    shown = [each for each in comparisons if each.metric == SUCCESS or each.p * metrics < 0.05]
+    if not shown:
+        return
+    rows = [
+        (
+            each.other,
+            each.metric,
+            str(each.n),
+            str(each.pairs),
+            *(
+                f"{100.0 * v:+.1f} %" if each.metric == SUCCESS else number(v)
+                for v in (each.difference, each.ci_low, each.ci_high)
+            ),
+            f"{each.p:.2g}",
+            "" if each.p_wilcoxon is None else f"{each.p_wilcoxon:.2g}",
+            "" if each.only_base is None else f"{each.only_base} : {each.only_other}",
+            "" if each.seeds_needed is None else str(each.seeds_needed),
+        )
+        for each in shown[:MOST_COMPARISONS]
+    ]
+    columns = (shown[0].axis, "metric", ">seeds", ">pairs", ">difference", ">from", ">to", ">p", ">p, ranks",
+               ">only base : only this", ">seeds needed")  # fmt: skip
+    screen.print(table(f"compared with {shown[0].base}, seed by seed", columns, rows))
+    left = len(comparisons) - min(len(shown), MOST_COMPARISONS)
+    if left:
+        say(screen, f"... and {left} more comparisons of metrics, in the summary")
 
 
 def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:

@@ -63,6 +63,24 @@ def test_rows_goals_and_table(study: Path, folder: Path, call_json: CallJson) ->
     assert rows[0]["counter.last_count"] == 1051.0 and len(rows[0]["run_hash"]) == 32
 
 
+def test_arms_are_compared_over_equal_seeds(study: Path, call: Call, call_json: CallJson) -> None:
+    result = call_json("study", "grid.yaml", "--workers", "1", "--detect", "10%")
+    success, count = (each for each in result["comparisons"] if "double" not in each["metric"])
+    assert {
+        "axis": "arm", "base": "low", "other": "high", "metric": "success", "n": 4, "pairs": 8,
+        "difference": -0.25, "p": 0.5, "only_base": 2, "only_other": 0, "detect": 0.1,
+    }.items() <= success.items()  # fmt: skip
+    assert success["ci_low"] < -0.25 < success["ci_high"] and success["seeds_needed"] > 50
+    assert (count["metric"], count["difference"], count["p"]) == ("counter.last_count", 0.0, 1.0)
+    said = call("study", "grid.yaml", "--compare", "stop").stdout
+    assert "compared with 0.5 s, seed by seed" in said
+    assert "counter.last_count" in said and "2 : 0" in said and "in the summary" not in said
+    wrong = call_json("study", "grid.yaml", "--compare", "arms", code=2)
+    assert wrong["reason"].endswith("axes of several values: arm, stop; did you mean arm?")
+    wrong = call_json("study", "grid.yaml", "--detect", "a=b", code=2)
+    assert "expected a difference of success rates" in wrong["reason"]
+
+
 @pytest.mark.long
 def test_a_missed_goal_a_broken_run_and_tuning_seeds(
     study: Path, call: Call, call_json: CallJson
