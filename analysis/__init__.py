@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .branching import branch
+    from .explanation import Explanation, explain
     from .linearisation import Linearisation, linearise
     from .loop_margins import Margins, margins
 
 _HOMES = {
     "branch": "branching",
+    "Explanation": "explanation",
+    "explain": "explanation",
     "Linearisation": "linearisation",
     "linearise": "linearisation",
     "Margins": "loop_margins",
     "margins": "loop_margins",
 }
 
-__all__ = ["Linearisation", "Margins", "branch", "linearise", "margins"]
+__all__ = ["Explanation", "Linearisation", "Margins", "branch", "explain", "linearise", "margins"]
 
 
 def __getattr__(name: str) -> Any:

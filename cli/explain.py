@@ -1,0 +1,64 @@
+"""``aloft explain``: names what went wrong in a recorded run, from the first deviation to the fall."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..runtime.language.errors import AloftError
+from .shared.options import JsonBesideTables
+from .shared.output import console, errors_reported, print_json, table
+
+if TYPE_CHECKING:
+    from ..analysis.deviations import Deviation
+
+
+def explain(
+    recording: Annotated[Path, typer.Argument(help="The recording of a simulated run, a .rrd.")],
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
+    ] = None,
+    as_json: JsonBesideTables = False,
+) -> None:
+    """Say why a run failed: its deviations from truth and plan, from the first one on."""
+    from ..analysis.explanation import explain as explain_run
+    from ..logs.replay.opened_run import OpenedRun
+
+    out = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        if not recording.is_file():
+            raise AloftError(f"there is no recording {recording}")
+        found = explain_run(OpenedRun.of(recording, folder))
+    outcome = f"{'success' if found.success else 'no success'}: {found.reason}"
+    if found.chain:
+        out.print(
+            table("What led there", ("s", "to", "phase", "kind", "deviation"), _rows(found.chain))
+        )
+    if found.passed:
+        out.print(
+            table("What passed", ("s", "to", "phase", "kind", "deviation"), _rows(found.passed))
+        )
+    if found.contacts:
+        rows = [
+            (f"{c.begin:.3f}", c.point, "false" if c.false else "missed",
+             f"{1e3 * c.duration:.0f} ms", c.effect)
+            for c in found.contacts
+        ]  # fmt: skip
+        head = ("s", "point", "contact", ">for", "what it did to the estimate")
+        out.print(table("False and missed contacts", head, rows))
+    if as_json:
+        print_json(found.to_json())
+        return
+    typer.echo(outcome)
+    if found.cause is not None:
+        typer.echo(f"first deviation at {found.cause.begin:.3f} s: {found.cause.text}")
+    elif not found.success:
+        typer.echo("nothing was beyond the limits of what successful jumps show")
+
+
+def _rows(deviations: Sequence[Deviation]) -> list[tuple[str, ...]]:
+    return [(f"{d.begin:.3f}", f"{d.end:.3f}", d.phase, d.kind, d.text) for d in deviations]
