@@ -375,7 +375,7 @@ def keep(text: str, reason: str, path: Path) -> tuple[Path, Path]:
     Args:
         text: of ``graph_text`` for the folder of the test.
         reason: why the run fails.
-        path: the test's file, ``test_NAME.py``; the graph is ``NAME.yaml`` beside it.
+        path: the test's file, with a name that pytest finds; the graph is beside it, without ``test_``.
 
     Raises:
         AloftError: the path is of another form, one of the files exists, or cannot be written.
@@ -386,7 +386,7 @@ def keep(text: str, reason: str, path: Path) -> tuple[Path, Path]:
     graph = path.with_name(f"{name}.yaml")
     for file in (path, graph):
         if file.exists():
-            raise AloftError(f"{file} is there already; give another name: --output test_NAME.py")
+            raise AloftError(f"{file} is there already; give another name with --output")
     quoted = reason.replace("\\", "/").replace('"', "'")
     test = TEST.format(reason=quoted, name=name, file=graph.name)
     for file, content in ((graph, text), (path, test)):

@@ -142,9 +142,9 @@ def _process_results(
                     begun.pop(message[0], None)
                     yield JobResult(*message)
     finally:
-        busy = [worker for worker in workers if worker.job is not None]
-        _stop(busy)
-        workers[:] = [worker for worker in workers if worker not in busy]
+        at_work = [worker for worker in workers if worker.job is not None]
+        _stop(at_work)
+        workers[:] = [worker for worker in workers if worker not in at_work]
 
 
 def _assign(worker: _Worker, job: Numbered | None, begun: dict[int, int]) -> bool:
