@@ -67,7 +67,7 @@ class Outside(Block):
         assert isinstance(params, OutsideParameters)
         body: dict[str, Any] = {"__doc__": cls.__doc__, "__module__": cls.__module__}
         for port, fields in params.ports.items():
-            signal = _signal(fields)
+            signal = signal_of(fields)
             body[port] = Output(signal, text="what is outside")
             body[f"kept_{port}"] = State(signal, text="what was set last")
         return type("Outside", (Outside,), body)
@@ -96,7 +96,8 @@ class Outside(Block):
         """Do nothing: there is no input."""
 
 
-def _signal(fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
+def signal_of(fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
+    """The signal with these fields: of each its shape, dtype, unit, frame and text."""
     body: dict[str, Any] = {"__doc__": "What is outside."}
     for name, field in fields.items():
         body[name] = Field(
@@ -104,6 +105,6 @@ def _signal(fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
             unit=field.get("unit"),
             frame=field.get("frame"),
             dtype=field.get("dtype", "float64"),
-            text=f"{name}, from outside",
+            text=field.get("text") or f"{name}, from outside",
         )
     return type("FromOutside", (Signal,), body)
