@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from ...clib.library import Library as Instance
 from ...clib.library import description_in, read_description
-from ...fmi.outside import signal_of
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import AloftError, BlockError
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Field, Signal, signal_of
 
 
 class LibraryState(Signal):
@@ -239,7 +238,7 @@ def _class_for(about: Mapping[str, Any]) -> type[Block]:
         body: dict[str, Any] = {"__doc__": Library.__doc__, "__module__": Library.__module__}
         for kind, ports in _ports(about).items():
             for name, fields in ports.items():
-                signal = signal_of({each["field"]: each for each in fields})
+                signal = signal_of("OfLibrary", {each["field"]: each for each in fields})
                 text = "; ".join(each["text"] for each in fields[:3])
                 body[name] = (Input if kind == "inputs" else Output)(signal, text=text)
         body["about"], body["specialize"] = about, vars(Library)["specialize"]
