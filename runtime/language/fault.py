@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.ring import Octets, next_entry
 from ...mathematics.kernel import kernel
-from .block import Block, Input, Output, State
+from .block import Block, Input, Metric, Output, State
 from .delay import RingPosition, copy_call, octets, ring_signal
 from .parameters import Parameters, parameter
 from .quantities import InputQuantities, OutputQuantities
@@ -74,6 +75,7 @@ class FaultMemory(Signal):
 
     runs = Field(dtype="int64", text="runs since its event, or since the start; -1 before")
     happened = Field(dtype="bool", text="whether its event was")
+    began = Field(dtype="int64", text="tick in which it was there first; -1 before")
     filled = Field(dtype="bool", text="whether earlier values are known")
 
 
@@ -116,8 +118,8 @@ def notice_event(value: Array, condition: Comparison, happened: Flags) -> None:
 
 @kernel
 def time_fault(
-    timing: FaultTiming, happened: Flags, draw: Array, runs: Indices, active: Flags, age: Array,
-    acts: Flags,
+    timing: FaultTiming, tick: Indices, happened: Flags, draw: Array, runs: Indices, began: Indices,
+    active: Flags, age: Array, acts: Flags,
 ) -> None:  # fmt: skip
     """Whether a fault is there, since when, and whether it acts in this run; ``draw`` is between 0 and 1."""
     if runs[()] >= 0 or happened[0] or not timing.event:
@@ -125,6 +127,8 @@ def time_fault(
     elapsed = timing.period * runs[()]
     there = runs[()] >= 0 and timing.start - 1e-9 <= elapsed < timing.end - 1e-9
     active[()] = there
+    if there and began[()] < 0:
+        began[()] = tick[0]
     age[()] = elapsed - timing.start if there else 0.0
     acts[0] = there and draw[0] < timing.share
 
@@ -241,7 +245,7 @@ class Fault(Block):
         self._random = RandomStream(self, params.seed)
         start = params.start + params.start_spread * float(self._random.generator.random())
         end = np.inf if params.duration is None else start + params.duration
-        self.memory.runs = -1
+        self.memory.runs, self.memory.began = -1, -1
         places = max(len(each) for each in self.elements.values())
         self._draw, self._normal = np.zeros(1), np.zeros(places)
         self._happened, self._acts = self.memory.happened.reshape(1), np.zeros(1, np.bool_)
@@ -258,9 +262,11 @@ class Fault(Block):
             KernelCall(
                 time_fault,
                 timing,
+                self.context.clock.present,
                 self._happened,
                 self._draw,
                 self.memory.runs,
+                self.memory.began,
                 self.state.active,
                 self.state.age,
                 self._acts,
@@ -312,6 +318,11 @@ class Fault(Block):
                 change_elements, *change, self.state.age, self._normal, places, self._acts, out
             )
         ]
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """When the fault was there first, if it was."""
+        began = int(self.memory.began)
+        return {} if began < 0 else {"fault_time_s": began * self.context.clock.base_period}
 
     def step(self) -> None:
         """Copy, and change what is at fault."""
