@@ -34,21 +34,24 @@ Outputs = Annotated[
 def fmu(
     graph: GraphPart,
     to: Annotated[Path, typer.Option("--to", help="The file to write, such as controller.fmu.")],
+    fmi: Annotated[str, typer.Option("--fmi", help="The version of FMI, 3.0 or 2.0.")] = "3.0",
     output: Outputs = None,
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
-    """A Functional Mock-up Unit (FMI 3.0, co-simulation) of a graph or of a sub-graph.
+    """A Functional Mock-up Unit (co-simulation) of a graph or of a sub-graph.
 
     What the sub-graph reads from outside becomes its inputs, what it declares as outputs its
-    outputs. Of a whole graph the inputs are its blocks blocks.External, and the outputs what no
-    block reads. aloft has to be installed in the Python that runs the FMU.
+    outputs. Of a whole graph the inputs are its blocks blocks.External and the sensors of its robot, and
+    the outputs what the robot reads or, without a robot, what no block reads. The FMU is a
+    library of C. Where a block needs Python, it is named, and aloft has to be installed in the Python that
+    runs the FMU.
     """
     with errors_reported(as_json):
         from ..fmi.exporting.write import export as write
 
         path, part = _parts(graph)
-        made = write(path, to, part, set_ or [], output or [])
+        made = write(path, to, part, set_ or [], output or [], fmi)
         terminals = [("input", t) for t in made.inputs] + [("output", t) for t in made.outputs]
         if as_json:
             print_json(
@@ -58,6 +61,7 @@ def fmu(
                     "inputs": [t.plain() for t in made.inputs],
                     "outputs": [t.plain() for t in made.outputs],
                     "problems": made.problems,
+                    "python": made.python,
                 }
             )
             return
@@ -67,7 +71,11 @@ def fmu(
             for kind, t in terminals
         ]
         out.print(table("", ["", "variable", "shape", "unit"], rows))
-        say(out, f"{made.file}: FMI 3.0, co-simulation, steps of {made.period:.6g} s")
+        say(out, f"{made.file}: FMI {fmi}, co-simulation, steps of {made.period:.6g} s")
+        if made.python:
+            say(out, "it needs Python with aloft where it runs:")
+        for reason in made.python:
+            say(out, f"  {reason}")
         for problem in made.problems or ():
             say(out, f"FMPy's validator: {problem}")
         if made.problems == ():
@@ -110,7 +118,7 @@ def c(
         else:
             out = console()
             about = made.about
-            rows = [(name, f"{size} bytes") for name, size in about["files_bytes"].items()]
+            rows = [(name, f"{each['bytes']} bytes") for name, each in about["files"].items()]
             rows += [
                 (text, f"{about[f'{key}_bytes']} bytes")
                 for key, text in (

@@ -6,13 +6,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ..fmi.exporting.cut import Cut, Terminal, cut
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..runtime.language.block import Block, Output
 from ..runtime.language.errors import AloftError
 from ..runtime.language.parameters import Parameters, is_live
 from ..runtime.language.stages import BlockSpec, CheckedGraph
 from ..runtime.running.memory import BoundGraph
+from .cut import Cut, Terminal, cut
+
+
+class NeedsPython(AloftError):
+    """Blocks of a part that need Python; ``reasons`` names each with its place."""
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        count = "1 block needs" if len(reasons) == 1 else f"{len(reasons)} blocks need"
+        super().__init__("\n  ".join((f"{count} Python, so there is no library:", *reasons)))
+        self.reasons = tuple(reasons)
 
 
 class NumberParameter(NamedTuple):
@@ -69,7 +78,8 @@ def take_part(
 
     Raises:
         LoadError: the graph may not run.
-        AloftError: there is no such part, or blocks in it need Python; the text names all of them.
+        NeedsPython: blocks in it need Python.
+        AloftError: there is no such part.
     """
     found = cut(path, part, overrides, outputs, alone=True)
     own = {block.path for block in found.inside}
@@ -93,8 +103,7 @@ def take_part(
         for reason in _needs_python(bound.blocks[each])
     ]
     if problems:
-        count = "1 block needs" if len(problems) == 1 else f"{len(problems)} blocks need"
-        raise AloftError("\n  ".join((f"{count} Python, so there is no library:", *problems)))
+        raise NeedsPython(problems)
     live = [item for each in order for item in _parameters(bound.blocks[each])]
     return Part(
         found, graph, bound, order,

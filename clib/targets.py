@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..mathematics.compiling.machine_code import cross_compiled
+from ..mathematics.compiling.machine_code import assembler_text, cross_compiled
 from ..runtime.language.errors import AloftError
 
 
@@ -56,6 +56,11 @@ TARGETS: dict[str, Target] = {
 def compile_module(text: str, target: Target) -> bytes:
     """The object file of a module for a kind of processor."""
     return cross_compiled(text, target.triple, target.cpu, target.features)
+
+
+def assembler(text: str, target: Target) -> str:
+    """The same code as a text for an assembler."""
+    return assembler_text(text, target.triple, target.cpu, target.features)
 
 
 def link(name: str, folder: Path, target: Target) -> list[Path]:

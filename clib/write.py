@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..fmi.exporting.cut import Terminal
 from ..runtime.language.errors import AloftError
 from ..runtime.language.layout import Layout
+from .cut import Terminal
 from .module import STATUS_TEXTS, Module, Status
 from .part import Part, take_part, terminal_groups
 from .targets import TARGETS, compile_module, link
@@ -24,6 +24,20 @@ register return short signed sizeof static struct switch typedef union unsigned 
 inline restrict bool class new delete this template operator
 """
 _KEYWORDS = frozenset(_WORDS.split())
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a library will be made of: its name, the part, the code, and what ``NAME.json`` says."""
+
+    name: str
+    part: Part
+    module: Module
+    about: dict[str, Any]
+
+    def header(self) -> str:
+        """The text of ``NAME.h``."""
+        return _header(self.name, self.part, self.about)
 
 
 @dataclass(frozen=True)
@@ -57,28 +71,19 @@ def write_library(
         LoadError: the graph may not run.
         AloftError: the part needs Python, the name is none in C, or a tool fails.
     """
-    name = to.name
-    if not name.isidentifier() or not name.isascii() or name in _KEYWORDS:
-        raise AloftError(
-            f"{name!r} cannot be the name of a library; write it as --to my_controller"
-        )
-    if target not in TARGETS:
-        raise AloftError(f"there is no target {target!r}; there is {', '.join(TARGETS)}")
-    taken = take_part(path, part, overrides, outputs)
-    digest = hashlib.sha256(taken.graph.text.encode() + f"{part} {outputs}".encode()).hexdigest()
-    texts = {"version": f"aloft {__version__}", "graph_hash": digest}
-    module = Module(name, taken, int(digest[:15], 16), texts)
+    made = prepare(path, to.name, part, overrides, outputs, target)
+    name, taken, about = made.name, made.part, made.about
     to.mkdir(parents=True, exist_ok=True)
-    (to / f"{name}.o").write_bytes(compile_module(module.text(), TARGETS[target]))
+    (to / f"{name}.o").write_bytes(compile_module(made.module.text(), TARGETS[target]))
     libraries = link(name, to, TARGETS[target])
-    about = _describe(name, target, taken, module, texts)
-    about["graph"], about["part"] = Path(path).name, part
-    sizes = {each.name: each.stat().st_size for each in (to / f"{name}.o", *libraries)}
-    about["files_bytes"] = sizes
+    about["files"] = {
+        each.name: {"bytes": each.stat().st_size, "sha256": sha256(each.read_bytes()).hexdigest()}
+        for each in (to / f"{name}.o", *libraries)
+    }
     description = to / f"{name}.json"
     contents = {
         description: json.dumps(about, indent=1) + "\n",
-        to / f"{name}.h": _header(name, taken, about),
+        to / f"{name}.h": made.header(),
         to / "example.c": _example(name, taken),
         to / "CMakeLists.txt": _cmake(name),
         to / "README.md": _readme(name, about, taken),
@@ -86,6 +91,36 @@ def write_library(
     for file, text in contents.items():
         file.write_text(text, encoding="utf-8")
     return Written(description, (to / f"{name}.o", *libraries, *contents), about)
+
+
+def prepare(
+    path: str,
+    name: str,
+    part: str = "",
+    overrides: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    target: str = "x86_64",
+) -> Prepared:
+    """A part of a graph as code, with what is to be said of it; the parameters are those of
+    ``write_library``.
+
+    Raises:
+        LoadError: the graph may not run.
+        AloftError: the part needs Python, or the name is none in C.
+    """
+    if not name.isidentifier() or not name.isascii() or name in _KEYWORDS:
+        raise AloftError(
+            f"{name!r} cannot be the name of a library; write it as --to my_controller"
+        )
+    if target not in TARGETS:
+        raise AloftError(f"there is no target {target!r}; there is {', '.join(TARGETS)}")
+    taken = take_part(path, part, overrides, outputs)
+    digest = sha256(taken.graph.text.encode() + f"{part} {outputs}".encode()).hexdigest()
+    texts = {"version": f"aloft {__version__}", "graph_hash": digest}
+    module = Module(name, taken, int(digest[:15], 16), texts)
+    about = _describe(name, target, taken, module, texts)
+    about["graph"], about["part"] = Path(path).name, part
+    return Prepared(name, taken, module, about)
 
 
 def _describe(
@@ -116,7 +151,7 @@ def _describe(
 
 
 def _terminal(terminal: Terminal, fields: dict[str, tuple[int, int, int]]) -> dict[str, Any]:
-    names = ("name", "source", "shape", "dtype", "unit", "frame", "text", "start")
+    names = ("name", "source", "shape", "dtype", "unit", "frame", "text", "start", "depends")
     return {
         **{key: getattr(terminal, key) for key in names}, "offset": fields[terminal.name][0],
     }  # fmt: skip
@@ -285,7 +320,9 @@ target_link_libraries(example PRIVATE {name})
 
 
 def _readme(name: str, about: dict[str, Any], part: Part) -> str:
-    sizes = "\n".join(f"| `{file}` | {size} bytes |" for file, size in about["files_bytes"].items())
+    sizes = "\n".join(
+        f"| `{file}` | {each['bytes']} bytes |" for file, each in about["files"].items()
+    )
     fixed = ", ".join(f"`{each}`" for each in part.fixed) or "none"
     return f"""\
 # {name}

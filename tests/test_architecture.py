@@ -85,8 +85,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "ros2": ("robots", "runtime/language"),
     "fmi": ("robots", "runtime/language"),
-    "fmi/exporting": ("fmi", "robots", "runtime", "logs/file"),
-    "clib": ("mathematics/compiling", "fmi/exporting", "logs/file", "runtime"),
+    "fmi/exporting": ("fmi", "clib", "robots", "runtime", "logs/file"),
+    "clib": ("mathematics/compiling", "logs/file", "runtime"),
     "logs/file": ("robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (

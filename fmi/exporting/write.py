@@ -17,10 +17,13 @@ from typing import Any
 import yaml
 
 from ... import __version__
+from ...clib.cut import Cut, Terminal, cut, start_of
+from ...clib.part import NeedsPython
+from ...clib.write import prepare
 from ...logs.file.surroundings import named_file
 from ...runtime.language.errors import AloftError
 from ...runtime.loading.flattening.flat import ROBOT_FILES
-from .cut import Cut, Terminal, cut, start_of
+from .native import compiler, write_native
 from .slave import GRAPH, INTERFACE
 
 _OURS = Path(__file__).parents[2]
@@ -38,13 +41,15 @@ class {name}(GraphSlave, Fmi3Slave):
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: the file, its terminals, and what FMPy's validator says, if it is here."""
+    """What was written: the file, its terminals, and what FMPy's validator says, if it is here.
+    ``python`` says why the FMU needs Python; none: it does not."""
 
     file: Path
     period: float
     inputs: tuple[Terminal, ...]
     outputs: tuple[Terminal, ...]
     problems: tuple[str, ...] | None
+    python: tuple[str, ...] = ()
 
 
 def export(
@@ -53,8 +58,12 @@ def export(
     part: str = "",
     overrides: Sequence[str] = (),
     outputs: Sequence[str] = (),
+    version: str = "3.0",
 ) -> Exported:
-    """Write a graph, or a sub-graph, as an FMU of FMI 3.0 for co-simulation.
+    """Write a graph, or a sub-graph, as an FMU for co-simulation.
+
+    It is made of the library of C that ``aloft export c`` writes. Where that cannot be, since a block
+    needs Python or there is no compiler, the FMU runs the graph in Python.
 
     Args:
         path: the graph file.
@@ -62,27 +71,49 @@ def export(
         part: the path of the sub-graph; empty for the whole graph.
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``; by default as ``cut`` says.
+        version: of FMI, ``3.0`` or ``2.0``.
 
     Raises:
         LoadError: the graph may not run.
-        AloftError: PythonFMU3 is missing, the part cannot be cut out, or does not run alone.
+        AloftError: FMPy or PythonFMU3 is missing, the part cannot be cut out or does not run alone, or
+            it needs Python and the version is 2.0.
     """
+    name = to.stem
+    if to.suffix != ".fmu" or not name.isidentifier():
+        raise AloftError(f"{to} cannot be the name of an FMU; write it as my_controller.fmu")
+    if version not in ("3.0", "2.0"):
+        raise AloftError(f"there is no FMI {version!r} here; there is 3.0, 2.0")
+    title = f"{Path(path).stem}{f', {part}' if part else ''}, by aloft {__version__}"
+    try:
+        made = prepare(path, name, part, overrides, outputs)
+        if compiler():
+            write_native(made, to, version, title)
+            inside = made.part.cut
+            return Exported(
+                to, inside.graph.base_period, inside.inputs, inside.outputs, _validated(to)
+            )
+        reasons: tuple[str, ...] = ("there is no C compiler (cc)",)
+    except NeedsPython as error:
+        reasons = error.reasons
+    if version != "3.0":
+        raise AloftError("\n  ".join(("the FMU needs Python, and such are of FMI 3.0:", *reasons)))
+    return _with_python(to, cut(path, part, overrides, outputs), title, reasons)
+
+
+def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -> Exported:
+    """Write an FMU that runs its graph in Python."""
     try:
         from pythonfmu3.builder import FmuBuilder
     except ImportError:
         raise AloftError(
             "an FMU is made with PythonFMU3: pip install 'aloft-robotics[fmi]'"
         ) from None
-    name = to.stem
-    if to.suffix != ".fmu" or not name.isidentifier():
-        raise AloftError(f"{to} cannot be the name of an FMU; write it as my_controller.fmu")
-    cut_out = cut(path, part, overrides, outputs)
     with tempfile.TemporaryDirectory(prefix="aloft-export-") as made:
         folder = Path(made) / "graph"
         folder.mkdir()
-        _write_graph(cut_out, folder, f"{Path(path).stem}{f', {part}' if part else ''}")
+        _write_graph(cut_out, folder, title)
         script = Path(made) / f"aloft_fmu_{_hash(folder)}.py"
-        script.write_text(_SCRIPT.format(name=name), encoding="utf-8")
+        script.write_text(_SCRIPT.format(name=to.stem), encoding="utf-8")
         try:
             written = FmuBuilder.build_FMU(
                 script,
@@ -98,7 +129,8 @@ def export(
             sys.modules.pop(script.stem, None)
         to.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(written, to)
-    return Exported(to, cut_out.graph.base_period, cut_out.inputs, cut_out.outputs, _validated(to))
+    found = cut_out.inputs, cut_out.outputs
+    return Exported(to, cut_out.graph.base_period, *found, _validated(to), reasons)
 
 
 def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
@@ -129,7 +161,7 @@ def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
     inputs = [{**t.plain(), "start": list(start_of(t))} for t in cut_out.inputs]
     outputs = [t.plain() for t in cut_out.outputs]
     interface = {
-        "description": f"{title}, by aloft {__version__}",
+        "description": title,
         "stop_time": None if graph.ticks is None else graph.ticks * graph.base_period,
         "overrides": overrides,
         "inputs": inputs,

@@ -77,7 +77,10 @@ def optimised(assembly: str) -> bytes:
     Raises:
         RuntimeError: the module is not valid.
     """
-    return _optimised(assembly, _binding().get_process_triple(), target_machine())
+    machine = target_machine()
+    module = _optimised(assembly, _binding().get_process_triple(), machine)
+    code: bytes = machine.emit_object(module)
+    return code
 
 
 def cross_compiled(assembly: str, triple: str, cpu: str, features: str = "") -> bytes:
@@ -86,15 +89,34 @@ def cross_compiled(assembly: str, triple: str, cpu: str, features: str = "") -> 
     Raises:
         RuntimeError: the module is not valid, or LLVM has no such processor.
     """
+    module, machine = _for_processor(assembly, triple, cpu, features)
+    code: bytes = machine.emit_object(module)
+    return code
+
+
+def assembler_text(assembly: str, triple: str, cpu: str, features: str = "") -> str:
+    """The same code as ``cross_compiled`` gives, as a text for an assembler.
+
+    Raises:
+        RuntimeError: the module is not valid, or LLVM has no such processor.
+    """
+    module, machine = _for_processor(assembly, triple, cpu, features)
+    text: str = machine.emit_assembly(module)
+    return text
+
+
+def _for_processor(assembly: str, triple: str, cpu: str, features: str) -> tuple[Any, Any]:
+    """A module, optimised for a processor, and what makes code of it."""
     binding = _binding()
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
     target = binding.Target.from_triple(triple)
     machine = target.create_target_machine(cpu=cpu, features=features, opt=3, reloc="pic")
-    return _optimised(assembly, triple, machine)
+    return _optimised(assembly, triple, machine), machine
 
 
-def _optimised(assembly: str, triple: str, machine: Any) -> bytes:
+def _optimised(assembly: str, triple: str, machine: Any) -> Any:
+    """The module of a text, optimised."""
     binding = _binding()
     module = binding.parse_assembly(assembly)
     module.triple = triple
@@ -105,8 +127,7 @@ def _optimised(assembly: str, triple: str, machine: Any) -> bytes:
     options.loop_unrolling = False  # a third of the time of compiling, and no gain in a tick
     builder = binding.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    code: bytes = machine.emit_object(module)
-    return code
+    return module
 
 
 def read_only_arguments(assembly: str, names: set[str]) -> dict[str, tuple[bool, ...]]:

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the fault is of
 GRAPH = """\
 rate: 100 Hz
 duration: 0.05 s
-blocks: {wave: {use: blocks.SineWave, with: {frequency: 1 Hz}}}
+blocks: {wave: {use: blocks.WhiteNoise, with: {std: 1}}}
 """
 USER = """\
 rate: 100 Hz

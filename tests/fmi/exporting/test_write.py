@@ -1,6 +1,7 @@
 """``aloft export fmu``: the FMU gives the numbers of the graph, in FMPy and as a block."""
 
 import json
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -59,6 +60,22 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a computer without one, where FMUs run in Python."""
+    monkeypatch.setattr("aloft.fmi.exporting.write.compiler", lambda: "")
+
+
+@pytest.fixture(params=["c", "python"])
+def kind(request: pytest.FixtureRequest) -> str:
+    """Both kinds of FMU: of the library of C, and in Python."""
+    if request.param == "python":
+        request.getfixturevalue("no_compiler")
+    elif not shutil.which("cc"):
+        pytest.skip("there is no C compiler (cc)")
+    return str(request.param)
+
+
+@pytest.fixture
 def reference(folder: Path) -> aloft.RunResult:
     result = aloft.load(folder / "rail.yaml").run()
     result.raise_if_failed()
@@ -91,9 +108,10 @@ def master(file: Path, inputs: dict[str, np.ndarray], outputs: list[str], ticks:
 
 
 def test_a_sub_graph_gives_in_fmpy_the_numbers_of_the_graph(
-    folder: Path, reference: aloft.RunResult
+    folder: Path, reference: aloft.RunResult, kind: str
 ) -> None:
     made = export(str(folder / "rail.yaml"), folder / "controller.fmu", "controller")
+    assert made.python == (() if kind == "c" else ("there is no C compiler (cc)",))
     assert made.problems == ()
     assert [(t.name, t.unit) for t in made.inputs] == [("setpoint", "m"), ("measured", "m")]
     assert [(t.name, t.unit) for t in made.outputs] == [("force", "N"), ("wound", "m s")]
@@ -121,7 +139,7 @@ def test_simulate_fmu_gives_the_same(folder: Path, reference: aloft.RunResult) -
 
 @pytest.mark.parametrize("part", ["controller", "plant"])
 def test_the_fmu_as_a_block_in_its_place_gives_the_same_numbers(
-    folder: Path, reference: aloft.RunResult, part: str
+    folder: Path, reference: aloft.RunResult, part: str, kind: str
 ) -> None:
     export(str(folder / "rail.yaml"), folder / f"{part}.fmu", part)
     text = RAIL.replace(f"use: {part}.yaml", f"use: fmi.CoSimulation, with: {{file: {part}.fmu}}")
@@ -135,7 +153,7 @@ def test_the_fmu_as_a_block_in_its_place_gives_the_same_numbers(
     assert np.array_equal(result.signal(one), reference.signal(other))
 
 
-def test_a_snapshot_goes_through_the_fmu(folder: Path) -> None:
+def test_a_snapshot_goes_through_the_fmu(folder: Path, kind: str) -> None:
     export(str(folder / "rail.yaml"), folder / "plant.fmu", "plant")
     text = RAIL.replace("use: plant.yaml", "use: fmi.CoSimulation, with: {file: plant.fmu}")
     with aloft.load(text, path=folder / "rail.yaml").open() as run:
@@ -148,7 +166,9 @@ def test_a_snapshot_goes_through_the_fmu(folder: Path) -> None:
     assert np.ptp(first) > 0.0
 
 
-def test_a_state_that_is_not_its_own_is_refused(folder: Path, tmp_path: Path) -> None:
+def test_a_state_that_is_not_its_own_is_refused(
+    folder: Path, tmp_path: Path, no_compiler: None
+) -> None:
     export(str(folder / "rail.yaml"), folder / "plant.fmu", "plant")
     with zipfile.ZipFile(folder / "plant.fmu") as file:
         file.extractall(tmp_path / "plant")

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ...runtime.language.errors import AloftError
-from ...runtime.language.quantities import Quantity
-from ...runtime.language.signals import Field
-from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.language.units import parse_unit
-from ...runtime.loading import flatten
-from ...runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
-from ...runtime.loading.load import load
+from ..runtime.language.errors import AloftError
+from ..runtime.language.quantities import Quantity
+from ..runtime.language.signals import Field
+from ..runtime.language.stages import BlockSpec, CheckedGraph
+from ..runtime.language.units import parse_unit
+from ..runtime.loading import flatten
+from ..runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
+from ..runtime.loading.load import load
 
 _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m", "W", "V", "A")
 """Units by the names that people know; a unit may have been multiplied up to a longer text."""
@@ -26,7 +26,7 @@ _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m"
 
 @dataclass(frozen=True)
 class Terminal:
-    """An input or an output of the FMU: one field of a signal of the graph in it.
+    """An input or an output of the part: one field of a signal of the graph in it.
 
     ``source`` is ``block.port.field`` there. ``unit`` is ``None`` where it is not checked.
     ``depends`` has the names of the inputs on which an output depends within a tick.
@@ -75,8 +75,9 @@ def cut(
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``; none: those that the sub-graph declares, or
             those of the whole graph that no block reads.
-        alone: whether only blocks are taken on which an output depends, and no robot. The outputs of
-            a whole graph are then what its robots read.
+        alone: whether only blocks are taken on which an output depends, and no robot. Of a whole
+            graph a robot is never taken, unless ``outputs`` has one of its own; the outputs are then by
+            default what its robots read.
 
     Raises:
         LoadError: the graph may not run.
@@ -91,7 +92,12 @@ def cut(
         there = f"the nearest is {near[0]}" if near else f"there is {', '.join(names[:12])}"
         raise AloftError(f"{path} has no sub-graph {part!r}; {there}")
     external = {b.path: specs[b.path] for b in inside if b.use == "blocks.External"}
-    robots = [p for p in specs if alone and specs[p].block_type.outside != "no"]
+    asked = [name.rpartition(".")[0] for name in outputs]
+    robots = [
+        path
+        for path in specs
+        if specs[path].block_type.outside != "no" and (alone or not part) and path not in asked
+    ]
     inside = [b for b in inside if b.path not in external and b.path not in robots]
     if not outputs and not part and robots:
         outputs = _read_by(robots, specs, [b.path for b in inside])
