@@ -234,7 +234,7 @@ def _nodes(
         if slash:
             boxes.setdefault(first, []).append(spec)
             continue
-        label = f"{first}<br/>{_use(spec.block_type)}<br/>{_hertz(graph, spec)}"
+        label = f"{first}<br/>{_use(spec)}<br/>{_hertz(graph, spec)}"
         latency = _latency(graph, spec)
         label += f"<br/>in the background, {latency}" if latency else ""
         label += f"<br/>on {spec.machine}" if spec.machine else ""
