@@ -25,7 +25,7 @@ WORKERS := --numprocesses auto --dist worksteal
 # pytest keeps the tests whose assertions it has rewritten, also where the environment forbids bytecode
 CACHED := PYTHONDONTWRITEBYTECODE=
 
-.PHONY: setup jump test test-all lint format bench plans docs site clean help
+.PHONY: setup jump test test-all lint format bench plans docs site demo release clean help
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##/\1:/p' $(MAKEFILE_LIST)
@@ -82,6 +82,12 @@ docs: $(COMPLETE)  ## make what is generated under docs/
 site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves
 	@$(BIN)/python -m sphinx -q --fail-on-warning --keep-going -c docs -d build/doctrees . site
 	@echo "site/index.html"
+
+demo: $(COMPLETE)  ## build the page on which BRUCE jumps in a browser in site/demo; needs npm and wasm-ld
+	@$(BIN)/python docs/demo/build.py site/demo
+
+release: $(COMPLETE)  ## build sdist and wheel into dist/, try the wheel alone, sign it (SIGN=KEY); publish nothing
+	@sh scripts/release.sh
 
 clean:  ## remove all that these targets made
 	rm -rf $(VENV) build dist site *.egg-info recordings

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import json
+import platform
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +32,13 @@ class Library:
     """
 
     def __init__(self, description: Path) -> None:
+        self.about = read_description(description)
+        name = self.about["name"]
+        file = description.parent.resolve() / f"lib{name}.so"
         try:
-            self.about: Mapping[str, Any] = json.loads(description.read_text(encoding="utf-8"))
-            name = self.about["name"]
-            self._code: Any = ctypes.CDLL(str(description.parent.resolve() / f"lib{name}.so"))
-        except (OSError, ValueError, KeyError) as error:
-            raise AloftError(f"{description} is no library that can run here: {error}") from error
+            self._code: Any = ctypes.CDLL(str(file))
+        except OSError as error:
+            raise AloftError(f"{file} cannot be loaded here: {error}") from error
         self.memory = _aligned(self.about["memory_bytes"])
         self._in, self._out = (_aligned(self.about[f"{k}_bytes"]) for k in ("input", "output"))
         self.inputs = views(self._in, self.about["inputs"])
@@ -44,7 +47,9 @@ class Library:
             _pointer(self.memory),
             (_pointer(self._in), _pointer(self._out)),
         )
-        self._step = self._function("step")
+        self._step, self._save, self._restore = map(self._function, ("step", "save", "restore"))
+        self._state = _aligned(self.about["state_bytes"])
+        self._at_state = _pointer(self._state)
         self._expect(self._function("init")(self._self, ctypes.c_int64(self.memory.size)), "init")
 
     def _function(self, key: str) -> Any:
@@ -80,11 +85,18 @@ class Library:
         number = self._function("last_block")(self._self)
         return str(self.about["blocks"][number]) if number >= 0 else ""
 
+    def keep(self) -> None:
+        """Keep the state for ``go_back``."""
+        self._expect(self._save(self._self, self._at_state), "save")
+
+    def go_back(self) -> None:
+        """Take back the state that was kept last."""
+        self._expect(self._restore(self._self, self._at_state), "restore")
+
     def save(self) -> bytes:
         """The state as bytes."""
-        state = _aligned(self.about["state_bytes"])
-        self._expect(self._function("save")(self._self, _pointer(state)), "save")
-        return state.tobytes()
+        self.keep()
+        return self._state.tobytes()
 
     def restore(self, state: bytes) -> None:
         """Take back a state that ``save`` gave.
@@ -92,13 +104,12 @@ class Library:
         Raises:
             AloftError: it is of another library.
         """
-        copy = _aligned(self.about["state_bytes"])
-        if len(state) != copy.size:
+        if len(state) != self._state.size:
             raise AloftError(
-                f"a state of {self.about['name']} has {copy.size} bytes, not {len(state)}"
+                f"a state of {self.about['name']} has {self._state.size} bytes, not {len(state)}"
             )
-        copy[:] = np.frombuffer(state, np.uint8)
-        self._expect(self._function("restore")(self._self, _pointer(copy)), "restore")
+        self._state[:] = np.frombuffer(state, np.uint8)
+        self.go_back()
 
     def set(self, parameter: str, value: float) -> None:
         """Change a live parameter, ``block.parameter`` or an element of it, ``block.parameter[0]``.
@@ -127,6 +138,54 @@ class Library:
                 f"no live parameter {parameter!r}; there is {', '.join(names) or 'none'}"
             )
         return ctypes.c_int32(names.index(parameter))
+
+
+def description_in(folder: Path) -> Path:
+    """The description ``NAME.json`` in a folder that ``aloft export c`` has written.
+
+    Raises:
+        AloftError: there is none, or there are several files of that kind.
+    """
+    found = sorted(folder.glob("*.json"))
+    if len(found) == 1:
+        return found[0]
+    if not folder.is_dir():
+        raise AloftError(f"there is no folder {folder}; write it with aloft export c --to {folder}")
+    many = f"{', '.join(each.name for each in found)}, of which one may be" if found else "none"
+    raise AloftError(
+        f"{folder} has to have one description NAME.json, as aloft export c writes it; there is {many}"
+    )
+
+
+def read_description(description: Path) -> Mapping[str, Any]:
+    """What the description of a library says, if the library can run here.
+
+    Raises:
+        AloftError: it is no description, it is of another processor, or the shared library is missing
+            or another one; the message says what to do.
+    """
+    try:
+        about = json.loads(description.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise AloftError(f"{description} cannot be read: {error}") from error
+    if not isinstance(about, dict) or not {"name", "target", "files", "memory_bytes"} <= set(about):
+        raise AloftError(f"{description} describes no library; aloft export c writes such files")
+    if about["target"] != platform.machine():
+        raise AloftError(
+            f"{description} is for {about['target']}, and this computer is {platform.machine()}; "
+            f"export it with --target {platform.machine()}"
+        )
+    name = f"lib{about['name']}.so"
+    file = description.parent / name
+    if not file.is_file():
+        raise AloftError(f"{file} is missing: without a C compiler no shared library is written")
+    digest, own = sha256(file.read_bytes()).hexdigest(), about["files"].get(name, {}).get("sha256")
+    if digest != own:
+        raise AloftError(
+            f"{file} is not the library that {description.name} describes: its SHA-256 begins with "
+            f"{digest[:12]}, not {str(own)[:12]}; export both again"
+        )
+    return about
 
 
 def views(

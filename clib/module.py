@@ -7,9 +7,10 @@ instance is written, and no floating-point number is computed here, so the bytes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -70,22 +71,36 @@ class Module:
         name: of the library; its functions begin with it.
         part: what it computes.
         mark: a number that no other library has.
+        functions: functions beside the step, by name, which make these calls; ``Status`` is their
+            result. All that they work on is in the instance.
+        visible: further memory that is to be in the instance.
     """
 
-    def __init__(self, name: str, part: Part, mark: int, texts: dict[str, str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        part: Part,
+        mark: int,
+        texts: dict[str, str],
+        functions: Mapping[str, Sequence[KernelCall]] | None = None,
+        visible: Iterable[NDArray[Any]] = (),
+    ) -> None:
         self.name, self.part, self.mark, self._texts = name, part, mark, texts
+        self._functions = functions or {}
         memory = part.bound.memory
         self._calls = self._list(part.blocks, "kernel_calls")
         self._updates = self._list(part.moore, "update_calls")
         events = [c for p in part.blocks for c in part.bound.blocks[p].event_calls]
-        every = [*(each.call for each in (*self._calls, *self._updates)), *events]
+        beside = [call for calls in self._functions.values() for call in calls]
+        every = [*(each.call for each in (*self._calls, *self._updates)), *events, *beside]
         self._types = {id(c): tuple(type_of(a) for a in c.arguments) for c in every}
         kernels = [(call.kernel, self._types[id(call)]) for call in every]
         self._kernels, made = Translator().functions(kernels)
         self._made = {id(call): each for call, each in zip(every, made, strict=True)}
         self._tick: NDArray[np.int64] = part.bound.clock.present
         known = read_only_arguments(self._kernels + "\n" + ATTRIBUTES, {m.name for m in made})
-        written: list[NDArray[Any]] = [self._tick]
+        written: list[NDArray[Any]] = [self._tick, *visible]
+        written += [array for call in beside for array, _ in _arrays(call)]
         read: list[NDArray[Any]] = []
         for call in every:
             if call.when is not None:
@@ -162,6 +177,10 @@ class Module:
             self._function("save", "ptr %self, ptr %state", self._save),
             self._function("restore", "ptr %self, ptr %state", self._restore),
             self._function("set", "ptr %self, i32 %parameter, double %value", self._set),
+            *(
+                self._function(key, "ptr %self", partial(self._beside, calls))
+                for key, calls in self._functions.items()
+            ),
             self._get(),
             *(
                 self._field(key, place)
@@ -262,6 +281,16 @@ class Module:
             code.copy(code.at(struct, "%out"), code.at(bus), size)
         code(f"%code = load i32, ptr {code.at(CODE)}")
         code("ret i32 %code")
+        self._end(code)
+
+    def _beside(self, calls: Sequence[KernelCall], code: _Code) -> None:
+        for call in calls:
+            self._call(code, call, -1)
+        code("ret i32 0")
+        self._end(code)
+
+    def _end(self, code: _Code) -> None:
+        """Where calls that divide by zero go on."""
         if code.failures:
             code.label("divided")
             pairs = ", ".join(f"[ {block}, %{label} ]" for block, label in code.failures)

@@ -138,8 +138,8 @@ def _describe(
         "state_bytes": module.state_size,
         "input_bytes": module.input_size,
         "output_bytes": module.output_size,
-        "inputs": [_terminal(each, module.input_fields) for each in part.cut.inputs],
-        "outputs": [_terminal(each, module.output_fields) for each in part.cut.outputs],
+        "inputs": _terminals(part.cut.inputs, module.input_fields),
+        "outputs": _terminals(part.cut.outputs, module.output_fields),
         "parameters": [each._asdict() for each in part.parameters],
         "fixed_parameters": list(part.fixed),
         "blocks": list(part.blocks),
@@ -150,11 +150,14 @@ def _describe(
     }
 
 
-def _terminal(terminal: Terminal, fields: dict[str, tuple[int, int, int]]) -> dict[str, Any]:
-    names = ("name", "source", "shape", "dtype", "unit", "frame", "text", "start", "depends")
-    return {
-        **{key: getattr(terminal, key) for key in names}, "offset": fields[terminal.name][0],
-    }  # fmt: skip
+def _terminals(
+    terminals: Sequence[Terminal], fields: dict[str, tuple[int, int, int]]
+) -> list[dict[str, Any]]:
+    return [
+        {**each.plain(), "port": port, "field": field, "offset": fields[each.name][0]}
+        for port, group in terminal_groups(terminals).items()
+        for field, each in group
+    ]
 
 
 def _slots(layout: Layout, place: int, part: Part) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..robots.description import RobotDescription
 from ..runtime.language.block import Block, Output, State
 from ..runtime.language.errors import UnitError
 from ..runtime.language.parameters import Parameters, parameter
-from ..runtime.language.signals import DTYPES, Field, Signal
+from ..runtime.language.signals import DTYPES, signal_of
 from ..runtime.language.units import parse_unit
 
 _FIELD_KEYS = ("shape", "dtype", "unit", "frame", "start")
@@ -67,7 +67,7 @@ class Outside(Block):
         assert isinstance(params, OutsideParameters)
         body: dict[str, Any] = {"__doc__": cls.__doc__, "__module__": cls.__module__}
         for port, fields in params.ports.items():
-            signal = _signal(fields)
+            signal = signal_of("FromOutside", fields)
             body[port] = Output(signal, text="what is outside")
             body[f"kept_{port}"] = State(signal, text="what was set last")
         return type("Outside", (Outside,), body)
@@ -94,16 +94,3 @@ class Outside(Block):
 
     def update(self) -> None:
         """Do nothing: there is no input."""
-
-
-def _signal(fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
-    body: dict[str, Any] = {"__doc__": "What is outside."}
-    for name, field in fields.items():
-        body[name] = Field(
-            tuple(field.get("shape", ())),
-            unit=field.get("unit"),
-            frame=field.get("frame"),
-            dtype=field.get("dtype", "float64"),
-            text=f"{name}, from outside",
-        )
-    return type("FromOutside", (Signal,), body)

@@ -92,14 +92,15 @@ def docs_script() -> Callable[[str], ModuleType]:
     """Imports a script of docs/ by its name; it finds the other scripts beside it."""
 
     def imported(name: str) -> ModuleType:
-        spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+        path = ROOT / "docs" / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(path.stem, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        sys.path.insert(0, str(ROOT / "docs"))
+        sys.path.insert(0, str(path.parent))
         try:
             spec.loader.exec_module(module)
         finally:
-            sys.path.remove(str(ROOT / "docs"))
+            sys.path.remove(str(path.parent))
         return module
 
     return imported

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.compiling.call_sequence import CallSequence
+from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Context, Metric, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
@@ -223,6 +223,15 @@ class MujocoRobot(SimulatedRobot):
         self._settling = plant.simulating(drives, 1)
         self._ticking = plant.simulating(drives, steps, self.push)
         self._damped = plant.simulating(drives, steps)
+
+    @property
+    def calls(self) -> Mapping[str, Sequence[Call]]:
+        """What a tick calls: ``read`` the sensors, ``send`` the command, ``clear`` the record, and
+        ``advance`` to the next tick."""
+        return {
+            "read": self._reading.calls, "send": self._sending.calls,
+            "clear": (self.plant.clearing,), "advance": self._ticking.calls,
+        }  # fmt: skip
 
     def open(self) -> None:
         """Stand on the ground, settle, and wait for the first command."""

@@ -243,6 +243,7 @@ class Plant:
         sensed: what the encoders make of both, without their offsets.
         clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
+        step1, step2: the two parts of a physics step, see ``step_calls``.
         late: by how much [s] the physics steps begin after the control clock's ticks.
     """
 
@@ -355,7 +356,7 @@ class Plant:
         self._encoding = KernelCall(
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
-        self._step1, self._step2 = step_calls(model, data)
+        self.step1, self.step2 = step_calls(model, data)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(
@@ -404,7 +405,7 @@ class Plant:
             phase = float(stream(params.seed_of_noise, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
         self.start_delay = phase - early * params.timestep
-        self._step1.run()
+        self.step1.run()
         observed = math.ceil(OBSERVED_TIME / params.timestep)
         self._settle(step, math.ceil(SETTLING_TIME / params.timestep) + early - observed)
         self.clear_record()
@@ -417,7 +418,7 @@ class Plant:
         steps = round(self._period / params.timestep)
         self.physics.step[()] = -steps
         self.record.bounce_end.fill(-steps)
-        self._step1.run()
+        self.step1.run()
         self.clear_record()
         for sensor in self.sensors.mounted:
             sensor.reset()
@@ -437,7 +438,7 @@ class Plant:
             self.gears.begin(self.position)
         if self.switches is not None:
             self.switches.begin()
-        self._step1.run()
+        self.step1.run()
         for call in self._seeing:
             call.run()
 
@@ -449,7 +450,7 @@ class Plant:
             if len(self._passive):
                 self.position[self._passive] = self._robot.standing_position[self._passive]
                 self.velocity[self._passive] = 0.0
-                self._step1.run()
+                self.step1.run()
 
     def simulating(
         self, drives: JointTorques, steps: int, push: ExternalForce | None = None
@@ -485,8 +486,8 @@ class Plant:
         if self.gantry is not None:
             one.append(self.gantry.pulling(step))
         one += [
-            self._step2, *self._sensing, self._note, *self.sensors.after_step(), *self._falling,
-            self._step1,
+            self.step2, *self._sensing, self._note, *self.sensors.after_step(), *self._falling,
+            self.step1,
             *self._seeing,
         ]  # fmt: skip
         return CallSequence([self.forces.releasing(), *(one * steps)])
@@ -538,7 +539,7 @@ class Plant:
             self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
         )
         self.streams.load(self.physics.random)
-        for call in (*self._falling, self._step1):
+        for call in (*self._falling, self.step1):
             call.run()
         if self.gears is not None:
             self.gears.sensing().run()

@@ -221,3 +221,25 @@ class Slot:
     def size(self) -> int:
         """The number of elements."""
         return prod(self.shape)
+
+
+def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
+    """A signal that is declared by data, such as the description of what was exported.
+
+    Args:
+        name: its name.
+        fields: of each field ``shape``, ``dtype``, ``unit``, ``frame`` and ``text``, each of which may be missing.
+
+    Raises:
+        DeclarationError: as for ``Field``.
+    """
+    body: dict[str, Any] = {"__doc__": "What is outside."}
+    for key, field in fields.items():
+        body[key] = Field(
+            tuple(field.get("shape", ())),
+            unit=field.get("unit"),
+            frame=field.get("frame"),
+            dtype=field.get("dtype", "float64"),
+            text=field.get("text") or f"{key}, from outside",
+        )
+    return type(name, (Signal,), body)
