@@ -100,7 +100,7 @@ def take_part(
     problems = [
         f"{spec.where or found.graph.file}: block '{each}' ({spec.block_type.__name__}) {reason}"
         for each, spec in specs.items()
-        for reason in _needs_python(bound.blocks[each])
+        for reason in needs_python(bound.blocks[each])
     ]
     if problems:
         raise NeedsPython(problems)
@@ -135,7 +135,7 @@ def _nothing(self: Block) -> None:
     """Somebody else writes the outputs."""
 
 
-def _needs_python(block: Block) -> Iterator[str]:
+def needs_python(block: Block) -> Iterator[str]:
     """Why a block cannot be a part of a library."""
     kind = type(block)
     steps = ("emit", "update") if kind.is_moore() else ("step",)

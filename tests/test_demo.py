@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.clib.part import NeedsPython
 
 from .logs.viewing.browser import PROGRAM, Browser
 from .logs.viewing.pixels import pixels_of
@@ -120,3 +121,13 @@ def test_the_page_is_small_and_a_drag_of_the_mouse_pushes_the_robot(
     wait_for(browser, "document.getElementById('verdict').textContent !== ''", 300.0)
     said = value(browser, "document.getElementById('verdict').textContent")
     assert said.startswith("it "), said
+
+
+@pytest.mark.long
+def test_a_block_in_plain_python_is_refused(world: ModuleType, tmp_path: Path) -> None:
+    graph = tmp_path / "noisy.yaml"
+    graph.write_text(
+        f"include: [{DEMO / 'push.yaml'}]\nblocks: {{hiss: {{use: blocks.WhiteNoise}}}}\n"
+    )
+    with pytest.raises(NeedsPython, match=r"noisy.yaml: block 'hiss' .*plain Python"):
+        world.make_world(graph, [], "noisy")

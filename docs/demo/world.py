@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aloft.blocks.signals.jumping import Phase
+from aloft.clib.cut import Cut
 from aloft.clib.module import Module
-from aloft.clib.part import Part
+from aloft.clib.part import NeedsPython, Part, needs_python
 from aloft.clib.targets import TARGETS, compile_module, link
-from aloft.fmi.exporting.cut import Cut
 from aloft.hal.simulated.mujoco_model import mujoco_spec
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
@@ -77,10 +77,19 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
 
     Raises:
         LoadError: the graph may not run.
+        NeedsPython: blocks beside the robot need Python.
         StartError: the robot does not stand.
     """
     graph = load(graph_file, overrides)
     bound = BoundGraph(graph)
+    blocks = tuple(path for path in graph.order if path != "robot")
+    reasons = [
+        f"{graph.file}: block '{path}' {why}"
+        for path in blocks
+        for why in needs_python(bound.blocks[path])
+    ]
+    if reasons:
+        raise NeedsPython(reasons)
     for path in graph.order:
         bound.blocks[path].start()
     robot = bound.blocks["robot"]
@@ -110,7 +119,6 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
-    blocks = tuple(path for path in graph.order if path != "robot")
     part = Part(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
     module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
 
