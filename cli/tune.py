@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import Cluster, JsonBesideTables, Workers
 from .shared.output import console, errors_reported, print_json, say
-from .shared.studies import check_cells, make_all, print_tuned, report_stop, tuned_json
-
-if TYPE_CHECKING:
-    from ..studies.execution import Run
+from .shared.studies import check_cells, print_tuned, report_stop, run_maker, tuned_json
 
 
 def tune(
@@ -46,29 +41,21 @@ def tune(
             raise AloftError(f"{found.path}: 'where' of 'tune' leaves nothing to run")
         both = [*tried, *tuning.extreme_cells(found, tried)]
         checked = check_cells(found, both, screen)[: len(tried)]
-        asked: list[Run] = []
-        made: list[Run] = []
-        stops: list[signal.Signals] = []
         folder = out or Path("results") / found.name
+        total = tuning.runs_of_search(found, checked)
         with Journal(folder / "tuning.jsonl") as journal:
-
-            def make(runs: Sequence[Run]) -> list[Run] | None:
-                asked.extend(runs)
-                text = f"tuning {found.name}, from run {len(made) + 1}"
-                done = make_all(runs, journal, workers, cluster, screen, text)
-                if isinstance(done, signal.Signals):
-                    stops.append(done)
-                    return None
-                made.extend(done)
-                return done
-
-            best = tuning.search(found, checked, make)
+            best = None
+            with run_maker(
+                journal, workers, cluster, screen, f"tuning {found.name}", total
+            ) as make:
+                best = tuning.search(found, checked, make)
             if best is None:
-                raise typer.Exit(report_stop(stops[0], asked, journal, screen, as_json))
+                assert make.stopped is not None
+                raise typer.Exit(report_stop(make.stopped, make.asked, journal, screen, as_json))
         path = tuning.write_tuned(found, best)
         print_tuned(screen, found, best)
         say(screen, f"tuned parameters: {path}")
         if as_json:
-            broken = sum(bool(run.outcome and run.outcome.error) for run in made)
+            broken = sum(bool(run.outcome and run.outcome.error) for run in make.made)
             print_json(tuned_json(found, best, path, broken))
     raise typer.Exit(ExitCode.SUCCESS)

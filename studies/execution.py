@@ -9,7 +9,7 @@ from time import perf_counter
 
 from ..runtime.language.errors import AloftError, ExitCode
 from ..runtime.running.run_result import RunResult
-from .batch.jobs import job_results
+from .batch.jobs import JobPool
 from .expansion import Cell, Job, job, seeded_graph
 from .journal import Journal, Outcome
 
@@ -64,22 +64,26 @@ def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
     )
 
 
+def run_pool(workers: int = 0, cluster: str = "") -> JobPool:
+    """The processes, or the cluster, that make runs."""
+    return JobPool(run_job, workers=workers, cluster=cluster)
+
+
 def make_runs(
     runs: Sequence[Run],
     journal: Journal,
+    pool: JobPool,
     *,
-    workers: int = 0,
-    cluster: str = "",
     on_run: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Run]:
-    """All runs with their outcomes, in the order of ``runs``.
+    """All runs with their outcomes, in the order of ``runs``; ``pool`` is one of ``run_pool``.
 
     Runs that are in the journal are not made again. Every other run is kept as soon as it is done.
     Runs with the same key are made once, and ``on_run`` is called once for them. The death of a
     run's process is an error here, but it is not kept, so the run is tried again the next time.
 
     Raises:
-        AloftError: as ``batch.jobs.job_results``.
+        AloftError: as ``JobPool.results``.
     """
     missing = {run.key: run for run in runs if run.key not in journal.outcomes}
     for key in dict.fromkeys(run.key for run in runs if run.key not in missing):
@@ -88,7 +92,7 @@ def make_runs(
     lost: dict[str, Outcome] = {}
     if order:
         jobs = (job(run.cell, run.seed) for run in order)
-        with closing(job_results(run_job, jobs, workers=workers, cluster=cluster)) as results:
+        with closing(pool.results(jobs)) as results:
             for result in results:
                 key = order[result.index].key
                 if result.error:

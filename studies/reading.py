@@ -1,7 +1,7 @@
 """Reads a study's file and reports every mistake in it at once, as for graphs.
 
 The keys: ``graph``, ``graphs`` or ``graphs_of``, ``include``, ``seeds``, ``title``, ``set``, ``arms``,
-``grid``, ``goals``, ``tune``, ``plots``; docs/studies.md explains them. What overrides mean to the
+``grid``, ``goals``, ``tune``, ``falsify``, ``plots``; docs/studies.md explains them. What overrides mean to the
 graphs is checked by ``expansion``.
 """
 
@@ -14,13 +14,22 @@ from ..files.document import read_file
 from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..files.problems import Code, LoadError, Position, Problems, nearest
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
-from .sections import Labels, read_axes, read_goals, read_plots, read_seeds, read_sets, read_tuning
-from .study import Arm, CellFilter, Range, Study, StudyTask
+from .sections import (
+    Labels,
+    read_axes,
+    read_falsification,
+    read_goals,
+    read_plots,
+    read_seeds,
+    read_sets,
+    read_tuning,
+)
+from .study import Arm, CellFilter, Falsification, Range, Study, StudyTask
 from .tuning import read_range
 
 KEYS = (
     "graph", "graphs", "graphs_of", "include", "seeds", "title", "set", "arms", "grid", "goals",
-    "tune", "plots",
+    "tune", "falsify", "plots",
 )  # fmt: skip
 GRAPH_KEYS = ("graph", "graphs", "graphs_of")
 ARM_KEYS = ("set", "tune", "include")
@@ -126,6 +135,7 @@ def _read(tree: MapNode, path: Path, problems: Problems) -> Study:
         axes,
         read_goals(keys["goals"].value, labels, problems) if "goals" in keys else (),
         tuning,
+        _read_falsification(section("falsify"), labels, problems) if "falsify" in keys else None,
         read_plots(section("plots"), labels, problems),
     )
 
@@ -236,6 +246,16 @@ def _read_ranges(entry: Entry | None, problems: Problems) -> tuple[Range, ...]:
         return ()
     found = [read_range(item, problems) for item in entry.value if not item.key.startswith("_")]
     return tuple(each for each in found if each is not None)
+
+
+def _read_falsification(node: MapNode, labels: Labels, problems: Problems) -> Falsification | None:
+    ranges = _read_ranges(node.get("ranges"), problems)
+    if not ranges:
+        problems.add(
+            Code.MISSING_KEY, "'falsify' has no ranges to search in", node.where, at="falsify",
+            expected="ranges", fix="ranges: {block.parameter: [low, high]}",
+        )  # fmt: skip
+    return read_falsification(node, ranges, labels, problems)
 
 
 def _read_arm(entry: Entry, common: tuple[Range, ...], path: Path, problems: Problems) -> Arm:

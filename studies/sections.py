@@ -1,4 +1,4 @@
-"""Reads the sections of a study that refer to its axes: goals, tune and plots.
+"""Reads the sections of a study that refer to its axes: goals, tune, falsify and plots.
 
 Reads the axes of a study's grid.
 
@@ -17,6 +17,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ..files.problems import Code, Problems, listing, nearest
@@ -24,7 +25,19 @@ from ..runtime.language.errors import AloftError
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .batch.seeds import parse_seeds
 from .quantities import column_name, in_unit, quantity, written
-from .study import FIRST_REPORT_SEED, Axis, Case, CellFilter, Coordinate, Goal, Plot, Tuning
+from .study import (
+    FIRST_REPORT_SEED,
+    Axis,
+    Case,
+    CellFilter,
+    Coordinate,
+    Falsification,
+    Goal,
+    MarginTerm,
+    Plot,
+    Range,
+    Tuning,
+)
 
 RESERVED = (
     "task", "arm", "seed", "tuning_seed", "success", "reason", "error", "run_hash", "wall_time_s",
@@ -230,6 +243,7 @@ def _spaced(entry: Entry, node: MapNode, problems: Problems) -> list[Node] | Non
 
 GOAL_KEYS = ("rate", "where")
 TUNE_KEYS = ("seeds", "draws", "seed", "ranges", "where", "set", "least")
+FALSIFY_KEYS = ("seeds", "draws", "seed", "ranges", "where", "set", "margin", "smallest")
 PLOT_KEYS = {
     "polar": ("kind", "title", "angle", "radius", "level", "lines", "where"),
     "lines": ("kind", "title", "x", "y", "lines", "panels", "where"),
@@ -371,20 +385,15 @@ def read_seeds(node: Node, what: str, problems: Problems) -> tuple[int, ...]:
 
 def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | None:
     """Reads the section ``tune``, except its ranges."""
-    for entry in node:
-        if entry.key not in TUNE_KEYS:
-            unknown_key(entry, TUNE_KEYS, "of 'tune'", problems)
-    seeds: tuple[int, ...] = ()
-    for key, example in (("seeds", "seeds: 0:4"), ("draws", "draws: 50")):
-        if node.get(key) is None:
-            problems.add(
-                Code.MISSING_KEY, f"'tune' does not say its {key}", node.where, expected=key,
-                fix=example,
-            )  # fmt: skip
-    given = node.get("seeds")
-    if given is not None:
-        seeds = read_seeds(given.value, "tune.seeds", problems)
-        kept = [seed for seed in seeds if seed >= FIRST_REPORT_SEED]
+    search = _read_search(node, "tune", TUNE_KEYS, labels, problems)
+    given, least_of = node.get("seeds"), node.get("least")
+    if given is None:
+        problems.add(
+            Code.MISSING_KEY, "'tune' does not say its seeds", node.where, expected="seeds",
+            fix="seeds: 0:4",
+        )  # fmt: skip
+    else:
+        kept = [seed for seed in search.seeds if seed >= FIRST_REPORT_SEED]
         if kept:
             problems.add(
                 Code.BAD_VALUE,
@@ -395,6 +404,35 @@ def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | N
                 found=listing(map(str, kept)),
                 fix="seeds: 0:4",
             )
+    return Tuning(
+        search.seeds, search.draws, search.seed, search.cells, search.sets,
+        str(plain(least_of.value)) if least_of else "",
+    )  # fmt: skip
+
+
+class _Search(NamedTuple):
+    """What ``tune`` and ``falsify`` have in common, except the ranges."""
+
+    seeds: tuple[int, ...]
+    draws: int
+    seed: int
+    cells: CellFilter
+    sets: tuple[Entry, ...]
+
+
+def _read_search(
+    node: MapNode, section: str, keys: tuple[str, ...], labels: Labels, problems: Problems
+) -> _Search:
+    for entry in node:
+        if entry.key not in keys:
+            unknown_key(entry, keys, f"of '{section}'", problems)
+    if node.get("draws") is None:
+        problems.add(
+            Code.MISSING_KEY, f"'{section}' does not say its draws", node.where, expected="draws",
+            fix="draws: 50",
+        )  # fmt: skip
+    given, sets = node.get("seeds"), node.get("set")
+    seeds = read_seeds(given.value, f"{section}.seeds", problems) if given else ()
     numbers = {"draws": 1, "seed": 0}
     for key, least in numbers.items():
         entry_of = node.get(key)
@@ -403,19 +441,65 @@ def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | N
             assert entry_of is not None
             problems.add(
                 Code.BAD_VALUE, f"{key} cannot be {kind(entry_of.value)}", entry_of.value.where,
-                at=f"tune.{key}", expected=f"a whole number from {least}", found=text_of(value),
+                at=f"{section}.{key}", expected=f"a whole number from {least}", found=text_of(value),
             )  # fmt: skip
         else:
             numbers[key] = value
-    sets, least_of = node.get("set"), node.get("least")
-    return Tuning(
+    return _Search(
         seeds,
         numbers["draws"],
         numbers["seed"],
         labels.read_filter(node.get("where"), problems),
         (read_sets(sets, problems) or ()) if sets else (),
-        str(plain(least_of.value)) if least_of else "",
     )
+
+
+def read_falsification(
+    node: MapNode, ranges: tuple[Range, ...], labels: Labels, problems: Problems
+) -> Falsification:
+    """Reads the section ``falsify``, whose ranges have been read."""
+    search = _read_search(node, "falsify", FALSIFY_KEYS, labels, problems)
+    smallest = node.get("smallest")
+    legal = tuple(each.key for each in ranges if each.scalar and not each.choices)
+    return Falsification(
+        search.draws,
+        ranges,
+        _read_margin(node, problems),
+        search.seeds,
+        search.seed,
+        search.cells,
+        search.sets,
+        labels.read_axis(smallest, legal, problems),
+    )
+
+
+def _read_margin(node: MapNode, problems: Problems) -> tuple[MarginTerm, ...]:
+    """``margin: {metric: [best, limit]}``."""
+    entry = node.get("margin")
+    example = "margin: {peak_tilt_deg: [0, 45]}"
+    if entry is None:
+        problems.add(
+            Code.MISSING_KEY, "'falsify' does not say how near a run is to failing", node.where,
+            expected="margin: for metrics of a run the best value and the limit", fix=example,
+        )  # fmt: skip
+        return ()
+    if not isinstance(entry.value, MapNode) or not entry.value.entries:
+        wrong_kind(entry.value, "'margin'", "{metric: [best value, limit]}", problems)
+        return ()
+    found = []
+    for item in entry.value:
+        ends = plain(item.value)
+        numbers = ends if isinstance(ends, list) and len(ends) == 2 else (None, None)
+        best, limit = (in_unit(each, "") for each in numbers)
+        if best is None or limit is None or best == limit:
+            problems.add(
+                Code.BAD_VALUE, f"the margin of {item.key} cannot be {text_of(ends)}",
+                item.value.where, at="falsify.margin", fix=example, found=text_of(ends),
+                expected="two different numbers, the best value and the limit",
+            )  # fmt: skip
+            continue
+        found.append(MarginTerm(item.key, best, limit))
+    return tuple(found)
 
 
 def read_plots(node: MapNode, labels: Labels, problems: Problems) -> tuple[Plot, ...]:

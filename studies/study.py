@@ -110,6 +110,31 @@ class Tuning:
 
 
 @dataclass(frozen=True)
+class MarginTerm:
+    """A metric of the margin: 1 where it has its ``best`` value, 0 at its ``limit``, linear between."""
+
+    metric: str
+    best: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Falsification:
+    """Search for the worst case in ranges of parameters."""
+
+    draws: int
+    ranges: tuple[Range, ...]
+    margin: tuple[MarginTerm, ...]
+    seeds: tuple[int, ...] = ()
+    """Those of every draw; empty for the study's."""
+    seed: int = 0
+    cells: CellFilter = CellFilter()
+    sets: tuple[Entry, ...] = ()
+    smallest: str = ""
+    """The parameter of whose values that fail the least is searched."""
+
+
+@dataclass(frozen=True)
 class Plot:
     """One picture; see ``plots``."""
 
@@ -141,6 +166,7 @@ class Study:
     axes: tuple[Axis, ...] = ()
     goals: tuple[Goal, ...] = ()
     tuning: Tuning | None = None
+    falsification: Falsification | None = None
     plots: tuple[Plot, ...] = ()
 
     @property

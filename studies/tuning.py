@@ -40,7 +40,7 @@ from ..runtime.loading.reading.written import unknown_key
 from .execution import Run
 from .expansion import Cell, Tuned, cells
 from .quantities import in_unit, quantity, written
-from .study import Arm, Range, Study
+from .study import Range, Study
 
 if TYPE_CHECKING:
     from optuna import Study as OptunaStudy
@@ -152,27 +152,30 @@ def tuning_cells(study: Study) -> list[Cell]:
 
 
 def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with every range at its ends. They are checked before anything runs."""
+    """Cells with every range of tuning at its ends. They are checked before anything runs."""
     found = []
     for arm in study.arms:
         first = next((cell for cell in chosen if cell.arm == arm.name), None)
-        for each in arm.ranges if first else ():
-            assert first is not None
-            found += [first.with_sets({each.key: end}, each.where) for end in corners(each)]
+        found += cells_at_ends(first, arm.ranges) if first else []
     return found
 
 
-def draw_runs(study: Study, arm: Arm, each: Draw, mine: Sequence[Cell]) -> list[Run]:
-    """The runs of one draw on the checked cells of its arm."""
-    assert study.tuning is not None
+def cells_at_ends(cell: Cell, ranges: Sequence[Range]) -> list[Cell]:
+    """The cell with each of the ranges at its ends."""
+    return [cell.with_sets({each.key: e}, each.where) for each in ranges for e in corners(each)]
+
+
+def draw_runs(
+    values: Mapping[str, Any], where: str, mine: Sequence[Cell], seeds: Sequence[int]
+) -> list[Run]:
+    """The runs of one set of parameters on checked cells; ``where`` names it in errors."""
     found = []
     for cell in mine:
-        where = Position(f"draw {each.number} of arm {arm.name}", 0, 0)
-        tried = cell.with_sets(each.values, where)
-        if each.values:
-            text = f"{cell.key} {text_of(dict(each.values))}"
+        tried = cell.with_sets(values, Position(where, 0, 0))
+        if values:
+            text = f"{cell.key} {text_of(dict(values))}"
             tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])
-        found += [Run(tried, seed) for seed in study.tuning.seeds]
+        found += [Run(tried, seed) for seed in seeds]
     return found
 
 
@@ -267,12 +270,19 @@ def read_tuned(study: Study) -> Tuned:
 
 AT_ONCE = 8
 """Draws of an arm that are proposed before the first of their results is known."""
-Make = Callable[[Sequence[Run]], "list[Run] | None"]
-"""Makes runs; nothing comes back where it was stopped."""
+Make = Callable[[Sequence[Run]], list[Run]]
+"""Makes runs."""
 
 
-def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw] | None:
-    """The best draw of every arm; ``None`` where ``make`` was stopped.
+def runs_of_search(study: Study, chosen: Sequence[Cell]) -> int:
+    """How many runs the search takes on these cells."""
+    assert study.tuning is not None
+    draws = {arm.name: study.tuning.draws if arm.ranges else 1 for arm in study.arms}
+    return sum(draws[cell.arm] for cell in chosen) * len(study.tuning.seeds)
+
+
+def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
+    """The best draw of every arm.
 
     Args:
         study: the study, with a section ``tune``.
@@ -286,7 +296,11 @@ def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw] 
     tuning = study.tuning
     arms = {arm.name: arm for arm in study.arms if any(c.arm == arm.name for c in chosen)}
     own_cells = {name: [cell for cell in chosen if cell.arm == name] for name in arms}
-    samplers = {name: _optuna_study(tuning.seed, arm) for name, arm in arms.items() if arm.ranges}
+    samplers = {
+        name: optuna_study("tune", f"{tuning.seed} {name}")
+        for name, arm in arms.items()
+        if arm.ranges
+    }
     best: dict[str, Draw] = {}
     for first in (0, *range(1, tuning.draws, AT_ONCE)):
         asked: list[tuple[str, Draw, Trial | None]] = []
@@ -296,12 +310,15 @@ def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw] 
             elif arm.ranges:
                 for number in range(first, min(first + AT_ONCE, tuning.draws)):
                     trial = samplers[name].ask()
-                    values = {each.key: _proposed(each, trial) for each in arm.ranges}
+                    values = {each.key: proposed(each, trial) for each in arm.ranges}
                     asked.append((name, Draw(number, values), trial))
-        planned = [draw_runs(study, arms[name], each, own_cells[name]) for name, each, _ in asked]
+        planned = [
+            draw_runs(
+                each.values, f"draw {each.number} of arm {name}", own_cells[name], tuning.seeds
+            )
+            for name, each, _ in asked
+        ]
         done = make([run for runs in planned for run in runs])
-        if done is None:
-            return None
         at = 0
         for (name, each, trial), runs in zip(asked, planned, strict=True):
             found = scored(each, done[at : at + len(runs)], tuning.least)
@@ -319,19 +336,31 @@ def value_to_minimise(found: Draw, runs: int) -> float:
     return runs - found.successes + share
 
 
-def _proposed(each: Range, trial: Trial) -> Any:
+def proposed(each: Range, trial: Trial) -> Any:
+    """The value of a range that a trial proposes."""
     if each.choices:
         return each.choices[trial.suggest_categorical(each.key, list(range(len(each.choices))))]
     shares = [trial.suggest_float(f"{each.key} {i}", 0.0, 1.0) for i in range(len(each.bounds))]
     return value_at(each, shares)
 
 
-def _optuna_study(seed: int, arm: Arm) -> OptunaStudy:
+def optuna_study(verb: str, seed: str, *, random: bool = False) -> OptunaStudy:
+    """What proposes draws: a tree-structured Parzen estimator, or for comparison chance alone.
+
+    Args:
+        verb: the verb that needs it.
+        seed: a text that determines what is proposed.
+        random: whether results do not count.
+
+    Raises:
+        AloftError: Optuna is not installed.
+    """
     try:
         import optuna
     except ImportError:
-        raise AloftError("aloft tune needs Optuna: pip install 'aloft-robotics[tune]'") from None
+        raise AloftError(f"aloft {verb} needs Optuna: pip install 'aloft-robotics[tune]'") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    name = int.from_bytes(hashlib.sha256(f"{seed} {arm.name}".encode()).digest()[:4], "big")
-    sampler = optuna.samplers.TPESampler(seed=name, constant_liar=True)
-    return optuna.create_study(sampler=sampler)
+    number = int.from_bytes(hashlib.sha256(seed.encode()).digest()[:4], "big")
+    if random:
+        return optuna.create_study(sampler=optuna.samplers.RandomSampler(seed=number))
+    return optuna.create_study(sampler=optuna.samplers.TPESampler(seed=number, constant_liar=True))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from .viewing import draw, how_to_view, show
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ...studies.batch.jobs import JobPool
     from ...studies.comparison import Comparison
     from ...studies.execution import Run
     from ...studies.expansion import Cell
@@ -35,6 +37,58 @@ def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list
         return checked_cells(expanded, found, code_fingerprint(), lambda: bar.advance(task))
 
 
+class RunMaker:
+    """Makes batches of runs, all with the same processes and under one progress bar; see ``run_maker``."""
+
+    def __init__(self, journal: Journal, pool: JobPool, show: Callable[[int], None]) -> None:
+        self.asked: list[Run] = []
+        self.made: list[Run] = []
+        self.stopped: signal.Signals | None = None
+        """The signal that stopped the work."""
+        self._journal, self._pool, self._show = journal, pool, show
+        self._successes = 0
+
+    def __call__(self, runs: Sequence[Run]) -> list[Run]:
+        """All runs with their outcomes."""
+        from ...studies.execution import make_runs
+
+        self.asked += runs
+        done = make_runs(runs, self._journal, self._pool, on_run=self._on_run)
+        self.made += done
+        return done
+
+    def _on_run(self, outcome: Outcome) -> None:
+        self._successes += outcome.success
+        self._show(self._successes)
+
+
+@contextmanager
+def run_maker(
+    journal: Journal, workers: int, cluster: str, screen: Console, text: str, total: int
+) -> Iterator[RunMaker]:
+    """Make runs within the block, which SIGINT and SIGTERM leave; ``stopped`` then has the signal.
+
+    ``total`` is how many runs there will be, for the progress bar.
+    """
+    from ...studies.execution import run_pool
+    from .output import progress_bar
+
+    with (
+        stopped_by_signals() as received,
+        progress_bar(screen, text, total) as (bar, task),
+        run_pool(workers, cluster) as pool,
+    ):
+
+        def show(successes: int) -> None:
+            bar.update(task, advance=1, description=f"{text}: {successes} succeeded")
+
+        maker = RunMaker(journal, pool, show)
+        try:
+            yield maker
+        finally:
+            maker.stopped = received[0] if received else None
+
+
 def make_all(
     runs: Sequence[Run],
     journal: Journal,
@@ -48,26 +102,14 @@ def make_all(
     Returns:
         All runs with their outcomes, or the signal that stopped the work.
     """
-    from ...studies.execution import make_runs
-    from .output import progress_bar
-
-    successes = 0
     keys = {run.key for run in runs}
     known = len(keys & journal.outcomes.keys())
     if known:
         say(screen, f"{known} of {len(keys)} runs were made before")
-    with (
-        stopped_by_signals() as received,
-        progress_bar(screen, text, len(keys)) as (bar, task),
-    ):
-
-        def on_run(outcome: Outcome) -> None:
-            nonlocal successes
-            successes += outcome.success
-            bar.update(task, advance=1, description=f"{text}: {successes} succeeded")
-
-        return make_runs(runs, journal, workers=workers, cluster=cluster, on_run=on_run)
-    return received[0]
+    with run_maker(journal, workers, cluster, screen, text, len(keys)) as make:
+        return make(runs)
+    assert make.stopped is not None
+    return make.stopped
 
 
 def report_stop(

@@ -36,7 +36,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -44,7 +44,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from threading import Thread
 from time import monotonic
-from typing import Any
+from typing import Any, Self
 
 from ...processes.child import end_with
 from ...runtime.language.errors import AloftError
@@ -101,14 +101,13 @@ class _Worker:
     job: Numbered | None = None
 
 
-def process_results(
-    function: Callable[[Any], Any], jobs: Iterable[Any], count: int
+def _process_results(
+    function: Callable[[Any], Any], jobs: Iterable[Any], workers: list[_Worker], count: int
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs, done by at most ``count`` processes; see ``job_results``."""
+    """The results of all jobs, done by ``workers``, which become at most ``count``."""
     numbered = enumerate(jobs)
     again: deque[Numbered] = deque()
     begun: dict[int, int] = {}
-    workers: list[_Worker] = []
 
     def next_job() -> Numbered | None:
         return again.popleft() if again else next(numbered, None)
@@ -143,7 +142,9 @@ def process_results(
                     begun.pop(message[0], None)
                     yield JobResult(*message)
     finally:
-        _stop(workers)
+        at_work = [worker for worker in workers if worker.job is not None]
+        _stop(at_work)
+        workers[:] = [worker for worker in workers if worker not in at_work]
 
 
 def _assign(worker: _Worker, job: Numbered | None, begun: dict[int, int]) -> bool:
@@ -276,6 +277,59 @@ def _on_terminate(number: int, frame: object) -> None:
         raise _StoppedError
 
 
+class JobPool:
+    """Processes, or a connection to a cluster, that serve one batch of jobs after another.
+
+    They begin with the first job and end with the ``with`` statement::
+
+        with JobPool(run_one, workers=2) as pool:
+            for batch in batches:
+                with closing(pool.results(batch)) as results: ...
+
+    Args:
+        function: does one job.
+        workers: how many processes of this machine work at once; 0 for one for every processor.
+        cluster: the address of a Dask scheduler (``tcp://127.0.0.1:8786``) whose workers do the
+            jobs instead, which needs the package ``distributed``. ``workers`` is ignored then.
+    """
+
+    def __init__(
+        self, function: Callable[[Any], Any], *, workers: int = 0, cluster: str | None = None
+    ) -> None:
+        self.function = function
+        self._count = workers or processors()
+        self._cluster = cluster
+        self._workers: list[_Worker] = []
+        self._connection = ExitStack()
+        self._client: Any = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        _stop(self._workers)
+        self._workers.clear()
+        self._connection.close()
+        self._client = None
+
+    def results(self, jobs: Iterable[Any]) -> Generator[JobResult, None, None]:
+        """The results of all jobs, in the order in which they are ready.
+
+        Jobs are taken from ``jobs`` only as they are needed. Closing the generator, or an exception in
+        it, stops the jobs under way: their processes get SIGTERM, and SIGKILL if they have not ended
+        10 s later.
+
+        Raises:
+            AloftError: no process can be started, or the cluster cannot be reached or used.
+        """
+        if not self._cluster:
+            yield from _process_results(self.function, jobs, self._workers, self._count)
+            return
+        if self._client is None:
+            self._client = self._connection.enter_context(_connected(self._cluster))
+        yield from _cluster_results(self.function, jobs, self._client, self._cluster)
+
+
 def job_results(
     function: Callable[[Any], Any],
     jobs: Iterable[Any],
@@ -283,25 +337,9 @@ def job_results(
     workers: int = 0,
     cluster: str | None = None,
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs, in the order in which they are ready.
-
-    Jobs are taken from ``jobs`` only as they are needed. Closing the generator, or an exception in
-    it, stops the jobs under way: their processes get SIGTERM, and SIGKILL if they have not ended
-    10 s later.
-
-    Args:
-        function: does one job.
-        jobs: the arguments of ``function``.
-        workers: how many processes of this machine work at once; 0 for one for every processor.
-        cluster: the address of a Dask scheduler (``tcp://127.0.0.1:8786``) whose workers do the
-            jobs instead, which needs the package ``distributed``. ``workers`` is ignored then.
-
-    Raises:
-        AloftError: no process can be started, or the cluster cannot be reached or used.
-    """
-    if cluster:
-        return cluster_results(function, jobs, cluster)
-    return process_results(function, jobs, workers or processors())
+    """The results of one batch of jobs; see ``JobPool``."""
+    with JobPool(function, workers=workers, cluster=cluster) as pool:
+        yield from pool.results(jobs)
 
 
 def processors() -> int:
@@ -351,22 +389,15 @@ MOST_LOSSES = 10
 """How often the result of one job may be lost with its worker before the job is given up."""
 
 
-def cluster_results(
-    function: Callable[[Any], Any], jobs: Iterable[Any], address: str
+def _cluster_results(
+    function: Callable[[Any], Any], jobs: Iterable[Any], client: Any, address: str
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs; see ``job_results`` for the parameters.
+    """The results of all jobs, done by a cluster.
 
     When a worker is lost, the scheduler gives its jobs to another one. It gives up on all jobs that
     were on several lost workers, because it cannot tell which of them was the cause. These jobs are
     done once more at the end, one at a time.
     """
-    with _connected(address) as client:
-        yield from _results(function, jobs, client, address)
-
-
-def _results(
-    function: Callable[[Any], Any], jobs: Iterable[Any], client: Any, address: str
-) -> Generator[JobResult, None, None]:
     from distributed import as_completed
 
     numbered = enumerate(jobs)

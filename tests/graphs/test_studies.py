@@ -6,6 +6,7 @@ import pytest
 
 import aloft
 from aloft.studies.expansion import Cell, cells, checked_cells
+from aloft.studies.falsification import end_cells, searched_cells
 from aloft.studies.reading import read_study
 from aloft.studies.tuning import extreme_cells, tuning_cells
 
@@ -33,5 +34,7 @@ def test_every_graph_takes_what_is_set(path: Path) -> None:
         tried = tuning_cells(study)
         assert tried
         chosen += extreme_cells(study, tried)
+    if study.falsification is not None:
+        chosen += end_cells(study, searched_cells(study))
     assert len(checked_cells(chosen, study, "")) == len(chosen)
     assert min(study.seeds) >= 1000, "what a study reports is not what gains were tuned on"

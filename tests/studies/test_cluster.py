@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
-from aloft.studies.execution import Run, make_runs
+from aloft.studies.execution import Run, make_runs, run_pool
 from aloft.studies.expansion import cells, checked_cells
 from aloft.studies.journal import Journal
 from aloft.studies.reading import read_study
@@ -34,8 +34,12 @@ def test_the_table_is_the_same_however_many_work(folder: Path, cluster: str) -> 
     runs = [Run(cell, seed) for cell in checked for seed in found.seeds]
     files = []
     for name, workers, address in (("one", 1, ""), ("two", 2, ""), ("cluster", 1, cluster)):
-        with Journal(folder / name / "runs.jsonl") as journal:
-            done = make_runs(runs, journal, workers=workers, cluster=address)
+        with (
+            Journal(folder / name / "runs.jsonl") as journal,
+            run_pool(workers, address) as pool,
+        ):
+            half = make_runs(runs[:5], journal, pool)
+            done = [*half, *make_runs(runs[5:], journal, pool)]
             assert len(journal.outcomes) == 12
         assert [run.outcome.success for run in done if run.outcome] == 5 * [True] + 7 * [False]
         files.append(folder / name / "runs.parquet")

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from aloft.studies.execution import Run, make_runs
+from aloft.studies.execution import Run, make_runs, run_pool
 from aloft.studies.expansion import cells, checked_cells
 from aloft.studies.journal import Journal, Outcome
 from aloft.studies.study import Study
@@ -36,14 +36,14 @@ def test_a_process_that_dies_is_an_error_now_and_tried_again_next_time(
     (folder / "count.yaml").write_text(graph)
     runs = runs_of(study("arms: {a: {}}\n"))[:1]
     (folder / "deadly").touch()
-    with Journal(folder / "runs.jsonl") as journal:
-        (run,) = make_runs(runs, journal, workers=1)
+    with Journal(folder / "runs.jsonl") as journal, run_pool(1) as pool:
+        (run,) = make_runs(runs, journal, pool)
         assert run.outcome is not None and not run.outcome.success
         assert "its process ended with exit code 7" in run.outcome.error
         assert journal.outcomes == {}
     (folder / "deadly").unlink()
-    with Journal(folder / "runs.jsonl") as journal:
-        (run,) = make_runs(runs, journal, workers=1)
+    with Journal(folder / "runs.jsonl") as journal, run_pool(1) as pool:
+        (run,) = make_runs(runs, journal, pool)
         assert run.outcome is not None and run.outcome.success
         assert len(journal.outcomes) == 1
 
@@ -51,10 +51,10 @@ def test_a_process_that_dies_is_an_error_now_and_tried_again_next_time(
 def test_a_block_that_fails_is_an_outcome_and_kept(folder: Path, study: Read) -> None:
     runs = runs_of(study("set: {counter.fail_at: 3}\n"))
     heard: list[Outcome] = []
-    with Journal(folder / "runs.jsonl") as journal:
-        done = make_runs([*runs, *runs], journal, workers=1, on_run=heard.append)
+    with Journal(folder / "runs.jsonl") as journal, run_pool(1) as pool:
+        done = make_runs([*runs, *runs], journal, pool, on_run=heard.append)
         assert len(journal.outcomes) == 3 == len(heard)  # the same run twice is one run
-        again = make_runs(runs, journal, workers=1, on_run=heard.append)
+        again = make_runs(runs, journal, pool, on_run=heard.append)
     assert len(done) == 6 and again == done[:3] and len(heard) == 6
     for run in done:
         assert run.outcome is not None

@@ -21,6 +21,7 @@ from aloft.studies.tuning import (
     extreme_cells,
     order,
     read_tuned,
+    runs_of_search,
     search,
     tuning_cells,
     value_to_minimise,
@@ -57,9 +58,7 @@ def made_by(
         runs.extend((run.cell.arm, run) for run in asked)
         return [replace(run, outcome=judge(run)) for run in asked]
 
-    best = search(found, checked, make)
-    assert best is not None
-    return best, runs
+    return search(found, checked, make), runs
 
 
 def test_every_arm_gets_the_same_draws_cells_and_seeds(study: Read) -> None:
@@ -149,14 +148,19 @@ def judged(run: Run) -> Outcome:
 def searched(study: Study, most: int = 10**9) -> tuple[dict[str, Draw] | None, list[Any]]:
     made: list[Any] = []
 
-    def make(runs: Sequence[Run]) -> list[Run] | None:
+    def make(runs: Sequence[Run]) -> list[Run]:
         if len(made) + len(runs) > most:
-            return None
+            raise KeyboardInterrupt
         made.extend((run.key, dict(run.cell.overrides)) for run in runs)
         return [replace(run, outcome=judged(run)) for run in runs]
 
     cells = [replace(cell, key=str(n)) for n, cell in enumerate(tuning_cells(study))]
-    return search(study, cells, make), made
+    try:
+        best = search(study, cells, make)
+    except KeyboardInterrupt:
+        return None, made
+    assert len(made) == runs_of_search(study, cells)
+    return best, made
 
 
 def test_every_arm_gets_the_same_effort_and_a_better_set_is_found(study: Read) -> None:

@@ -174,7 +174,7 @@ def settings_of(path: Path) -> dict[str, Any]:
     return {entry.key: plain(entry.value) for file in gathered for entry in file.sets}
 
 
-_STUDY = ("arms", "grid", "goals", "plots", "graphs", "graph", "tune", "draws_per_arm")
+_STUDY = ("arms", "grid", "goals", "plots", "graphs", "graph", "tune", "falsify", "draws_per_arm")
 _ROBOT = ("links", "joints", "feet", "profiles", "standing", "transmission")
 _TASK = ("rise", "distance_x", "distance_y", "landing_height", "jumps", "twist", "rotation")
 _HARDWARE = ("bus", "board", "drives", "motors", "soft_start", "dead_man")

@@ -16,7 +16,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.units import parse_unit
-from aloft.studies.batch.jobs import JobResult, attempt, job_results, processors
+from aloft.studies.batch.jobs import JobPool, JobResult, attempt, job_results, processors
 
 
 def results(function: Any, jobs: Any, workers: int = 2) -> dict[int, JobResult]:
@@ -122,6 +122,24 @@ def test_closing_the_results_stops_the_jobs() -> None:
     with closing(job_results(time.sleep, [0.0, 300.0, 300.0, 300.0], workers=2)) as found:
         assert next(found) == JobResult(0, None, "")
     assert time.monotonic() - started < 300.0
+
+
+def test_a_pool_serves_batches_with_the_same_processes_and_ends_them() -> None:
+    with JobPool(work_here, workers=2) as pool:
+        first = {result.value for result in pool.results(range(4))}
+        second = {result.value for result in pool.results(range(4))}
+        assert second <= first and len(first) <= 2 and os.getpid() not in first
+        with closing(pool.results([0, 300])) as found:
+            next(found)
+        after = {result.value for result in pool.results([0])}
+    assert len(after) == 1
+    wait_until(lambda: not any(running(pid) for pid in first | after))
+
+
+def work_here(seconds: float) -> int:
+    if seconds > 3.0:
+        time.sleep(seconds)
+    return os.getpid()
 
 
 def test_a_function_that_has_no_name_is_refused() -> None:
