@@ -24,7 +24,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "files": ("runtime/language/errors", "runtime/language/units"),
     "mathematics": ("processes",),
     "robots": ("files", "mathematics"),
-    "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/ground_surface"),
+    "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/ground_surface"),
     "runtime/running": (
         "processes", "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),
@@ -77,7 +77,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
         "blocks/signals",
     ),
-    "blocks/general": ("blocks/signals", "clib/library", "mathematics", "robots", "runtime/language"),
+    "blocks/general": ("blocks/signals", "clib/library", "clib/remote_library", "mathematics", "robots", "runtime/language"),
     "blocks/estimation": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
