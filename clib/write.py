@@ -85,6 +85,7 @@ def write_library(
         description: json.dumps(about, indent=1) + "\n",
         to / f"{name}.h": made.header(),
         to / "example.c": _example(name, taken),
+        to / "main.c": _main(name),
         to / "CMakeLists.txt": _cmake(name),
         to / "README.md": _readme(name, about, taken),
     }
@@ -308,6 +309,22 @@ int main(void)
 """
 
 
+def _main(name: str) -> str:
+    """The library as a process, in real time or in lockstep."""
+    upper = name.upper()
+    lines = [
+        f"#define lib_{each} {name}_{each}"
+        for each in ("init", "step", "last_block", "inputs", "outputs")
+    ]
+    lines += [
+        f"#define LIB_{each} {upper}_{each}" for each in ("PERIOD", "MEMORY_SIZE", "GRAPH_HASH")
+    ]
+    text = (Path(__file__).parent / "real_time.c").read_text(encoding="utf-8")
+    return "\n".join(
+        ("#define _GNU_SOURCE", f'#include "{name}.h"', f"#define lib {name}", *lines, text)
+    )
+
+
 def _cmake(name: str) -> str:
     return f"""\
 cmake_minimum_required(VERSION 3.13)
@@ -319,6 +336,12 @@ target_include_directories({name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
 target_link_libraries({name} PUBLIC m)
 add_executable(example example.c)
 target_link_libraries(example PRIVATE {name})
+if(CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  find_package(Threads REQUIRED)
+  add_executable(main main.c)
+  target_compile_features(main PRIVATE c_std_11)
+  target_link_libraries(main PRIVATE {name} Threads::Threads)
+endif()
 """
 
 

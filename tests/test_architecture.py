@@ -77,7 +77,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
         "blocks/signals",
     ),
-    "blocks/general": ("blocks/signals", "clib/library", "mathematics", "robots", "runtime/language"),
+    "blocks/general": ("blocks/signals", "clib/library", "clib/remote_library", "mathematics", "robots", "runtime/language"),
     "blocks/estimation": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),

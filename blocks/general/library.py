@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...clib.library import Library as Instance
 from ...clib.library import description_in, read_description
+from ...clib.remote_library import RemoteLibrary
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import AloftError, BlockError
@@ -36,6 +37,9 @@ class LibraryParameters(Parameters):
     )
     live: dict[str, float] = parameter(
         {}, text="values of the library's live parameters, by their names in NAME.json"
+    )
+    memory: str = parameter(
+        "", text="the shared memory of a process that runs the library; empty: it runs here"
     )
 
 
@@ -88,9 +92,13 @@ class LibraryBlock(Block):
         """Make an instance of the library, and bind its terminals to the ports."""
         description = description_in(self.context.folder / self.params.folder)
         self.files_read = (description, description.with_name(f"lib{self.about['name']}.so"))
-        self._instance = Instance(description)
-        for name, value in self.params.live.items():
-            self._instance.set(name, value)
+        self._instance: Instance | RemoteLibrary
+        if self.params.memory:
+            self._instance = RemoteLibrary(self.about, Path(self.params.memory))
+        else:
+            self._instance = Instance(description)
+            for name, value in self.params.live.items():
+                self._instance.set(name, value)
         self._given = self._pairs("inputs", self._instance.inputs)
         self._found = self._pairs("outputs", self._instance.outputs)
         self._asked: dict[str, int] = {}
@@ -129,11 +137,20 @@ class LibraryBlock(Block):
 
     def save_state(self) -> None:
         """Write the library's state into the block's own."""
+        if isinstance(self._instance, RemoteLibrary):
+            return
         kept = np.frombuffer(self._instance.save(), np.uint8)
         self.state.data.view(np.uint8)[: kept.size] = kept
 
     def load_state(self) -> None:
         """Give the library its state back."""
+        if isinstance(self._instance, RemoteLibrary):
+            if self.state.steps[()]:
+                raise BlockError(
+                    f"the state of {self.about['name']} is in the process that shares {self.params.memory}: "
+                    "a run with it cannot be restored"
+                )
+            return
         size = int(self.about["state_bytes"])
         self._instance.restore(self.state.data.view(np.uint8)[:size].tobytes())
 
@@ -158,6 +175,9 @@ class Library(LibraryBlock):
     a snapshot has the library's state. Where a block of the library asks for attention, the run goes on, and its
     end says how often; see the codes in docs/c_library.md.
 
+    With ``memory`` the library runs in a process of its own, the program ``main`` that was exported with it:
+    in lockstep the bytes are the same; in real time the block gives the newest inputs and takes the newest outputs.
+
     Source: docs/c_library.md.
 
     Raises:
@@ -176,7 +196,7 @@ class Library(LibraryBlock):
         """The class with the ports of the library."""
         assert isinstance(params, LibraryParameters)
         try:
-            return _class_for(_read(params, folder))
+            return _class_for(_read(params, folder), remote=bool(params.memory))
         except AloftError as error:
             raise BlockError(str(error)) from error
 
@@ -195,6 +215,8 @@ class Library(LibraryBlock):
 
 class _WithoutFeedthrough(LibraryBlock):
     """A library whose outputs do not depend on its inputs at once."""
+
+    _instance: Instance
 
     def emit(self) -> None:
         """Write the outputs, which any inputs give; the step itself is made with those of this tick."""
@@ -229,11 +251,11 @@ def _ports(about: Mapping[str, Any]) -> dict[str, dict[str, list[Mapping[str, An
 _CLASSES: dict[str, type[Block]] = {}
 
 
-def _class_for(about: Mapping[str, Any]) -> type[Block]:
+def _class_for(about: Mapping[str, Any], *, remote: bool) -> type[Block]:
     """The class of a library; the same one for the same library, so that graphs compare equal."""
-    key = repr(about)
+    key = repr((about, remote))
     if key not in _CLASSES:
-        direct = any(each["depends"] for each in about["outputs"])
+        direct = remote or any(each["depends"] for each in about["outputs"])
         base: Any = Library if direct else _WithoutFeedthrough
         body: dict[str, Any] = {"__doc__": Library.__doc__, "__module__": Library.__module__}
         for kind, ports in _ports(about).items():

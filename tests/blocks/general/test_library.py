@@ -2,6 +2,10 @@
 
 import json
 import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +19,7 @@ from aloft.files.problems import LoadError
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
-from aloft.runtime.language.errors import BlockError
+from aloft.runtime.language.errors import AloftError, BlockError
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases
 
@@ -228,6 +232,10 @@ def test_a_jump_with_its_controller_as_a_library(tmp_path: Path) -> None:
     ticks = len(wanted.signal("robot.imu.specific_force"))
     result = aloft.load(text, path=graphs / "sil.yaml").run(ticks / 500)
     assert ticks > 1000
+    compare_jumps(result, wanted)
+
+
+def compare_jumps(result: aloft.RunResult, wanted: aloft.RunResult) -> None:
     fields = ("mode", "torque", "position", "velocity", "stiffness", "damping")
     pairs = {f"controller.safety_command.{f}": f"safety.command.{f}" for f in fields}
     sensed = ("imu.angular_velocity", "imu.specific_force", "joints.position", "contacts.closed")
@@ -235,3 +243,86 @@ def test_a_jump_with_its_controller_as_a_library(tmp_path: Path) -> None:
     for own, name in pairs.items():
         assert result.signal(own).tobytes() == wanted.signal(name).tobytes(), name
     assert np.ptp(wanted.signal("safety.command.torque")) > 5.0
+
+
+@contextmanager
+def process(library: Path, memory: Path, *options: str) -> Iterator[list[str]]:
+    """The exported program ``main`` as a process; what it has said is in the list at its end."""
+    program, said = library / "main_program", []
+    if not program.exists():
+        command = [
+            "cc",
+            "-std=c11",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "main.c",
+            f"lib{library.name}.a",
+        ]
+        subprocess.run([*command, "-lm", "-pthread", "-o", program], cwd=library, check=True)
+    started = subprocess.Popen([program, memory, *options], stderr=subprocess.PIPE, text=True)
+    try:
+        for _ in range(500):
+            if memory.exists() and memory.stat().st_size and memory.read_bytes()[:4] == b"ART1":
+                break
+            time.sleep(0.01)
+        yield said
+    finally:
+        started.terminate()
+        said += (started.communicate(timeout=10)[1] or "").splitlines()
+        assert started.returncode == 0, said
+
+
+@needs_compiler
+def test_a_process_in_lockstep_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    wanted = aloft.load(folder / "rail.yaml").run().signal("controller/bound.y.value")
+    memory = tmp_path / "memory"
+    text = with_library("controller", more=f", memory: {memory}")
+    with process(folder / "controller", memory, "--lockstep") as said:
+        result = aloft.load(text, path=folder / "g.yaml").run()
+        result.raise_if_failed()
+        found = result.signal("controller.force.value")
+        other = (
+            "rate: 500 Hz\nduration: 0.1 s\nblocks:\n  force: {use: blocks.Constant, with: {value: [1 N]}}\n"
+            f"  plant: {{use: blocks.Library, with: {{folder: plant, memory: {memory}}}, in: {{force: force.y}}}}\n"
+        )
+        with pytest.raises(AloftError, match=r"runs another library than plant"):
+            aloft.load(other, path=folder / "g.yaml").run()
+    assert found.tobytes() == wanted.tobytes()
+    assert said[-1].startswith("200 ticks, 0 deadlines missed")
+    assert not memory.exists()
+    with pytest.raises(AloftError, match="start the program main of the library first"):
+        aloft.load(text, path=folder / "g.yaml").run()
+
+
+@needs_compiler
+@pytest.mark.long
+def test_a_process_in_real_time_answers_and_counts_its_deadlines(
+    folder: Path, tmp_path: Path
+) -> None:
+    memory = tmp_path / "memory"
+    text = with_library("controller", more=f", memory: {memory}").replace(
+        "rate:", "clock: {kind: paced}\nrate:"
+    )
+    with process(folder / "controller", memory) as said:
+        result = aloft.load(text, path=folder / "g.yaml").run()
+        result.raise_if_failed()
+        assert result.signal("controller.force.value").max() == 5.0, "the step of the wish"
+    assert any("deadlines missed, longest" in line for line in said)
+    ticks = int(said[-1].split()[0])
+    assert ticks >= 100, "0.4 s at 500 Hz, on a machine that does other things, too"
+
+
+@needs_compiler
+@pytest.mark.long
+def test_a_jump_with_its_controller_in_a_process(tmp_path: Path) -> None:
+    write_library("aloft:jump.yaml", tmp_path / "jumper")
+    graphs = Path(aloft.__file__).parent / "graphs"
+    memory = tmp_path / "memory"
+    text = JUMP.replace("folder: jumper", f"folder: {tmp_path / 'jumper'}, memory: {memory}")
+    wanted = aloft.load("aloft:jump.yaml").run()
+    ticks = len(wanted.signal("robot.imu.specific_force"))
+    with process(tmp_path / "jumper", memory, "--lockstep"):
+        result = aloft.load(text, path=graphs / "sil.yaml").run(ticks / 500)
+    compare_jumps(result, wanted)
