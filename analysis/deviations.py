@@ -20,11 +20,14 @@ from ..mathematics.arrays import Array
 from ..mathematics.capture_step import support_margin
 from ..mathematics.constants import GRAVITY
 from ..mathematics.rotations import matrices_of_quaternions
+from ..runtime.language.fault import Fault, FaultParameters
 from .robot_run import RobotRun
 
-Kind = Literal["world", "sensor", "actuator", "contact", "estimate", "limit", "plan", "body"]
+Kind = Literal[
+    "fault", "world", "sensor", "actuator", "contact", "estimate", "limit", "plan", "body"
+]
 KINDS: tuple[Kind, ...] = (
-    "world", "sensor", "actuator", "contact", "estimate", "limit", "plan", "body",
+    "fault", "world", "sensor", "actuator", "contact", "estimate", "limit", "plan", "body",
 )  # fmt: skip
 """In the order in which one leads to the next: of deviations that begin together the first is the cause."""
 
@@ -70,7 +73,9 @@ class Deviation:
     @property
     def text(self) -> str:
         """The deviation in words."""
-        size = f"{self.size:.3g} {self.unit}".strip()
+        if not self.unit:  # a thing that is so, or is not
+            return self.name
+        size = f"{self.size:.3g} {self.unit}"
         return f"{self.name}: {size}{f' ({self.effect})' if self.effect else ''}"
 
 
@@ -113,7 +118,7 @@ def stretches(beyond: np.ndarray, gap: int = 0) -> Iterator[tuple[int, int]]:
 def all_deviations(run: RobotRun) -> list[Deviation]:
     """Every deviation of the run but those of contacts, by when they begin."""
     parts = (
-        _disturbances, _sensors, _actuators, _estimates, _limits, _plan, _hanging_feet, _body,
+        _faults, _disturbances, _sensors, _actuators, _estimates, _limits, _plan, _hanging_feet, _body,
     )  # fmt: skip
     found = [d for part in parts for measure in part(run) for d in measure.deviations(run)]
     return sorted(found, key=lambda d: d.begin)
@@ -147,6 +152,15 @@ def length(vectors: Array) -> Array:
     """Euclidean norms of (n, k) vectors."""
     norms: Array = np.linalg.norm(vectors, axis=-1)
     return norms
+
+
+def _faults(run: RobotRun) -> Iterator[Measure]:
+    """The faults that the graph declares."""
+    for spec in run.run.graph.blocks:
+        if issubclass(spec.block_type, Fault) and isinstance(spec.params, FaultParameters):
+            active = run(f"{spec.path}.state", "active").astype(float)
+            name = f"{spec.block_type.target} is {spec.params.kind} ({spec.path})"
+            yield Measure("fault", name, active, 0.5, "")
 
 
 def _disturbances(run: RobotRun) -> Iterator[Measure]:

@@ -31,6 +31,7 @@ from ..logs.replay.replay import Replayable
 from ..mathematics.arrays import Array
 from ..robots.description import RobotDescription
 from ..runtime.language.errors import AloftError
+from ..runtime.language.fault import Fault
 from ..runtime.language.signals import Signal
 from ..runtime.language.stages import BlockSpec
 
@@ -148,8 +149,13 @@ class RobotRun:
 
     @cached_property
     def command(self) -> str:
-        """What the robot is commanded; else empty."""
-        return self.read_by(self.robot_block, JointCommand)
+        """What the controller commands, before any fault on the way to the robot; else empty."""
+        source = self.read_by(self.robot_block, JointCommand)
+        while source and issubclass(
+            self.run.graph.block(source.rpartition(".")[0]).block_type, Fault
+        ):
+            source = self.run.graph.block(source.rpartition(".")[0]).wires["u"].source
+        return source
 
     @cached_property
     def reference(self) -> str:

@@ -30,6 +30,7 @@ from result_tables import (
     direction_table,
     effects_table,
     every_robot_table,
+    fault_table,
     frontier_table,
     ground_table,
     impulse_table,
@@ -117,6 +118,11 @@ def write_excerpts() -> None:
     """README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
     text = README.read_text(encoding="utf-8")
     README.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
+
+
+def write_faults(file: Path) -> None:
+    """What faults do to BRUCE, by when they begin."""
+    refresh(DOCS / "analysis.md", "faults", fault_table(_runs_of([file])))
 
 
 def write_frontier(folder: Path) -> None:
@@ -333,6 +339,7 @@ PAGES = {
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
     "excerpts": Page(write_excerpts),
+    "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
     "known_effects": Page(

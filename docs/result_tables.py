@@ -491,6 +491,37 @@ def _landed(runs: Sequence[Row]) -> tuple[str, str]:
     return f"{sum(run['success'] for run in runs)} of {len(runs)}", str(upright)
 
 
+def fault_table(runs: Sequence[Row]) -> str:
+    """One row a fault, one column for when it begins: how many runs succeed, how the others end, who stopped them after how long."""
+    cells: dict[str, dict[str, list[Row]]] = {}
+    for run in runs:
+        cells.setdefault(run["fault"], {}).setdefault(run["task"], []).append(run)
+    tasks = list(dict.fromkeys(run["task"] for run in runs))
+    return table(
+        ("fault", *tasks),
+        [
+            (name, *(_fault_cell(row.get(task, ())) for task in tasks))
+            for name, row in cells.items()
+        ],
+    )
+
+
+def _fault_cell(runs: Sequence[Row]) -> str:
+    """How the runs of one fault end, such as ``2 succeed, 3 fall; tilt after 0.41 s``."""
+    ends = {"succeed": 0, "fall": 0, "stop": 0, "fail": 0}
+    stops: dict[str, list[float]] = {}
+    for run in runs:
+        reason = run["reason"]
+        ends["succeed" if run["success"] else "fall" if reason.startswith("fell") else
+             "stop" if reason.startswith(("safety", "the run failed")) else "fail"] += 1  # fmt: skip
+        if run.get("safety_fault_time_s") is not None and run.get("fault_time_s") is not None:
+            after = run["safety_fault_time_s"] - run["fault_time_s"]
+            stops.setdefault(run["safety_fault"].replace("_", " "), []).append(after)
+    counted = ", ".join(f"{n} {end}" for end, n in ends.items() if n)
+    seen = ", ".join(f"{who} after {median(after):.2f} s" for who, after in stops.items())
+    return f"{counted}; {seen}" if seen else counted or "-"
+
+
 def equally_likely(first: int, second: int) -> float:
     """The probability of a split at least as uneven as ``first`` to ``second`` between two sides that
     are equally likely: McNemar's exact test, on both sides."""

@@ -6,17 +6,13 @@ they were. Streams depend on the seed and the purpose's number only.
 
 from __future__ import annotations
 
-import ctypes
 import zlib
 from collections.abc import Mapping
 from enum import IntEnum
-from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mathematics.arrays import Array, Counts
-from ..mathematics.compiling.library_call import LibraryCall, address_of
 from ..runtime.language.random_stream import load_generator, save_generator
 
 
@@ -112,43 +108,3 @@ class RandomStreams:
         """Restore the state; the seed must be the one that the state was saved with."""
         for k, generator in enumerate(self._streams.values()):
             load_generator(generator.bit_generator, words[3 * k : 3 * k + 3])
-
-
-def normal_call(generator: np.random.Generator, out: Array) -> LibraryCall:
-    """Draws numbers of mean zero and variance one into ``out``, (n,)."""
-    return LibraryCall(
-        partial(generator.standard_normal, out=out), _addresses()[0], _bits(generator), out.size,
-        out.ctypes.data,
-    )  # fmt: skip
-
-
-def uniform_call(generator: np.random.Generator, out: Array) -> tuple[LibraryCall, Counts]:
-    """Draws numbers between zero and one into ``out``, (n,), and where it is read how many, (1,)."""
-
-    def draw() -> None:
-        for k in range(int(count[0])):
-            out[k] = generator.random()
-
-    call = LibraryCall(draw, _addresses()[1], _bits(generator), out.size, out.ctypes.data)
-    count = call.words[2:3]
-    return call, count
-
-
-def _bits(generator: np.random.Generator) -> int:
-    """The address of what NumPy's functions draw from; it is the generator's for all its life."""
-    interface = generator.bit_generator.ctypes
-    return int(interface.bit_generator.value or 0)
-
-
-@cache
-def _addresses() -> tuple[int, int]:
-    """The addresses of the functions behind ``standard_normal`` and ``random``; zeros where NumPy does
-    not give them away, and then Python calls these."""
-    from numpy.random import _generator
-
-    try:
-        library = ctypes.CDLL(_generator.__file__)
-        normal, uniform = library.random_standard_normal_fill, library.random_standard_uniform_fill
-    except (AttributeError, OSError):
-        return 0, 0
-    return address_of(normal), address_of(uniform)

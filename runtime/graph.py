@@ -17,6 +17,7 @@ from typing import Any
 
 from ..files.nodes import text_of
 from .language.errors import AloftError
+from .language.fault import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import load as load_checked
@@ -45,9 +46,9 @@ class Graph:
 
     @property
     def seed_parameters(self) -> tuple[str, ...]:
-        """Every parameter called ``seed``, as ``block.seed``, in file order."""
+        """Every parameter called ``seed``, as ``block.seed`` or ``faults.fault.seed``, in file order."""
         return tuple(
-            f"{spec.path}.seed"
+            f"{spec.path.replace(FOLDER, 'faults.', 1)}.seed"
             for spec in self.checked.blocks
             if "seed" in type(spec.params).model_fields
         )

@@ -125,6 +125,14 @@ def load_all():
         importlib.import_module(".".join(("aloft", *path.relative_to(ROOT).with_suffix("").parts)))
 
 
+FAULTS = {
+    "faults.gyro": {"on": "robot.imu.angular_velocity[1]", "kind": "stuck", "value": 0.0},
+    "faults.lost": {"on": "robot.joints", "kind": "lost", "share": 0.3, "when": "phase.phase == STAND"},
+    "faults.drift": {"on": "robot.imu.specific_force", "kind": "drifting", "value": 0.1},
+    "faults.flip": {"on": "robot.command.torque", "kind": "flipped", "bit": 3, "share": 0.5},
+}  # fmt: skip
+
+
 def run_jump(changes=None, duration=None, graph="jump.yaml"):
     """A jump, or its first part; whether it would succeed does not matter."""
     result = aloft.load(ROOT / "graphs" / graph, changes or {}).run(duration=duration)
@@ -226,6 +234,7 @@ def calls():
         run_jump(weak, duration=0.1)
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
         run_jump({"robot.motor_model.load_friction": 0.05}, 0.02, "from_gantry.yaml")
+        run_jump(FAULTS, duration=0.1)
         steer_alone()
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}

@@ -9,7 +9,7 @@ from ...mathematics.arrays import Array, Array1D, Counts, Flags, Flags1D, Indice
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
-from ..random_streams import uniform_call
+from ...runtime.language.random_stream import uniform_call
 from .sensor import RosMessage, Sensor
 
 

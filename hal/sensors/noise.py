@@ -12,7 +12,7 @@ from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.parameters import Parameters, parameter
-from ..random_streams import normal_call
+from ...runtime.language.random_stream import normal_call
 
 
 class NoiseModel(Parameters):

@@ -185,7 +185,8 @@ class MujocoRobot(SimulatedRobot):
 
     def setup(self) -> None:
         """Draw the world from the seed and build it."""
-        from ..random_streams import Purpose, uniform_call
+        from ...runtime.language.random_stream import uniform_call
+        from ..random_streams import Purpose
         from .drives import CommandLatency, SimulatedDrives
         from .plant import Plant
         from .stance import RELEASED

@@ -52,6 +52,11 @@ class LibraryCall:
         self._count = len(arguments)
 
     @property
+    def compiled(self) -> NDArray[np.int64] | None:
+        """What keeps the call alive, as that of a ``KernelCall``; none where Python makes it."""
+        return self.words if self.words[0] else None
+
+    @property
     def addresses(self) -> tuple[int, int]:
         """The addresses of machine code that makes the call, and of what it needs.
 

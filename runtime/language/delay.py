@@ -56,15 +56,15 @@ class WireDelay(Block):
             ring[name][...] = value
             target[name][...] = value  # read before the first run of a block with an offset
         oldest = self.ring_position.oldest
-        entries = {name: _octets(values, len(values)) for name, values in ring.items()}
+        entries = {name: octets(values, len(values)) for name, values in ring.items()}
         self.kernel_calls = [
-            KernelCall(read_entry, entries[name], oldest, _octets(values, 1))
+            KernelCall(read_entry, entries[name], oldest, octets(values, 1))
             for name, values in target.items()
         ]
         length = next(iter(ring.values())).shape[0]
         self.update_calls = [
             *(
-                KernelCall(write_entry, entries[name], oldest, _octets(values, 1))
+                KernelCall(write_entry, entries[name], oldest, octets(values, 1))
                 for name, values in source.items()
             ),
             KernelCall(next_entry, oldest, length),
@@ -81,14 +81,14 @@ class WireDelay(Block):
             call.run()
 
 
-def _octets(values: NDArray[Any], rows: int) -> Octets:
+def octets(values: NDArray[Any], rows: int) -> Octets:
     """A view of the bytes of an array in so many rows, so that one kernel serves every dtype."""
     return values.reshape(rows, -1).view(np.uint8)
 
 
 def copy_call(source: NDArray[Any], target: NDArray[Any]) -> KernelCall:
     """The call that copies an array to another of the same dtype and size."""
-    return KernelCall(read_entry, _octets(source, 1), np.zeros((), np.int64), _octets(target, 1))
+    return KernelCall(read_entry, octets(source, 1), np.zeros((), np.int64), octets(target, 1))
 
 
 def initial_problems(

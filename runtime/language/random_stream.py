@@ -22,12 +22,16 @@ snapshots, replay and the conformance suite then work with nothing more than two
 
 from __future__ import annotations
 
+import ctypes
 import zlib
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Counts
+from ...mathematics.compiling.library_call import LibraryCall, address_of
 from .block import Block
 from .signals import Field, Signal
 
@@ -86,3 +90,43 @@ def load_generator(bits: np.random.BitGenerator, words: NDArray[np.int64]) -> No
 def _signed(word: int) -> int:
     """The 64 bits of a whole number as a signed one, which an array of integers holds."""
     return word - (1 << 64) if word >= 1 << 63 else word
+
+
+def normal_call(generator: np.random.Generator, out: Array) -> LibraryCall:
+    """Draws numbers of mean zero and variance one into ``out``, (n,)."""
+    return LibraryCall(
+        partial(generator.standard_normal, out=out), _addresses()[0], _bits(generator), out.size,
+        out.ctypes.data,
+    )  # fmt: skip
+
+
+def uniform_call(generator: np.random.Generator, out: Array) -> tuple[LibraryCall, Counts]:
+    """Draws numbers between zero and one into ``out``, (n,), and where it is read how many, (1,)."""
+
+    def draw() -> None:
+        for k in range(int(count[0])):
+            out[k] = generator.random()
+
+    call = LibraryCall(draw, _addresses()[1], _bits(generator), out.size, out.ctypes.data)
+    count = call.words[2:3]
+    return call, count
+
+
+def _bits(generator: np.random.Generator) -> int:
+    """The address of what NumPy's functions draw from; it is the generator's for all its life."""
+    interface = generator.bit_generator.ctypes
+    return int(interface.bit_generator.value or 0)
+
+
+@cache
+def _addresses() -> tuple[int, int]:
+    """The addresses of the functions behind ``standard_normal`` and ``random``; zeros where NumPy does
+    not give them away, and then Python calls these."""
+    from numpy.random import _generator
+
+    try:
+        library = ctypes.CDLL(_generator.__file__)
+        normal, uniform = library.random_standard_normal_fill, library.random_standard_uniform_fill
+    except (AttributeError, OSError):
+        return 0, 0
+    return address_of(normal), address_of(uniform)

@@ -7,8 +7,8 @@ from itertools import cycle
 from typing import Any
 
 from ..background.background_block import BackgroundBlock
-from ..language.block import Block
 from ..language.delay import WireDelay
+from ..language.fault import Fault, FaultParameters
 from ..language.quantities import Quantity
 from ..language.registry import block_name
 from ..language.stages import BlockSpec, CheckedGraph, Wire
@@ -98,7 +98,7 @@ def _row(
     return BlockRow(
         number,
         spec.path,
-        _use(block_type),
+        _use(spec),
         graph.base_rate / spec.period_ticks,
         spec.offset_ticks,
         "Moore" if block_type.is_moore() else "Mealy",
@@ -116,7 +116,10 @@ def _latency(graph: CheckedGraph, spec: BlockSpec) -> str:
     return f"{ticks * graph.base_period * 1e3:.9g} ms"
 
 
-def _use(block_type: type[Block]) -> str:
+def _use(spec: BlockSpec) -> str:
+    block_type = spec.block_type
+    if issubclass(block_type, Fault) and isinstance(spec.params, FaultParameters):
+        return f"{spec.params.kind}: {block_type.target}"
     for inserted, word in ((WireDelay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
         if issubclass(block_type, inserted):
             return word
@@ -231,7 +234,7 @@ def _nodes(
         if slash:
             boxes.setdefault(first, []).append(spec)
             continue
-        label = f"{first}<br/>{_use(spec.block_type)}<br/>{_hertz(graph, spec)}"
+        label = f"{first}<br/>{_use(spec)}<br/>{_hertz(graph, spec)}"
         latency = _latency(graph, spec)
         label += f"<br/>in the background, {latency}" if latency else ""
         label += f"<br/>on {spec.machine}" if spec.machine else ""

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.hal import random_streams
-from aloft.hal.random_streams import Purpose, normal_call, stream, uniform_call
+from aloft.hal.random_streams import Purpose, stream
 from aloft.mathematics.compiling.call_sequence import CallSequence
+from aloft.runtime.language import random_stream
+from aloft.runtime.language.random_stream import normal_call, uniform_call
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_draws_are_those_of_the_generator(known: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not known:
-        monkeypatch.setattr(random_streams, "_addresses", lambda: (0, 0))
+        monkeypatch.setattr(random_stream, "_addresses", lambda: (0, 0))
     ours, theirs = stream(3, Purpose.GYRO), stream(3, Purpose.GYRO)
     normal, uniform = np.zeros(7), np.zeros(5)
     drawing, count = uniform_call(ours, uniform)

@@ -23,6 +23,7 @@ from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
+from .faults import insert_faults
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
@@ -47,6 +48,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
+    drafts = insert_faults(graph, drafts, settings, problems)
     drafts = resolve_composite_wires(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}

@@ -175,6 +175,7 @@ class FlatGraph:
     clock: MapNode | None = None
     machines: MapNode | None = None
     links: MapNode | None = None
+    faults: MapNode | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
     empty: bool = False
     """No file has any blocks."""
@@ -208,6 +209,7 @@ class FlatGraph:
             ("clock", self.clock),
             ("machines", self.machines),
             ("links", self.links),
+            ("faults", self.faults),
         ):
             if node is not None and node.entries:
                 lines.append(f"{key}: {text_of(plain(node))}")

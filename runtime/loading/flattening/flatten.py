@@ -149,6 +149,7 @@ class _Flattener:
             clock=self._mapping(graph, "clock"),
             machines=self._mapping(graph, "machines"),
             links=self._mapping(graph, "links"),
+            faults=self._mapping(graph, "faults"),
             overrides={command.key: plain(command.value) for command in commands},
             empty=empty and not self.files.incomplete,
             incomplete=self.files.incomplete,

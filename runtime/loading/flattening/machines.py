@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from ....files.problems import Code, Problems, listing, nearest
+from ...language.fault import FOLDER
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
 from ...transports.registry import EXAMPLE, endpoint_fault, transport_type
 from .flat import FlatBlock, FlatGraph
@@ -123,7 +124,13 @@ def on_machines(
         if isinstance(block.machine, ScalarNode)
     }
 
+    specs = {spec.path: spec for spec in checked.blocks}
+
     def machine_of(spec: BlockSpec) -> str:
+        if (
+            spec.path.startswith(FOLDER) and "u" in spec.wires
+        ):  # a fault is where its signal is written
+            return machine_of(specs[spec.wires["u"].source_block])
         owner = spec.path if "~" not in spec.path else spec.path.rpartition("/")[0]
         return named.get(owner, machines[0].name)
 

@@ -16,6 +16,7 @@ from ....files.nodes import MapNode, kind, plain
 from ....files.problems import Code, Problems
 from ....files.validation import find_mistakes, info_at, path_text
 from ...language.errors import UnitError
+from ...language.fault import FaultKind
 from ...language.stages import ClockKind, LinkMode, Overrun, WhenLate
 from ...language.units import parse_quantity
 
@@ -196,6 +197,26 @@ class GraphValues(_Keys):
     actuators: str = _key("the robot's actuator profile in use; by default its first")
 
 
+class FaultKeys(_Keys):
+    """A fault on a wire; which keys it has depends on its kind."""
+
+    on: Source | list[Source] = Field(
+        description="an output, an input, or elements of one: where it is"
+    )
+    kind: FaultKind = Field(description="what goes wrong")
+    when: str = _key("the event that it begins after: block.port.field == value")
+    start: Seconds = _key("when it begins, after the start or its event")
+    start_spread: Seconds = _key("up to so much later, drawn by the seed")
+    duration: Seconds = _key("for how long")
+    value: Constant = _key("what is stuck, the bias, what a drift reaches, the deviation of noise")
+    time: Seconds = _key("when a drift has reached the value")
+    factor: float = _key("what a scaled value is multiplied by")
+    delay: Seconds = _key("how late a delayed value is")
+    share: float = _key("share of the runs in which a value is lost or flipped")
+    bit: int = _key("the bit that is flipped")
+    seed: int = _key("of the random stream")
+
+
 class GraphSections(_Keys):
     """The keys of the graph that is run which are mappings; files and overrides add to them."""
 
@@ -204,6 +225,7 @@ class GraphSections(_Keys):
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")
+    faults: dict[str, FaultKeys] = _key("faults on wires, by name")
 
 
 class SubgraphKeys(_Keys):
