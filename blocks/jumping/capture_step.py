@@ -72,12 +72,12 @@ class StepParams(Parameters):
         text="height up to which the other points of a foot carry load while another foot steps",
     )
     seek_speed: float = live_parameter(
-        0.3, unit="m/s", ge=0.0, le=2.0,
+        1.0, unit="m/s", ge=0.0, le=2.0,
         text="downward speed of a foot that has not touched after the touchdown of another; 0: it is "
         "left to its inverse kinematics",
     )  # fmt: skip
     seek_damping: float = live_parameter(
-        60.0, unit="1/s", ge=0.0, le=500.0, text="gain on the error of that speed"
+        20.0, unit="1/s", ge=0.0, le=500.0, text="gain on the error of that speed"
     )
 
 
