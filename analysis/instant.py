@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from difflib import get_close_matches
 
@@ -10,11 +9,10 @@ import numpy as np
 
 from ..logs.file.header import recorded_signals
 from ..runtime.language.errors import AloftError
+from ..runtime.language.fault import CONDITION
 from ..runtime.loading.reading.selection import Selection, select
 from ..runtime.running.memory import BoundGraph
 from ..runtime.running.stepping import SteppedRun
-
-_CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<value>\S+)\s*$")
 
 
 def go_to(run: SteppedRun, at: float | None, when: str) -> None:
@@ -45,7 +43,7 @@ def go_to(run: SteppedRun, at: float | None, when: str) -> None:
 
 def _condition(run: SteppedRun, text: str) -> Callable[[], bool]:
     """A function that says whether a condition holds. Raises ``AloftError`` if it cannot be read."""
-    match = _CONDITION.match(text)
+    match = CONDITION.match(text)
     bound = bound_graph(run)
     fields = {field.name: field for field in recorded_signals(bound)}
     if match is None:

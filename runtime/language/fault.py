@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -99,6 +100,8 @@ class Comparison(NamedTuple):
 
 SIGNS = ("==", "!=", "<", "<=", ">", ">=")
 """The comparisons of which an event may be made."""
+CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<value>\S+)\s*$")
+"""A condition as it is written: ``phase.phase == FLIGHT``."""
 
 
 @kernel

@@ -18,6 +18,7 @@ from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, pl
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.errors import UnitError
 from ...language.fault import (
+    CONDITION,
     FOLDER,
     HOLDING,
     OPTIONS,
@@ -38,7 +39,6 @@ from .settings import Settings
 
 COMMON = ("on", "kind", "when", "start", "start_spread", "duration", "seed")
 """The keys of every fault."""
-_CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<value>\S+)\s*$")
 
 
 def insert_faults(
@@ -323,7 +323,7 @@ class _FaultReader:
         if entry is None:
             return None
         text = str(plain(entry.value))
-        match = _CONDITION.match(text)
+        match = CONDITION.match(text)
         read = read_selection(match["name"]) if match else None
         if match is None or read is None:
             self._report(f"{text!r} is no condition", entry.value.where, found=text,
