@@ -9,7 +9,7 @@ import typer
 
 from ..runtime.language.errors import AloftError
 from .replay import as_data, print_differences, write
-from .shared.options import JsonBesideTables
+from .shared.options import GraphFolder, JsonBesideTables
 from .shared.output import SET_HELP, console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
@@ -29,10 +29,7 @@ def branch(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Both runs side by side, a .rrd file.")
     ] = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
-    ] = None,
+    folder: GraphFolder = None,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Let a recorded run go on from its exact state with other parameters, beside the original."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.options import JsonBesideTables
+from .shared.options import GraphFolder, JsonBesideTables
 from .shared.output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 def explain(
     recording: Annotated[Path, typer.Argument(help="The recording of a simulated run, a .rrd.")],
-    folder: Annotated[
-        Path | None,
-        typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
-    ] = None,
+    folder: GraphFolder = None,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Say why a run failed: its deviations from truth and plan, from the first one on."""

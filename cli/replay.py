@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import JsonBesideTables, Quiet
+from .shared.options import GraphFolder, JsonBesideTables, Quiet
 from .shared.output import (
     SET_HELP,
     console,
@@ -61,10 +61,7 @@ def replay(
         Path | None,
         typer.Option(help="Write recorded and replayed signals side by side to this .rrd file."),
     ] = None,
-    folder: Annotated[
-        Path | None,
-        typer.Option(help="Where the graph file's folder is now, if it is not where it was."),
-    ] = None,
+    folder: GraphFolder = None,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:

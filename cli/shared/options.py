@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -54,6 +55,12 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 JsonBesideTables = Annotated[
     bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+]
+GraphFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--folder", help="Where the graph file's folder is now, if it is not where it was."
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Write no recording.")]
