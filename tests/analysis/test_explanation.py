@@ -102,7 +102,7 @@ FAILURES: list[tuple[str, str, Settings, str, str]] = [
     ("pushed left", PUSH, {"push.force": 160.0, "push.angle": np.pi / 2}, "world", "push"),
     ("pushed back", PUSH, {"push.force": 130.0, "push.angle": np.pi}, "world", "push"),
     ("weak and far", "graphs/forward_38cm.yaml",
-     {"robot.motors": {"saturation": 0.3}, "robot.friction": 0.35}, "limit", "_knee_motor at its torque limit"),
+     {"robot.motors": {"saturation": 0.3}, "robot.friction": 0.35}, "world", "_toe slides"),
     ("tiles", AHEAD, {"robot.seed": 6, "estimator.level_ground": True, "step.seek_speed": 0.0, "robot.uneven": {
         "size": [0.1, 0.2], "height": 0.02, "slope": 0.087, "friction": [0.4, 1.0]}},
      "world", "ground under"),
@@ -148,7 +148,7 @@ def test_a_foot_that_stops_in_the_air() -> None:
     assert named[0].startswith("ground under left_")
     hangs = named.index("right_foot hangs above the ground while another stands")
     assert hangs < named.index("capture point outside the support")
-    assert found.chain[hangs].size == pytest.approx(3.3, abs=0.5)  # mm
+    assert 1.0 < found.chain[hangs].size < 10.0  # mm; the box is 1 cm high
     found = explained(AHEAD, left)
     assert not any("hangs" in d.name for d in found.chain)
 
