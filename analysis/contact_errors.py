@@ -114,7 +114,7 @@ def _errors(run: RobotRun) -> Iterator[ContactError]:
 
 def _with_effect(run: RobotRun, error: ContactError) -> ContactError:
     """The error with what it did: the recorded estimate less the one with the true contact."""
-    port = run.run.bus.view
+    view = run.run.bus.view
     start, _ = run.run.bus.byte_range(f"{run.contacts}.active")  # a byte for each point
     start += [contact.name for contact in run.robot.contacts].index(error.point)
     rows = run.rows.copy()
@@ -131,8 +131,8 @@ def _with_effect(run: RobotRun, error: ContactError) -> ContactError:
     )  # fmt: skip
 
     def change(field: str) -> Array:
-        recorded = port(run.rows[seen : seen + 1], f"{run.base}.{field}")[0]
-        with_truth = port(done.rows[-1:], f"{run.base}.{field}")[0]
+        recorded = view(run.rows[seen : seen + 1], f"{run.base}.{field}")[0]
+        with_truth = view(done.rows[-1:], f"{run.base}.{field}")[0]
         return np.array([recorded, with_truth])
 
     (was, other), velocity = change("position"), change("linear_velocity")

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.language.errors import AloftError
 from .replay import as_data, print_differences, write
-from .shared.options import GraphFolder, JsonBesideTables
+from .shared.options import GraphFolder, JsonBesideTables, opened_recording
 from .shared.output import SET_HELP, console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
@@ -34,13 +33,10 @@ def branch(
 ) -> None:
     """Let a recorded run go on from its exact state with other parameters, beside the original."""
     from ..analysis.branching import branch as branch_run
-    from ..logs.replay.opened_run import OpenedRun
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if not recording.is_file():
-            raise AloftError(f"there is no recording {recording}")
-        opened = OpenedRun.of(recording, folder)
+        opened = opened_recording(recording, folder)
         rate = opened.file.header.base_rate
         graph = opened.load(overrides) if overrides else opened.graph
         end = None if until is None else round(until * rate)

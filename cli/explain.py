@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..runtime.language.errors import AloftError
-from .shared.options import GraphFolder, JsonBesideTables
+from .shared.options import GraphFolder, JsonBesideTables, opened_recording
 from .shared.output import console, errors_reported, print_json, table
 
 if TYPE_CHECKING:
@@ -23,13 +22,10 @@ def explain(
 ) -> None:
     """Say why a run failed: its deviations from truth and plan, from the first one on."""
     from ..analysis.explanation import explain as explain_run
-    from ..logs.replay.opened_run import OpenedRun
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        if not recording.is_file():
-            raise AloftError(f"there is no recording {recording}")
-        found = explain_run(OpenedRun.of(recording, folder))
+        found = explain_run(opened_recording(recording, folder))
     outcome = f"{'success' if found.success else 'no success'}: {found.reason}"
     if found.chain:
         out.print(

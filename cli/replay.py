@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import GraphFolder, JsonBesideTables, Quiet
+from .shared.options import GraphFolder, JsonBesideTables, Quiet, opened_recording
 from .shared.output import (
     SET_HELP,
     console,
@@ -66,18 +66,15 @@ def replay(
     quiet: Quiet = False,
 ) -> None:
     """Execute a recorded run again and compare every byte of every tick with the recording."""
-    from ..logs.replay.opened_run import OpenedRun
-
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
-        if not recording.is_file():
-            raise AloftError(f"there is no recording {recording}")
-        opened = OpenedRun.of(recording, folder)
+        opened = opened_recording(recording, folder)
         changed = changed_blocks(opened, swap or [], overrides or [])
         if changed and output is None:
             output = recording.with_name(f"{recording.stem}-replay.rrd")
         done = execute(opened, changed, inputs, first, until, output is not None, out)
-        done.result.raise_if_failed() if not done.signals.compared else None
+        if not done.signals.compared:
+            done.result.raise_if_failed()
         written = write(output, opened, done) if output is not None else None
     for kept in opened.restored.said:
         print_warning(kept)

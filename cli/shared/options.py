@@ -19,11 +19,24 @@ from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from ...runtime.language.errors import AloftError
 from .output import SET_HELP
+
+if TYPE_CHECKING:
+    from ...logs.replay.opened_run import OpenedRun
+
+
+def opened_recording(recording: Path, folder: Path | None) -> OpenedRun:
+    """The recorded run of a verb's arguments. Raises ``AloftError`` if there is none."""
+    from ...logs.replay.opened_run import OpenedRun
+
+    if not recording.is_file():
+        raise AloftError(f"there is no recording {recording}")
+    return OpenedRun.of(recording, folder)
 
 
 def block_names(incomplete: str) -> list[str]:
