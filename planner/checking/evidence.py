@@ -84,27 +84,39 @@ def capsule_ends(
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
-    """By link, except for feet, the lowest height [m] of its capsules above the ground, (n,).
+    """By link, except for soles, the lowest height [m] of its capsules above the ground, (n,).
 
     Balls along a capsule stand for it, close enough that no edge of a step passes between two. Where
-    the ground has edges, a ball's height is that of its lower side above the ground right below it.
+    the ground has edges, a ball's height is that of its lower side above the ground right below it. What a foot
+    that is a ball covers of its leg does not count.
     """
     feet = {foot.link for foot in robot.feet}
+    ends = {robot.feet[ball.foot].link: ball for ball in ball_feet(robot) if ball.radius}
     uneven = task.leans or any(hop.landing_height or hop.gap for hop in task.hops())
     shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
     aside = np.linspace(-0.95, 0.95, 7)[:, None, None] if uneven else np.zeros((1, 1, 1))
     found = {}
     for link in robot.links:
-        if link.name in feet or not link.shapes:
+        ball = ends.get(link.name)
+        if (link.name in feet and ball is None) or not link.shapes:
             continue
         heights = []
         for start, stop, radius in capsule_ends(robot, poses, link.name):
             centres = start + shares * (stop - start)
+            if ball is not None:
+                position, rotation = poses.of(link.name)
+                apart = np.linalg.norm(
+                    centres[:, 0] - position[0] - rotation[0] @ ball.centre, axis=1
+                )
+                centres = centres[apart > ball.radius + radius]
+                if not len(centres):
+                    continue
             x = centres[:, :, 0] + radius * aside
             below = centres[:, :, 2] - radius * np.sqrt(1.0 - aside**2)
             ground = ground_height(task, x, progress, centres[:, :, 1])
             heights.append((below - ground).min(axis=(0, 1)))
-        found[link.name] = np.min(heights, axis=0)
+        if heights:
+            found[link.name] = np.min(heights, axis=0)
     return found
 
 

@@ -22,7 +22,9 @@ LENGTH = 1e-3
 DIRECTION = 2e-3
 """The same for the components of a joint's axis."""
 SHARE = 0.02
-"""The same for masses and inertias, as a share."""
+"""The same for masses, motors and gears, as a share."""
+INERTIA = 0.05
+"""The same for the elements of inertias, as a share of the link's largest: they weigh less than masses."""
 
 ANGLE = 1e-3
 """Angles of a pose that differ by less [rad] are meant to be the same."""
@@ -186,7 +188,7 @@ def _alike_inertia(one: Link, other: Link) -> bool:
     return (
         abs(one.mass - other.mass) <= SHARE * max(one.mass, 1e-3)
         and _near(np.array(one.com) * PLACE, other.com, 2.0 * LENGTH)
-        and _near(np.array(one.inertia) * TENSOR, other.inertia, SHARE * size + 1e-6)
+        and _near(np.array(one.inertia) * TENSOR, other.inertia, INERTIA * size + 1e-6)
     )
 
 

@@ -88,12 +88,12 @@ def _guess_lengths(problem: FullProblem, guess: Array, k: int, mean: float) -> N
 
 
 def displaced_guess(problem: FullProblem, straight: FullProblem, values: Array) -> Array:
-    """Every variable of a problem, from the solution of the same jumps without their sideways
-    displacements and twists: the whole robot is moved and turned in proportion to the flight."""
+    """Every variable of a problem, from the solution of jumps straight ahead or in place, with the same knots:
+    the whole robot is moved and turned in proportion to the flight."""
     coordinates, assembly = problem.coordinates, problem.assembly
     n, own, plane = coordinates.size, straight.coordinates, straight.assembly
     guess = ballistic_guess(problem)
-    places = problem.task.places()
+    places, straight_places = problem.task.places(), straight.task.places()
     for k in range(problem.knots):
         stretch = problem.stretch_at(k)
         state, control = assembly.state_start[k], assembly.control_start[k]
@@ -106,11 +106,13 @@ def displaced_guess(problem: FullProblem, straight: FullProblem, values: Array) 
         q = own.matrix @ values[other : other + own.size]
         v = own.matrix @ values[other + own.size : other + 2 * own.size]
         place = np.array([here.x + share * ahead, here.y + share * aside])
-        q[:2] = turn @ (q[:2] - [place[0], 0.0]) + place
+        first, second = (straight_places[stretch.place + i].x for i in (0, int(stretch.flies)))
+        q[:2] = turn @ (q[:2] - [first + share * (second - first), 0.0]) + place
         v[:2] = turn @ v[:2]
         q[5] += angle
         if stretch.flies:
             duration = values[other + 2 * own.size] * stretch.count
+            v[0] += (ahead - (second - first)) / duration
             v[1] += aside / duration
             v[5] += twist / duration
         guess[state : state + n] = coordinates.reduce(q)

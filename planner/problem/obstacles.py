@@ -8,7 +8,8 @@ while the robot stands in front of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from ...mathematics.arrays import Indices
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
+from ...robots.robot_description import Link
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop, StanceLocation, step_of
@@ -37,14 +39,21 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     carriers = {joint.parent for joint in robot.joints if joint.child in link_of.values()}
+    balls: dict[str, Vector3] = {}
     found: list[Point] = []
     for c in coordinates.contacts:
         contact = robot.contacts[c]
         place, radius = touching_sphere(robot, c)
         found.append(("foot", (link_of[contact.foot], place), radius))
+        if radius:
+            balls[link_of[contact.foot]] = place
     for link in robot.links:
         limb = model.limb_of_link[link.name]
-        if link.name in link_of.values() or (limb >= 0 and limb not in coordinates.limbs):
+        if limb >= 0 and limb not in coordinates.limbs:
+            continue
+        if link.name in balls:
+            found += _upper_half(link, balls[link.name])
+        if link.name in link_of.values():
             continue
         kind = "calf" if link.name in carriers else "body"
         for shape in link.shapes:
@@ -59,6 +68,18 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
                     for share in SHARES
                 ]
     return found
+
+
+def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
+    """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
+    is nearer to the ground than the gap that is kept."""
+    ends = [end for shape in link.shapes for end in (shape.start, shape.end)]
+    half = 0.5 * max(math.dist(end, ball) for end in ends) if ends else 0.0
+    for shape in link.shapes:
+        for share in (0.0, *SHARES[:3], 0.5, *SHARES[3:], 1.0):
+            place = _between(shape.start, shape.end, share)
+            if math.dist(place, ball) > half:
+                yield "shank", (link.name, place), shape.radius
 
 
 def _between(start: Vector3, end: Vector3, share: float) -> Vector3:
@@ -108,26 +129,28 @@ class ObstacleRows:
         kinds = [kind for kind, _, _ in obstacle_points(model, coordinates)]
         self._of_kind = {
             name: np.flatnonzero(np.array(kinds) == name).astype(np.int64)
-            for name in ("foot", "calf", "shin", "body")
+            for name in ("foot", "calf", "shin", "shank", "body")
         }
         self.feet = len(self._of_kind["foot"])
         self.count = len(kinds)
         self._knees_fold = bool(ball_feet(model.robot))
-        self._folding = np.sort(
-            np.concatenate([self._of_kind[kind] for kind in ("calf", "shin", "body")])
-        )
+        self._folding = self._of("calf", "shin", "body")
+        self._folding_at_a_step = self._of("calf", "shin", "shank", "body")
+
+    def _of(self, *kinds: str) -> Indices:
+        return np.sort(np.concatenate([self._of_kind[kind] for kind in kinds]))
 
     def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
         """The rows of a jump's knot; ``first`` says that it is the flight's first."""
         turns = bool(hop.rotation)
         if self._knees_fold and not stretch.flies and not turns:
             # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
-            return self._folding
+            return self._folding if edge is None else self._folding_at_a_step
         landed = not stretch.flies and stretch.place > 0 and edge is not None
         if edge is None and not turns:
             return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
-        kinds = ["calf"] if turns else ["calf", "shin"]
+        kinds = ["calf"] if turns else ["calf", "shin", "shank"]
         kinds += ["body"] if turns or landed else []
         if turns and stretch.flies and not first:
             kinds = ["foot", *kinds]

@@ -541,10 +541,15 @@ def _air_rows(
     return [*heights, *(place[0] for place in places), *sides]
 
 
+HIP_JOINTS = 3
+"""Joints above the knee. Of a leg with fewer than five the thigh counts, too: it ends in a ball, and its knee folds down."""
+
+
 def body_points(model: SymbolicModel, coordinates: Coordinates
                 ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
-    """The points of the legs that must not touch anything in flight: (link, place), radius and +1
-    for a left leg, -1 for a right one. Contact points first; only balls have a radius there."""
+    """The points of the legs that must not touch anything in flight, from the knee down: (link, place),
+    radius and +1 for a left leg, -1 for a right one. Contact points first; only balls have a radius
+    there."""
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     found = []
@@ -553,7 +558,8 @@ def body_points(model: SymbolicModel, coordinates: Coordinates
         place, radius = touching_sphere(robot, c)
         found.append(((link_of[contact.foot], place), radius))
     for limb in coordinates.limbs:
-        for index in model.limbs[limb][-2:-1]:
+        joints = model.limbs[limb]
+        for index in joints[min(HIP_JOINTS, len(joints) - 2) : -1]:
             link = robot.link(robot.joints[index].child)
             for shape in link.shapes:
                 found += [((link.name, shape.start), shape.radius)]

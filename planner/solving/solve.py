@@ -398,6 +398,15 @@ def straight_ahead(task: JumpTask) -> JumpTask:
     return task.model_copy(update={**changed(task), "jumps": jumps})
 
 
+def in_place(task: JumpTask) -> JumpTask:
+    """A row of as many jumps in place, if all of them are on level ground; else the row itself."""
+    if task.leans or any(hop.landing_height or hop.gap for hop in task.hops()):
+        return task
+    still = {"distance_x": 0.0, "distance_y": 0.0, "twist": 0.0}
+    jumps = task.jumps and tuple(hop.model_copy(update=still) for hop in task.jumps)
+    return task.model_copy(update={**still, "jumps": jumps})
+
+
 def _barrier(problem: FullProblem) -> float:
     """The barrier's parameter for starts from another plan. With all coordinates such a plan is further
     from the solution, and a higher barrier takes a fifth fewer iterations."""
@@ -417,15 +426,20 @@ def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
 
 
 def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
-    """A guess from the same jump straight ahead, where there is one and it can be solved."""
+    """A guess from a simpler jump that can be solved: the same straight ahead, or, where that needs all
+    coordinates, too, one in place on level ground."""
     if problem.coordinates.name != "full":
         return None
-    task = straight_ahead(problem.task)
-    straight = make_problem(task, robot, compiled=not problem.assembly.interpreted)
-    if straight.coordinates.name == "full":
-        return None
-    solution = solve(straight, ballistic_guess(straight), solver="fatrop")
-    return displaced_guess(problem, straight, solution.values) if solution.solved else None
+    for task in (straight_ahead(problem.task), in_place(problem.task)):
+        if task == problem.task:
+            continue
+        simpler = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+        solution = solve(simpler, ballistic_guess(simpler), solver="fatrop")
+        if solution.solved:
+            return displaced_guess(problem, simpler, solution.values)
+        if simpler.coordinates.name != "full":
+            break
+    return None
 
 
 def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Solution | None:

@@ -21,8 +21,8 @@ DUAL_TOLERANCE = 1e-4
 LIMIT = 100
 """Iterations; where fatrop finds a motion at all it nearly always does in half as many, and IPOPT
 finds it often where it does not."""
-PATIENCE = 3e-5
-"""s of processor time for each iteration and state of the problem, about three times what one takes:
+PATIENCE = 1e-5
+"""s of processor time for each iteration, state and constraint of the problem, about three times what one takes:
 a solver that restores feasibility without counting, or looks for a step for ever, is given up."""
 FAR, NEAR = 10.0, 1e-4
 """The barrier's parameter to begin with, far from a solution and near one."""
@@ -97,7 +97,7 @@ def _run(
     }  # fmt: skip
     # In a copy of a process: a fatrop that has failed once would fail at easy problems later.
     if name == "fatrop":
-        ended, answer = call_bounded(function, arguments, patience(problem, limit))
+        ended, answer = call_bounded(function, arguments, patience(problem.assembly, limit))
         if not ended or answer is None:
             spent = cpu_time() - started
             return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, spent)
@@ -115,9 +115,9 @@ def _run(
     )  # fmt: skip
 
 
-def patience(problem: NonlinearProgram, limit: int) -> int:
-    """How long a solver may take for so many iterations [s of processor time]."""
-    return max(2, math.ceil(PATIENCE * limit * sum(problem.assembly.nx)))
+def patience(assembly: Assembly, limit: int) -> int:
+    """How long fatrop may take for so many iterations [s of processor time]; IPOPT, twice as long."""
+    return max(2, math.ceil(PATIENCE * limit * (sum(assembly.nx) + assembly.constraints)))
 
 
 def violation_of(problem: NonlinearProgram, values: Array, constraint: Any) -> tuple[float, str]:
@@ -170,7 +170,7 @@ def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> t
         }  # fmt: skip
     else:
         own |= {"sb": "yes", "mu_init": barrier}
-        own["max_cpu_time"] = max(2.0, 2.0 * PATIENCE * limit * sum(assembly.nx))
+        own["max_cpu_time"] = 2.0 * patience(assembly, limit)
         if barrier < FAR:
             own |= {"bound_push": PUSH, "bound_frac": PUSH,
                     "slack_bound_push": PUSH, "slack_bound_frac": PUSH}  # fmt: skip

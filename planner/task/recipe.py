@@ -31,6 +31,7 @@ import numpy as np
 from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
+from ...robots.kinematics import ball_feet
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
 from .scaling import knee_limits, least_distance_to_limits, rounded, size_of, toe_name_token
@@ -51,6 +52,9 @@ LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 """m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
+KNEE_SAG = 0.04
+"""Of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are
+50 mrad off."""
 LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
@@ -58,8 +62,9 @@ SQUAT, DEEP_SQUAT = 0.4, 0.5
 DEEP, DEEP_BACK = (0.65, 0.75), (0.8, 0.9)
 """Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
 number the squat begins to be a deep one, and from the second on it wholly is."""
-TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE = 1.7, 0.6
-"""m/s of the feet at touchdown, downwards and along the ground, for a robot of BRUCE's size."""
+TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, TOUCHDOWN_ROLL = 1.7, 0.6, 1.2
+"""m/s of the feet at touchdown, downwards and along the ground, of soles and of balls, which roll on, for a robot of
+BRUCE's size."""
 FALL, LEVEL_FALL = 0.9, 1.1
 """Up to which fall from the apex, as a multiple of the centre of mass's height, slow feet are asked for:
 in general, and in a jump on level ground that ends where it began. From higher up the motors stop the
@@ -272,7 +277,7 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     yield from _slow_feet(task, robot, said)
     fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
     if "step" not in said and any(hop.landing_height for hop in hops):
-        gap = rounded(STEP + STEP_HEIGHT * max(fall, onto))
+        gap = rounded(STEP + STEP_HEIGHT * max(fall, onto) + knee_sag(robot))
         yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
@@ -300,11 +305,9 @@ def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> I
     # Jumps back go 1 cm too far with that bound.
     back = any((hop.distance_x or 0.0) < 0.0 for hop in task.hops())
     if "touchdown_slide" not in said and not back:
-        slide, why = (
-            rounded(TOUCHDOWN_SLIDE * size.slow),
-            "feet that swing on miss their place if they land early",
-        )
-        yield Choice("margins.touchdown_slide", slide, why)
+        most = TOUCHDOWN_ROLL if ball_feet(robot) else TOUCHDOWN_SLIDE
+        why = "feet that swing on miss their place if they land early"
+        yield Choice("margins.touchdown_slide", rounded(most * size.slow), why)
 
 
 def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
@@ -321,6 +324,11 @@ def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
     if other or not toe_name_token(robot) or fall <= FALL or drop < DROP:
         return None
     return next((rounded(speed * size.slow) for most, speed in TOES_SPEEDS if fall <= most), None)
+
+
+def knee_sag(robot: RobotDescription) -> float:
+    """By how much [m] knees may hang lower than planned, of legs that end in balls: they fold down to the ground."""
+    return KNEE_SAG * size_of(robot).height if ball_feet(robot) else 0.0
 
 
 def deep(task: RecipeInputs, robot: RobotDescription) -> float:
