@@ -29,7 +29,7 @@ def render(
     rate: Annotated[float, typer.Option(min=1, max=120, help="Pictures a second.")] = 20.0,
     width: Annotated[int, typer.Option(min=64, max=3840, help="Of one run's picture.")] = 480,
     height: Annotated[int, typer.Option(min=64, max=2160, help="Of one run's picture.")] = 400,
-    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 112.0,
+    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 135.0,
     elevation: Annotated[float, typer.Option(help="Its angle to the ground [deg].")] = -9.0,
     distance: Annotated[
         float, typer.Option(min=0, help="Its distance [m]; 0: all of the motion is seen.")

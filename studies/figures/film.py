@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".mp4", ".png")
-FRAMING = 3.0
+FRAMING = 2.4
 """The camera's distance, in sizes of the robot: the largest extent of its links' origins at the start."""
 FOLLOW_WINDOW = 0.5
 """The seconds over which the place of a base is averaged that the camera follows."""
@@ -46,7 +46,7 @@ class Camera:
 
     width: int = 480
     height: int = 400
-    azimuth: float = 112.0
+    azimuth: float = 135.0
     elevation: float = -9.0
     distance: float = 0.0
     follow: bool = False
