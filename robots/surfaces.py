@@ -170,13 +170,14 @@ def turned_surface(part: TurnedPart) -> Surface:
         profile = profile[::-1]
     angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    corners, triangles = [], []
+    corners: list[Array] = []
+    triangles: list[Indices] = []
     here = np.arange(AROUND)
     following = (here + 1) % AROUND
     for low, high in pairwise(profile):
         if np.array_equal(low, high):
             continue
-        start = sum(map(len, corners))
+        start = sum(len(each) for each in corners)
         for radius, height in (low, high):
             corners.append(np.column_stack([radius * ring, np.full(AROUND, height)]))
         a, b = start + here, start + following

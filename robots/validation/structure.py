@@ -6,7 +6,7 @@ A mesh that is not there is no fault: the robot runs without.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -277,9 +277,10 @@ def check_looks(draft: Draft) -> None:
         if name not in links:
             draft.unknown(("looks", name), "the link of a look", name, "link", links)
         look = read(Appearance, value)
-        if look is None:
+        if not isinstance(look, Appearance):
             continue
-        for kind, parts in (("meshes", look.meshes), ("boxes", look.boxes)):
+        solid: Mapping[str, Sequence[Mesh | Box]] = {"meshes": look.meshes, "boxes": look.boxes}
+        for kind, parts in solid.items():
             for k, part in enumerate(parts):
                 path = ("looks", name, kind, k)
                 what = f"{'a mesh' if kind == 'meshes' else 'a box'} of link {name}"

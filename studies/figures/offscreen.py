@@ -177,15 +177,17 @@ def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -
     for link, parts in drawn.items():
         for geom in spec.body(body_name(link)).geoms:
             geom.rgba = [0.0, 0.0, 0.0, 0.0]
-        for k, part in enumerate(parts):
+        for k, surface in enumerate(parts):
             name = f"look/{link}/{k}"
             spec.add_mesh(
-                name=name, uservert=part.corners.ravel(), userface=part.triangles.ravel(),
-                usernormal=normals(part).ravel(), userfacenormal=part.triangles.ravel(),
+                name=name, uservert=surface.corners.ravel(), userface=surface.triangles.ravel(),
+                usernormal=normals(surface).ravel(), userfacenormal=surface.triangles.ravel(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
             )  # fmt: skip
             color = (
-                BONE if part.color is None else [b / 255.0 for b in part.color.to_bytes(3, "big")]
+                BONE
+                if surface.color is None
+                else [b / 255.0 for b in surface.color.to_bytes(3, "big")]
             )
             spec.body(body_name(link)).add_geom(
                 type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, contype=0, conaffinity=0,
