@@ -10,6 +10,7 @@ import typer
 from ..runtime.language.errors import AloftError
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
+from .shared.viewing import read
 
 
 def render(
@@ -43,7 +44,6 @@ def render(
     as_json: AsJson = False,
 ) -> None:
     """Draw a recording as a film or a picture: the robot, the forces, the phase."""
-    from ..logs.file.reader import read
     from ..studies.figures.film import ENDINGS, Camera, Take, instants, pictures, write_film
 
     with errors_reported(as_json):
