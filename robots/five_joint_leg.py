@@ -435,10 +435,10 @@ def slide(
 @kernel
 def within_limits(leg: Leg, angles: Array1D) -> bool:
     """Whether no joint above the ankle is at a limit."""
+    inside = True
     for i in range(4):
-        if not leg.limits[i, 0] < angles[i] < leg.limits[i, 1]:
-            return False
-    return True
+        inside = inside and leg.limits[i, 0] < angles[i] < leg.limits[i, 1]
+    return inside
 
 
 @kernel

@@ -254,7 +254,7 @@ def test_a_leg_of_another_kind_is_refused_by_name():
 
 def test_a_foot_out_of_reach_stays_where_it_is_as_its_ankle_reaches_the_limit():
     """The torso leans to the left by 19.5 deg and pitches slowly; the left hip is at its limit."""
-    leg = LEGS[1]._replace(limits=LEGS[1].limits + [0.15, -0.15])
+    leg = LEGS[1]._replace(limits=np.add(LEGS[1].limits, [0.15, -0.15]))
     last, most, ankles = None, 0.0, []
     for pitch in np.linspace(0.1, -0.1, 201):
         rotation = np.empty((3, 3))
