@@ -1,4 +1,4 @@
-"""Gives calls of kernels their machine code: from memory, from the cache, or by compiling it now."""
+"""Gives calls of kernels their machine code: from memory, the cache or the package, or by compiling."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import partial
 
 from ...processes.child_process import ChildProcess
 from ..kernel import kernels
-from . import store
+from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
@@ -62,7 +62,7 @@ class _Compilation:
         """Compile what is missing, and change over all calls; returns what did not compile."""
         missing: dict[str, int] = {}
         for k, name in enumerate(self._names):
-            if name not in _loaded and not self._load_from_cache(name):
+            if name not in _loaded and not self._load(name, self._kept(name, k)):
                 missing.setdefault(name, k)
         refused = self._compile(missing)
         for call, name in zip(self._calls, self._names, strict=True):
@@ -75,8 +75,11 @@ class _Compilation:
             call.compiled = code, words
         return "; ".join(refused)
 
-    def _load_from_cache(self, name: str) -> bool:
-        code = store.load(name)
+    def _kept(self, name: str, k: int) -> bytes | None:
+        """The machine code of call ``k`` from the cache, or from the package."""
+        return store.load(name) or shipped.load(self._calls[k].kernel, self._types[k])
+
+    def _load(self, name: str, code: bytes | None) -> bool:
         if code is None:
             return False
         with suppress(RuntimeError, ValueError):  # of another LLVM, or damaged: compiled again
@@ -101,7 +104,7 @@ class _Compilation:
             for process in processes:
                 _wait(process, len(own), others)
         for job in others:
-            if not self._load_from_cache(job.name):
+            if not self._load(job.name, store.load(job.name)):
                 self._translate(job, translator, refused)
         _tell(len(jobs), len(jobs))
         return refused
