@@ -313,6 +313,8 @@ def main(tasks: str) -> None:
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+    # Arrow imports pandas where it is installed, only to find that nothing here comes from it
+    sys.modules["pandas"] = None  # type: ignore[assignment]  # what Python takes for "not there"
     import_module("rerun")  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)

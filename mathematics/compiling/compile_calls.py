@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from typing import Any
 
 from ...processes.child_process import ChildProcess
 from ..kernel import kernels
@@ -56,7 +57,10 @@ class _Compilation:
     def __init__(self, calls: Sequence[KernelCall]) -> None:
         self._calls = calls
         self._types = [tuple(type_of(a) for a in call.arguments) for call in calls]
-        self._names = [_name(call, types) for call, types in zip(calls, self._types, strict=True)]
+        known: dict[Any, bytes] = {}
+        self._names = [
+            _name(call, types, known) for call, types in zip(calls, self._types, strict=True)
+        ]
 
     def finish(self) -> str:
         """Compile what is missing, and change over all calls; returns what did not compile."""
@@ -136,11 +140,11 @@ def _wait(process: ChildProcess, own: int, others: Sequence[CompileJob]) -> None
         _tell(own + _finished(others), own + len(others))
 
 
-def _name(call: KernelCall, types: tuple[ArgumentType, ...]) -> str:
+def _name(call: KernelCall, types: tuple[ArgumentType, ...], known: dict[Any, bytes]) -> str:
     """The name of a call's machine code in the cache."""
     key = call.kernel, types
     if key not in _names:
         if kernels().get(call.name) is not call.kernel:
             raise CompileError(f"{call.name} is not marked with @kernel")
-        _names[key] = fingerprint(call.kernel, types, tools())
+        _names[key] = fingerprint(call.kernel, types, tools(), known=known)
     return _names[key]

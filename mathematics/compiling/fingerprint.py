@@ -28,12 +28,14 @@ def fingerprint(
     tools: str,
     *,
     by_source: bool = False,
+    known: dict[Any, bytes] | None = None,
 ) -> str:
     """The name (32 hexadecimal digits) of the machine code of ``kernel`` for these types.
 
     Args:
         tools: whatever else decides on the machine code: versions, options, the processor.
         by_source: whether the content of the kernels' files counts, and not their byte code.
+        known: what other kernels of the same moment have found of the functions that they share.
 
     Raises:
         OSError: a source file cannot be read, with ``by_source``.
@@ -47,9 +49,13 @@ def fingerprint(
     if by_source:  # in an order that the byte code has no part in
         functions = functions[:1] + sorted(functions[1:], key=_name)
     for function in functions:
-        digest.update(f"|{function.__qualname__}".encode())
-        for text in _texts(function, marked, by_source):
-            digest.update(text.encode())
+        text = None if known is None else known.get(function)
+        if text is None:
+            parts = (f"|{function.__qualname__}", *_texts(function, marked, by_source))
+            text = "".join(parts).encode()
+            if known is not None:
+                known[function] = text
+        digest.update(text)
     return digest.hexdigest()
 
 
