@@ -1,6 +1,7 @@
 """Every block of ours keeps the promises of all blocks, with BRUCE and with every robot it fits."""
 
 from collections.abc import Iterable
+from itertools import product
 
 import pytest
 
@@ -39,10 +40,21 @@ LATER = {
     "blocks.SquatJumpReference": conformance_cases(),
 }
 """What takes seconds with another robot: `make test` has it with BRUCE, and the long tests with all."""
+PLANS = ("outputs written", "deterministic", "restored", "inputs kept", "life")
+"""The checks of ``blocks.OnlinePlanner`` that make several plans, which takes seconds."""
 
 
-@pytest.mark.parametrize("case", conformance_cases())
-@pytest.mark.parametrize("name", known_names())
+OF_ALL = [
+    pytest.param(
+        name,
+        case,
+        marks=pytest.mark.long if name == "blocks.OnlinePlanner" and case in PLANS else (),
+    )
+    for name, case in product(known_names(), conformance_cases())
+]
+
+
+@pytest.mark.parametrize(("name", "case"), OF_ALL)
 def test_conformance(name: str, case: str) -> None:
     if name in NOT_FOR_BRUCE:
         assert unmet_messages(find_block(name), robot="bruce")

@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from traceback import extract_tb
@@ -65,10 +66,12 @@ class Subject:
     rate: float
     dimensions: Mapping[str, int]
     seed: int
+    benches: ExitStack = field(default_factory=ExitStack)
+    """Closes all benches: a block may hold a device or a thread."""
 
     def bench(self, *, plain: bool = False) -> BlockBench[Block]:
         """A new instance of the block, on a bench of its own."""
-        return BlockBench(
+        bench = BlockBench(
             self.block_type,
             self.params,
             robot=self.robot,
@@ -76,6 +79,7 @@ class Subject:
             dimensions=self.dimensions,
             plain=plain,
         )
+        return self.benches.enter_context(bench)
 
     def feed(self, bench: BlockBench[Block], ticks: int, seed: int = 0) -> Iterator[int]:
         """Set new inputs for each of at most ``TICKS`` ticks, equal ones for equal seeds; the caller steps the
@@ -109,8 +113,8 @@ def _documented(subject: Subject) -> None:
     subject.expect(kind.__doc__ != Block.__doc__, "no docstring of its own")
     for name, port in {**kind.inputs, **kind.outputs, **kind.states}.items():
         subject.expect(bool(port.text), f"port {name!r} has no text")
-        for field_name, field in port.signal.fields.items():
-            subject.expect(bool(field.text), f"{name}.{field_name} has no text")
+        for name_of_field, declared in port.signal.fields.items():
+            subject.expect(bool(declared.text), f"{name}.{name_of_field} has no text")
     for name, info in kind.Params.model_fields.items():
         subject.expect(bool(info.description), f"parameter {name!r} has no text")
 
@@ -320,7 +324,7 @@ def _life(subject: Subject) -> None:
         for _ in range(5):
             bench.block.stop_cycle()
         metrics = bench.block.metrics() if ticks else {}
-        bench.close()
+        subject.benches.close()
         for name, value in metrics.items():
             subject.expect(
                 isinstance(value, (bool, int, float, str)),
@@ -411,7 +415,8 @@ def check_block(
         seed,
     )
     for name in CASES if cases is None else cases:
-        CASES[name](subject)
+        with subject.benches:
+            CASES[name](subject)
 
 
 def random_value(

@@ -317,6 +317,31 @@ def test_a_block_that_makes_infinity() -> None:
     assert failure(Divides, "finite").endswith("] is inf")
 
 
+def test_every_instance_is_closed() -> None:
+    opened: list[int] = []
+
+    class Device(Sound):
+        """Holds something open."""
+
+        def start(self) -> None:
+            opened.append(id(self))
+
+        def close(self) -> None:
+            opened.remove(id(self))
+
+    check_block(Device)
+    assert not opened
+
+    class Infinite(Device):
+        """Fails a check."""
+
+        def step(self) -> None:
+            self.y.value[:] = np.inf
+
+    assert failure(Infinite, "finite").endswith("] is inf")
+    assert not opened
+
+
 def test_metrics_that_are_no_plain_values() -> None:
     class Odd(Sound):
         """A block."""
