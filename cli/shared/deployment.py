@@ -206,7 +206,8 @@ def _requirements(graph: CheckedGraph) -> list[str]:
 
 def _needs(name: str) -> tuple[list[str], list[str]]:
     """The names of what a distribution always needs, and of what its extras need."""
-    always, extras = [], []
+    always: list[str] = []
+    extras: list[str] = []
     for text in distribution(name).requires or ():
         needed = re.match(r"[A-Za-z0-9._-]+", text)
         if needed:
