@@ -69,6 +69,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "count": ("agreement", "jumps"),
     "seed": ("agreement", "jumps"),
     "seeds": (
+        "jumps",
         "frontier",
         "link_delays",
         "real_robot",
@@ -86,6 +87,8 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "robot": ("real_robot",),
     "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
+    "trial": ("jumps",),
+    "push": ("jumps",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""
 
