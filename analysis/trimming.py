@@ -14,12 +14,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..files.problems import listing, nearest
 from ..logs.file.header import recorded_signals
 from ..mathematics.arrays import Array
 from ..runtime.graph import Graph, load
@@ -110,7 +110,7 @@ class Trim:
             text += f"; at a bound: {', '.join(self.at_bound)}"
         if self.idle:
             text += (
-                f"; no condition depends on {listing(self.idle)} within the periods that are run"
+                f"; no condition depends on {', '.join(self.idle)} within the periods that are run"
             )
         return text
 
@@ -331,7 +331,7 @@ class _Search:
             found = signal_coordinates(self.bound, self._fields, name)
         except AloftError as error:
             states = [label for each in self._states for label in each.labels]
-            near = listing(nearest(name, states, cutoff=0.0))
+            near = ", ".join(get_close_matches(name, states, 3, 0.0))
             raise AloftError(f"{error}; nor is it a state: there is {near}") from error
         if found.quaternion:
             raise AloftError(

@@ -29,13 +29,8 @@ Exit codes:
 """
 
 VERBS = (
-<<<<<<< HEAD
     "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise", "trim",
-    "keys", "top", "watch", "log", "robot", "twin", "doctor",
-=======
-    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise",
     "keys", "deploy", "top", "watch", "log", "robot", "twin", "doctor", "language-server",
->>>>>>> main
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""

@@ -67,7 +67,7 @@ def test_numbers_of_a_graph_are_found_and_those_that_may_not_vary_named(
     (folder / "count.yaml").write_text(
         "rate: 100 Hz\nduration: 1 s\nblocks:\n"
         '  counter: {use: "counter:Counter", with: {seed: 5, goal: -2.0}}\n'
-        "  f: {use: blocks.LowPass, with: {time_constant: 0.1 s}, in: {u: c.y}}\n"
+        "  f: {use: blocks.LowPass, with: {cutoff: 3 Hz}, in: {u: c.y}}\n"
         "  c: {use: blocks.Constant, with: {value: [1.0]}}\n"
     )
     (cell,) = cells(study(""))
@@ -87,5 +87,7 @@ def test_runs_that_lack_the_metric_are_told_what_there_is(
     (cell,) = cells(study(""))
     run = Run(cell, 0, Outcome(False, "fell", metrics={"peak_tilt_deg": 3.0, "last_count": 1.0}))
     assert (_value(run, "success"), _value(run, "peak_tilt_deg")) == (0.0, 3.0)
-    with pytest.raises(aloft.AloftError, match=r"no number 'peak_tilt' \(fell\); there is peak_tilt_deg"):
+    with pytest.raises(
+        aloft.AloftError, match=r"no number 'peak_tilt' \(fell\); there is peak_tilt_deg"
+    ):
         _value(run, "peak_tilt")
