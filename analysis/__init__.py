@@ -1,4 +1,4 @@
-"""Questions to a graph: its linear model and margins, another course of a run, and why a run failed."""
+"""Questions to a graph: operating points, linear models and margins, another course of a run, and why a run failed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .explanation import Explanation, explain
     from .linearisation import Linearisation, linearise
     from .loop_margins import Margins, margins
+    from .trimming import Trim, trim
 
 _HOMES = {
     "branch": "branching",
@@ -19,9 +20,21 @@ _HOMES = {
     "linearise": "linearisation",
     "Margins": "loop_margins",
     "margins": "loop_margins",
+    "Trim": "trimming",
+    "trim": "trimming",
 }
 
-__all__ = ["Explanation", "Linearisation", "Margins", "branch", "explain", "linearise", "margins"]
+__all__ = [
+    "Explanation",
+    "Linearisation",
+    "Margins",
+    "Trim",
+    "branch",
+    "explain",
+    "linearise",
+    "margins",
+    "trim",
+]
 
 
 def __getattr__(name: str) -> Any:

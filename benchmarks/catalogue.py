@@ -71,6 +71,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "count": ("agreement", "jumps", "export"),
     "seed": ("agreement", "jumps"),
     "seeds": (
+        "jumps",
         "frontier",
         "link_delays",
         "real_robot",
@@ -88,6 +89,8 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "robot": ("real_robot",),
     "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
+    "trial": ("jumps",),
+    "push": ("jumps",),
 }
 """The options of ``aloft bench``, and the benchmarks that take each."""
 
