@@ -38,11 +38,11 @@ from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
-    "export": export,
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,
     "general_blocks": general_blocks,
+    "export": export,
     "planner": planner,
     "recorder": recorder,
     "background": background,
