@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from .branching import branch
     from .explanation import Explanation, explain
     from .linearisation import Linearisation, linearise
+    from .locus import RootLocus, root_locus
     from .loop_margins import Margins, margins
     from .trimming import Trim, trim
 
@@ -20,21 +21,16 @@ _HOMES = {
     "linearise": "linearisation",
     "Margins": "loop_margins",
     "margins": "loop_margins",
+    "RootLocus": "locus",
+    "root_locus": "locus",
     "Trim": "trimming",
     "trim": "trimming",
 }
 
 __all__ = [
-    "Explanation",
-    "Linearisation",
-    "Margins",
-    "Trim",
-    "branch",
-    "explain",
-    "linearise",
-    "margins",
-    "trim",
-]
+    "Explanation", "Linearisation", "Margins", "RootLocus", "Trim", "branch", "explain", "linearise",
+    "margins", "root_locus", "trim",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

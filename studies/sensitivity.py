@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from ..files.problems import listing, nearest
+from ..files.problems import LoadError, Position, listing, nearest
 from ..files.validation import unit_of
 from ..mathematics.arrays import Array
 from ..plotting import COLOURS, FAINT, image, new_figure, style, svg_text
@@ -31,7 +31,6 @@ from .tuning import Make, draw_runs
 Evaluate = Callable[[Array], Array]
 """The metric at points, (n, parameters) to (n,)."""
 MOST_BARS = 20
-NOT_VARIED = ("seed", "noise_seed")
 DIGITS = 12
 """Of values that are run, so that a run is the same on every machine."""
 
@@ -116,34 +115,46 @@ def _problem(varied: Sequence[Varied]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def numeric_parameters(cell: Cell, spread: float) -> tuple[list[Varied], list[str]]:
-    """All numbers among the parameters of a cell's graph within a share of their value.
+def numeric_parameters(
+    cell: Cell, spread: float, chosen: Sequence[str] = ("*",)
+) -> tuple[list[Varied], list[str]]:
+    """The numbers among the parameters of a cell's graph within a share of their value.
+
+    Args:
+        cell: the graph with its overrides.
+        spread: the share.
+        chosen: patterns of their names.
 
     Returns:
-        What can be varied, and the names of what cannot: zero, or not allowed at an end of the range.
+        What can be varied, and the names of what cannot: zero, or the graph may not run with an end of
+        the range.
     """
     graph = load_cell(cell.graph, cell.include, cell.sets, cell.origin, cell.behind).checked
     found, left = [], []
     for spec in graph.blocks:
         if "~" in spec.path:
             continue
-        kind = type(spec.params)
-        for name, info in kind.model_fields.items():
-            value = getattr(spec.params, name)
-            if not isinstance(value, float) or name in NOT_VARIED:
+        for name, info in type(spec.params).model_fields.items():
+            value, key = getattr(spec.params, name), f"{spec.path}.{name}"
+            asked = any(fnmatchcase(key, pattern) for pattern in chosen)
+            if not asked or not isinstance(value, float):
                 continue
             low, high = sorted((value * (1.0 - spread), value * (1.0 + spread)))
-            key = f"{spec.path}.{name}"
-            try:
-                for end in (low, high):
-                    kind.model_validate({**spec.params.model_dump(), name: end})
-            except (ValidationError, ValueError, AloftError):
-                low = high
-            if low < high:
+            if low < high and all(_loads(cell, key, end) for end in (low, high)):
                 found.append(Varied(key, low, high, unit_of(info)))
             else:
                 left.append(key)
     return found, left
+
+
+def _loads(cell: Cell, key: str, value: float) -> bool:
+    """Whether the graph may run with a value."""
+    tried = cell.with_sets({key: value}, Position("the sensitivity", 0, 0))
+    try:
+        load_cell(tried.graph, tried.include, tried.sets, tried.origin, tried.behind)
+    except LoadError:
+        return False
+    return True
 
 
 def metric_at(points: Array, varied: Sequence[Varied], metric: str, cell: Cell, seeds: Sequence[int], make: Make) -> Array:  # fmt: skip

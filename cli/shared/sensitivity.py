@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -80,9 +79,8 @@ def rank_parameters(
             f"sensitivities are those of one cell, and {len(chosen)} are chosen: --where AXIS=VALUE"
         )
     (cell,) = check_cells(found, chosen, screen)
-    varied, left = numeric_parameters(cell, options.spread)
-    if options.vary:
-        varied = [v for v in varied if any(fnmatchcase(v.key, each) for each in options.vary)]
+    with screen.status("loading the graph with every parameter at the ends of its range"):
+        varied, left = numeric_parameters(cell, options.spread, options.vary or ("*",))
     if len(varied) < 2:
         raise AloftError(f"fewer than two numeric parameters vary: {[v.key for v in varied]}")
     runs = options.trajectories * (len(varied) + 1) * len(seeds)
