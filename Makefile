@@ -34,7 +34,7 @@ setup: $(COMPLETE)  ## create .venv with everything
 
 $(READY): pyproject.toml scripts/find_python.sh
 	@python="$$(sh scripts/find_python.sh $(PYTHON))" && \
-	echo "setting up $(VENV) with $$python; the first time this downloads several hundred MB" && \
+	echo "setting up $(VENV) with $$python; the first time this downloads about 450 MB" && \
 	"$$python" -m venv $(VENV)
 	@$(PIP) --upgrade 'pip>=25.1'
 	@$(PIP) --editable .
@@ -69,7 +69,7 @@ format: $(COMPLETE)  ## rewrite the files in the project's style
 bench: $(COMPLETE)  ## run all benchmarks
 	@$(SINGLE) $(BIN)/aloft bench
 
-plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/tasks
+plans: $(COMPLETE)  ## make the shipped plans anew, one for every file in graphs/tasks
 	@$(SINGLE) $(BIN)/aloft plan graphs/tasks/*.yaml --anew --prune --keep graphs/plans --no-pictures
 	@$(SINGLE) $(BIN)/aloft plan $(REHEARSED:%=graphs/tasks/%.yaml) --rehearse --keep graphs/plans --no-pictures
 	@$(SINGLE) $(BIN)/aloft plan $(LANDINGS:%=graphs/tasks/%.yaml) --rehearse-landing --keep graphs/plans --no-pictures

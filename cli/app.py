@@ -29,7 +29,7 @@ Exit codes:
 """
 
 VERBS = (
-    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise",
+    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise", "trim",
     "keys", "deploy", "top", "watch", "log", "robot", "twin", "doctor", "language-server",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:

@@ -60,7 +60,8 @@ def bench(
     count: Annotated[
         int | None,
         typer.Option(
-            help="How many tasks 'jumps' draws (200), or programs 'agreement' (50000).", min=1
+            help="How many tasks 'jumps' draws (200), programs 'agreement' (50000), or ticks 'export' runs in C (1000000).",
+            min=1,
         ),
     ] = None,
     seed: Annotated[
