@@ -25,7 +25,7 @@ WORKERS := --numprocesses auto --dist worksteal
 # pytest keeps the tests whose assertions it has rewritten, also where the environment forbids bytecode
 CACHED := PYTHONDONTWRITEBYTECODE=
 
-.PHONY: setup jump test test-all lint format bench plans docs site demo release clean help
+.PHONY: setup jump test test-all lint format bench plans docs site demo notebooks release clean help
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*##/\1:/p' $(MAKEFILE_LIST)
@@ -34,7 +34,7 @@ setup: $(COMPLETE)  ## create .venv with everything
 
 $(READY): pyproject.toml scripts/find_python.sh
 	@python="$$(sh scripts/find_python.sh $(PYTHON))" && \
-	echo "setting up $(VENV) with $$python; the first time this downloads several hundred MB" && \
+	echo "setting up $(VENV) with $$python; the first time this downloads about 450 MB" && \
 	"$$python" -m venv $(VENV)
 	@$(PIP) --upgrade 'pip>=25.1'
 	@$(PIP) --editable .
@@ -69,7 +69,7 @@ format: $(COMPLETE)  ## rewrite the files in the project's style
 bench: $(COMPLETE)  ## run all benchmarks
 	@$(SINGLE) $(BIN)/aloft bench
 
-plans: $(READY)  ## make the shipped plans anew, one for every file in graphs/tasks
+plans: $(COMPLETE)  ## make the shipped plans anew, one for every file in graphs/tasks
 	@$(SINGLE) $(BIN)/aloft plan graphs/tasks/*.yaml --anew --prune --keep graphs/plans --no-pictures
 	@$(SINGLE) $(BIN)/aloft plan $(REHEARSED:%=graphs/tasks/%.yaml) --rehearse --keep graphs/plans --no-pictures
 	@$(SINGLE) $(BIN)/aloft plan $(LANDINGS:%=graphs/tasks/%.yaml) --rehearse-landing --keep graphs/plans --no-pictures
@@ -85,6 +85,9 @@ site: $(COMPLETE)  ## build the documentation as a site in site/, which any web 
 
 demo: $(COMPLETE)  ## build the page on which BRUCE jumps in a browser in site/demo; needs npm and wasm-ld
 	@$(BIN)/python docs/demo/build.py site/demo
+
+notebooks: $(COMPLETE)  ## write the notebooks of the gallery, with the files that they use, into site/notebooks
+	@$(BIN)/python docs/notebooks.py site/notebooks
 
 release: $(COMPLETE)  ## build sdist and wheel into dist/, try the wheel alone, sign it (SIGN=KEY); publish nothing
 	@sh scripts/release.sh

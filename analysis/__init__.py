@@ -1,4 +1,4 @@
-"""Questions to a graph: its linear model and margins, another course of a run, and why a run failed."""
+"""Questions to a graph: operating points, linear models and margins, another course of a run, and why a run failed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     from .branching import branch
     from .explanation import Explanation, explain
     from .linearisation import Linearisation, linearise
+    from .locus import RootLocus, root_locus
     from .loop_margins import Margins, margins
+    from .trimming import Trim, trim
 
 _HOMES = {
     "branch": "branching",
@@ -19,9 +21,16 @@ _HOMES = {
     "linearise": "linearisation",
     "Margins": "loop_margins",
     "margins": "loop_margins",
+    "RootLocus": "locus",
+    "root_locus": "locus",
+    "Trim": "trimming",
+    "trim": "trimming",
 }
 
-__all__ = ["Explanation", "Linearisation", "Margins", "branch", "explain", "linearise", "margins"]
+__all__ = [
+    "Explanation", "Linearisation", "Margins", "RootLocus", "Trim", "branch", "explain", "linearise",
+    "margins", "root_locus", "trim",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

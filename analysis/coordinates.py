@@ -62,15 +62,22 @@ class Coordinates:
 
     def displaced(self, values: Array, k: int, distance: float) -> Array:
         """The elements with coordinate ``k`` moved by ``distance``."""
-        moved = values.copy()
+        distances = np.zeros(len(self))
+        distances[k] = distance
+        return self.moved(values, distances)
+
+    def moved(self, values: Array, distances: Array) -> Array:
+        """The elements with all coordinates moved; an orientation turns about its rotation vector."""
         if not self.quaternion:
-            moved[k] += distance
-            return moved
-        turn = np.zeros(4)
-        turn[k % 3], turn[3] = np.sin(0.5 * distance), np.cos(0.5 * distance)
-        group = slice(4 * (k // 3), 4 * (k // 3) + 4)
-        moved[group] = self._own_order(_product(self._xyzw(values[group]), turn))
-        return moved
+            return values + distances
+        found = values.copy()
+        for k in range(len(distances) // 3):
+            vector, group = distances[3 * k : 3 * k + 3], slice(4 * k, 4 * k + 4)
+            angle = float(np.linalg.norm(vector))
+            if angle:
+                turn = np.append(np.sin(0.5 * angle) / angle * vector, np.cos(0.5 * angle))
+                found[group] = self._own_order(_product(self._xyzw(values[group]), turn))
+        return found
 
     def difference(self, values: Array, nominal: Array) -> Array:
         """The coordinates of ``values`` relative to ``nominal``, (n,)."""
@@ -82,7 +89,10 @@ class Coordinates:
         for start in range(0, len(values), 4):
             x, y, z, w = self._xyzw(nominal[start : start + 4])
             turned = _product(np.array([-x, -y, -z, w]), self._xyzw(values[start : start + 4]))
-            found.append(turned[:3] * (2.0 if turned[3] > 0.0 else -2.0))  # of a small rotation
+            sine = float(np.linalg.norm(turned[:3]))
+            half = np.arctan2(sine, abs(turned[3]))
+            size = 2.0 * half / sine if sine > 0.0 else 2.0
+            found.append(turned[:3] * (size if turned[3] > 0.0 else -size))
         return np.concatenate(found)
 
     def _xyzw(self, quaternion: Array) -> Array:

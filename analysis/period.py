@@ -6,7 +6,7 @@ and those that read it. Without a change it gives the same bytes as the runtime.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ class Period:
             observed before the displacement is added.
         held: whether inputs are open: what is read is the value of the undisturbed run, and not what
             the block has written.
+        only: the blocks that run; what the others have written stays as it is. By default all run.
 
     Attributes:
         ticks: the length of the period.
@@ -42,6 +43,7 @@ class Period:
         outputs: Sequence[Coordinates] = (),
         *,
         held: bool = False,
+        only: Container[str] | None = None,
     ) -> None:
         graph = bound.graph
         self.bound, self.inputs, self.outputs, self.held = bound, inputs, outputs, held
@@ -49,12 +51,17 @@ class Period:
         rates = [(spec.period_ticks, spec.offset_ticks) for spec in specs]
         self._table = [[specs[k].path for k in active] for active in phases(rates)]
         touched = [each.block for each in (*inputs, *outputs)]
+        blocks = {p: b for p, b in bound.blocks.items() if only is None or p in only}
+        self._blocks = blocks
         self._calls = [
-            [(path, _first_call(bound.blocks[path]), path in touched) for path in active]
+            [
+                (path, _first_call(blocks[path]) if path in blocks else _nothing, path in touched)
+                for path in active if path in blocks or path in touched
+            ]
             for active in self._table
-        ]
+        ]  # fmt: skip
         self._updates = [
-            [(p, bound.blocks[p].update) for p in active if type(bound.blocks[p]).is_moore()]  # type: ignore[attr-defined]  # a Moore block
+            [(p, blocks[p].update) for p in active if p in blocks and type(blocks[p]).is_moore()]  # type: ignore[attr-defined]  # a Moore block
             for active in self._table
         ]
         self.ticks = len(self._table)
@@ -90,7 +97,7 @@ class Period:
             change()
         path = ""
         try:
-            for path, block in bound.blocks.items():  # noqa: B007  # the error names it
+            for path, block in self._blocks.items():  # noqa: B007  # the error names it
                 block.load_state()
             for output, observed in zip(self.outputs, self.observed, strict=True):
                 observed[:] = output.read(bound.memory.state)
@@ -103,7 +110,7 @@ class Period:
                 for path, call in self._updates[phase]:  # noqa: B007  # the error names it
                     call()
                 bound.clock.tick += 1
-            for path, block in bound.blocks.items():  # noqa: B007  # the error names it
+            for path, block in self._blocks.items():  # noqa: B007  # the error names it
                 block.save_state()
         except Exception as error:
             raise AloftError(f"block '{path}' failed in a perturbed run: {error}") from error
@@ -129,3 +136,7 @@ def _first_call(block: Block) -> Callable[[], Any]:
     """The call by which a block writes its outputs."""
     call: Callable[[], Any] = block.emit if type(block).is_moore() else block.step  # type: ignore[attr-defined]  # it has the one or the other
     return call
+
+
+def _nothing() -> None:
+    """Of a block that does not run."""

@@ -29,8 +29,8 @@ Exit codes:
 """
 
 VERBS = (
-    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise",
-    "keys", "top", "watch", "log", "robot", "twin", "doctor",
+    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise", "trim",
+    "keys", "deploy", "top", "watch", "log", "robot", "twin", "doctor", "language-server",
 )  # fmt: skip
 """All verbs, in the order of the help. The file of each has its name, and so has what it offers:
 a command, or a group of commands."""
@@ -54,7 +54,8 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
         rich_markup_mode=None,
     )
     for verb in verbs:
-        offered = getattr(import_module(f".{IN_FILE_OF.get(verb, verb)}", __package__), verb)
+        name = verb.replace("-", "_")
+        offered = getattr(import_module(f".{IN_FILE_OF.get(verb, name)}", __package__), name)
         if isinstance(offered, typer.Typer):
             app.add_typer(offered)
         else:

@@ -60,7 +60,8 @@ def bench(
     count: Annotated[
         int | None,
         typer.Option(
-            help="How many tasks 'jumps' draws (200), or programs 'agreement' (50000).", min=1
+            help="How many tasks 'jumps' draws (200), programs 'agreement' (50000), or ticks 'export' runs in C (1000000).",
+            min=1,
         ),
     ] = None,
     seed: Annotated[
@@ -69,7 +70,7 @@ def bench(
     seeds: Annotated[
         str,
         typer.Option(
-            help="Seeds of the trial for 'frontier', 'link_delays', 'real_robot', 'known_effects', 'identification' and 'courses'."
+            help="Seeds of the trial for 'jumps', 'frontier', 'link_delays', 'real_robot', 'known_effects', 'identification' and 'courses'."
         ),
     ] = "",
     jitter: Annotated[
@@ -101,6 +102,12 @@ def bench(
         bool,
         typer.Option("--harder", help="Draw the tasks of 'jumps' as far as jumps land at all."),
     ] = False,
+    trial: Annotated[
+        str, typer.Option(help="The trial of 'jumps': 'uneven'; by default robust.")
+    ] = "",
+    push: Annotated[
+        str, typer.Option(help="The impulse that the torso gets in a flight of 'jumps': '0.5 N s'.")
+    ] = "",
     as_json: JsonBesideTables = False,
 ) -> None:
     """Measure the runtime beside hand-written loops and peers; exit with 1 if a goal is missed."""
@@ -126,6 +133,8 @@ def bench(
             "asked": _names(asked),
             "robot": robot or None,
             "harder": harder or None,
+            "trial": trial or None,
+            "push": _number("--push", push, "N s", 10.0, "'0.5 N s', up to 10"),
         }
         given = {option: value for option, value in options.items() if value is not None}
         for option in given:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,9 +13,10 @@ from .shared.options import AsJson, Overrides
 from .shared.output import console, errors_reported, number, print_json, say, table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import Console
 
-    from ..analysis import Linearisation, Margins
+    from ..analysis import Linearisation, Margins, RootLocus
 
 MOST_POLES = 12
 
@@ -37,19 +39,38 @@ def linearise(
         bool,
         typer.Option("--open", help="Open the loop at --from. Without --to this gives margins."),
     ] = False,
-    png: Annotated[Path | None, typer.Option(help="Draw Bode and Nyquist diagrams here.")] = None,
+    locus: Annotated[
+        str,
+        typer.Option(help="The poles over one parameter and its range: pd.kp=10:200, 20 values."),
+    ] = "",
+    steps: Annotated[int, typer.Option(min=2, help="With --locus: how many values.")] = 20,
+    png: Annotated[
+        Path | None, typer.Option(help="Draw Bode and Nyquist diagrams, or the locus, here.")
+    ] = None,
     svg: Annotated[Path | None, typer.Option(help="The same as SVG.")] = None,
     overrides: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
     """Linearise a whole graph about an instant: A, B, C, D, poles, and the margins of an opened loop."""
     from ..analysis import linearise as linearise_graph
-    from ..analysis import margins
+    from ..analysis import margins, root_locus
+    from ..analysis.locus import locus_figure
+    from ..analysis.loop_margins import margins_figure
     from ..runtime.graph import load
 
     with errors_reported(as_json):
         if at is None and not when:
             raise AloftError("say about which instant: --at 0.4 or --when 'phase.phase == STAND'")
+        if locus and opened:
+            raise AloftError("a locus has the poles of the loop as it runs: leave out --open")
+        if locus:
+            traced = root_locus(
+                graph, locus, inputs=inputs, outputs=outputs or inputs, steps=steps,
+                overrides=overrides or [], at=at, when=when,
+            )  # fmt: skip
+            draw(lambda: locus_figure(traced, f"{Path(graph).stem}: poles"), png, svg)
+            show_locus(traced, graph, as_json)
+            return
         loop = opened and (outputs is None or outputs == inputs)
         if (png or svg) and not loop:
             raise AloftError("diagrams show an opened loop: give --open and no --to")
@@ -59,7 +80,8 @@ def linearise(
         )  # fmt: skip
         found = margins(model) if loop else None
         if found is not None:
-            draw(found, f"{Path(graph).stem} at {model.tick * model.base_period:.3f} s", png, svg)
+            title = f"{Path(graph).stem} at {model.tick * model.base_period:.3f} s"
+            draw(lambda: margins_figure(found, title), png, svg)
     if as_json:
         about = {} if found is None else {"margins": found.as_data()}
         print_json({"success": True, "graph": graph, **model.as_data(), **about})
@@ -67,15 +89,14 @@ def linearise(
     show(console(), model, found)
 
 
-def draw(found: Margins, title: str, png: Path | None, svg: Path | None) -> None:
-    """Write the diagrams. Raises ``AloftError`` if a file cannot be written."""
-    from ..analysis.loop_margins import margins_figure
+def draw(make: Callable[[], Figure], png: Path | None, svg: Path | None) -> None:
+    """Write the diagrams that ``make`` draws. Raises ``AloftError`` if a file cannot be written."""
     from ..plotting import image, style, svg_text
 
     if png is None and svg is None:
         return
     with style():
-        figure = margins_figure(found, title)
+        figure = make()
         try:
             if svg is not None:
                 svg.write_text(svg_text(figure), encoding="utf-8")
@@ -83,6 +104,26 @@ def draw(found: Margins, title: str, png: Path | None, svg: Path | None) -> None
                 image(figure).save(png, format="PNG")
         except OSError as error:
             raise AloftError(f"cannot write the diagrams: {error}") from error
+
+
+def show_locus(traced: RootLocus, graph: str, as_json: bool) -> None:
+    """Print the slowest pole at each value, and where the loop comes to its limit."""
+    if as_json:
+        print_json({"success": True, "graph": graph, **traced.as_data()})
+        return
+    rows = [
+        (number(value), f"{poles[k].real:.6f}", f"{poles[k].imag:.6f}", f"{abs(poles[k]):.6f}")
+        for value, poles in zip(traced.values, traced.poles, strict=True)
+        for k in [abs(poles).argmax()]
+    ]
+    value = f">{traced.parameter} [{traced.unit}]" if traced.unit else f">{traced.parameter}"
+    out = console()
+    out.print(table("slowest pole", (value, ">real", ">imaginary", ">size"), rows))
+    limits = ", ".join(f"{number(each)} {traced.unit}".strip() for each in traced.limits)
+    say(
+        out,
+        f"the limit of stability is at {limits}" if limits else "no pole crosses the unit circle",
+    )
 
 
 def show(out: Console, model: Linearisation, found: Margins | None) -> None:

@@ -44,6 +44,7 @@ def project(
             ".gitignore": templates.IGNORE,
             "graph.yaml": templates.PROJECT_GRAPH.format(**values),
             "graph.schema.json": _schema(),
+            ".vscode/settings.json": templates.EDITOR,
             "test_graph.py": templates.TEST_GRAPH,
             **_block_files("Smoother"),
         }
@@ -141,8 +142,8 @@ def _write(folder: Path, files: Mapping[str, str]) -> None:
     if there:
         raise AloftError(f"{', '.join(there)} would be overwritten; nothing was written")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_text(text, encoding="utf-8")
             typer.echo(f"wrote {folder / name}")
     except OSError as error:

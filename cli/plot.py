@@ -34,7 +34,7 @@ def plot(
     end: Annotated[float | None, typer.Option("--to", help="Up to this time [s].")] = None,
 ) -> None:
     """Plot signals of a recording: in the terminal, or into a file with --png or --svg."""
-    from ..logs import read
+    from .shared.viewing import read
 
     with errors_reported(False):
         recorded = read(run)

@@ -10,6 +10,7 @@ import typer
 from ..runtime.language.errors import AloftError
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
+from .shared.viewing import read
 
 
 def render(
@@ -29,7 +30,7 @@ def render(
     rate: Annotated[float, typer.Option(min=1, max=120, help="Pictures a second.")] = 20.0,
     width: Annotated[int, typer.Option(min=64, max=3840, help="Of one run's picture.")] = 480,
     height: Annotated[int, typer.Option(min=64, max=2160, help="Of one run's picture.")] = 400,
-    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 112.0,
+    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 135.0,
     elevation: Annotated[float, typer.Option(help="Its angle to the ground [deg].")] = -9.0,
     distance: Annotated[
         float, typer.Option(min=0, help="Its distance [m]; 0: all of the motion is seen.")
@@ -43,7 +44,6 @@ def render(
     as_json: AsJson = False,
 ) -> None:
     """Draw a recording as a film or a picture: the robot, the forces, the phase."""
-    from ..logs.file.reader import read
     from ..studies.figures.film import ENDINGS, Camera, Take, instants, pictures, write_film
 
     with errors_reported(as_json):

@@ -158,7 +158,6 @@ def run(
     """Run a graph; print its metrics and the time each block took; write a recording."""
     from ..runtime.graph import load
     from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
-    from ..studies.batch.seeds import parse_seeds
 
     as_json, traceback = printing.as_json, printing.traceback
     plain = compiling.plain or compiling.check_bounds
@@ -178,6 +177,8 @@ def run(
             )  # fmt: skip
             code = run_local(graph, options, out)
         elif changes.seeds:
+            from ..studies.batch.seeds import parse_seeds
+
             seeds = parse_seeds(changes.seeds)
             code = run_many(graph, settings, seeds, out, as_json, plain=plain, fuse=compiling.fuse)
         else:

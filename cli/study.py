@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import Cluster, JsonBesideTables, Workers
+from .shared.options import Cluster, JsonBesideTables, Workers, expand_option_groups
 from .shared.output import console, errors_reported, print_json, print_warning, say
+from .shared.sensitivity import SensitivityOptions, rank_parameters
 from .shared.studies import (
     check_cells,
     make_all,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from ..studies.study import CellFilter, Study
 
 
+@expand_option_groups
 def study(
     file: Annotated[
         Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
@@ -70,13 +72,15 @@ def study(
     no_show: Annotated[
         bool, typer.Option("--no-show", help="With --open: only write the recording.")
     ] = False,
+    asked: SensitivityOptions = SensitivityOptions(),  # noqa: B008  # immutable
     as_json: JsonBesideTables = False,
 ) -> None:
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
     Runs that were made before are not made again, so a study that was stopped or killed goes on
     where it was. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
-    study's arms, 'aloft falsify' the worst case. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+    study's arms, 'aloft falsify' the worst case, and --sensitivity says which parameters matter (extra
+    'analysis'). Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
@@ -100,6 +104,20 @@ def study(
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
         part = part_of(found, where or [])
+        if not asked.sensitivity and asked != SensitivityOptions():
+            raise AloftError(
+                "--vary, --spread, --trajectories, --sobol and --samples go with --sensitivity"
+            )
+        if asked.sensitivity:
+            if number or dry_run or compared or detect:
+                raise AloftError(
+                    "--sensitivity takes neither --open nor --dry-run, --compare, --detect"
+                )
+            raise typer.Exit(
+                rank_parameters(
+                    found, part, chosen, folder, workers, cluster, asked, screen, as_json
+                )
+            )
         if number:
             from .shared.studies import open_run
 

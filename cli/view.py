@@ -10,7 +10,7 @@ import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.output import errors_reported
-from .shared.viewing import draw, show
+from .shared.viewing import draw, read, show
 
 
 def view(
@@ -58,10 +58,10 @@ def view(
 
 def compare(first: Path, second: Path, path: Path) -> None:
     """Write both runs into one file for the viewer."""
-    from ..logs.file.reader import read
     from ..logs.recording.drawn_run import write_comparison
 
+    runs = read(first), read(second)
     try:
-        write_comparison(path, read(first), read(second))
+        write_comparison(path, *runs)
     except OSError as error:
         raise AloftError(f"{path} cannot be written ({error.strerror or error})") from error

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..mathematics.compiling.machine_code import assembler_text, cross_compiled
+from ..mathematics.compiling.machine_code import OLDEST, assembler_text, cross_compiled
 from ..runtime.language.errors import AloftError
 
 
@@ -17,7 +17,7 @@ class Target:
     """A kind of processor.
 
     Attributes:
-        triple, cpu, features: LLVM's names; code for the oldest processor of the kind.
+        triple, features: LLVM's names; code is for the oldest processor of the kind.
         linkers: commands that link a shared library, of which the first that is there is taken.
         archivers: the same for a static library.
         runner: what runs programs of this kind here; empty where they run by themselves.
@@ -25,7 +25,6 @@ class Target:
     """
 
     triple: str
-    cpu: str
     features: str
     linkers: Sequence[str]
     archivers: Sequence[str]
@@ -39,15 +38,15 @@ class Target:
 
 TARGETS: dict[str, Target] = {
     "x86_64": Target(
-        "x86_64-unknown-linux-gnu", "x86-64", "", ("cc", "gcc", "clang"), ("ar",), (), "gcc",
+        "x86_64-unknown-linux-gnu", "", ("cc", "gcc", "clang"), ("ar",), (), "gcc",
     ),
     "aarch64": Target(
-        "aarch64-unknown-linux-gnu", "generic", "", ("aarch64-linux-gnu-gcc",),
+        "aarch64-unknown-linux-gnu", "", ("aarch64-linux-gnu-gcc",),
         ("aarch64-linux-gnu-ar",), ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"),
         "gcc-aarch64-linux-gnu qemu-user",
     ),
     "wasm": Target(
-        "wasm32-unknown-unknown", "generic", "+bulk-memory", ("wasm-ld", "wasm-ld-14"), (),
+        "wasm32-unknown-unknown", "+bulk-memory", ("wasm-ld", "wasm-ld-14"), (),
         ("node",), "lld nodejs",
     ),
 }  # fmt: skip
@@ -55,12 +54,12 @@ TARGETS: dict[str, Target] = {
 
 def compile_module(text: str, target: Target) -> bytes:
     """The object file of a module for a kind of processor."""
-    return cross_compiled(text, target.triple, target.cpu, target.features)
+    return cross_compiled(text, target.triple, OLDEST[target.triple], target.features)
 
 
 def assembler(text: str, target: Target) -> str:
     """The same code as a text for an assembler."""
-    return assembler_text(text, target.triple, target.cpu, target.features)
+    return assembler_text(text, target.triple, OLDEST[target.triple], target.features)
 
 
 def link(name: str, folder: Path, target: Target) -> list[Path]:

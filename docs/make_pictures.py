@@ -170,7 +170,9 @@ def save_live_page(picture: Path) -> None:
         print(f"warning: {picture} is the old one: there is no Chromium")
         return
     name = "live-picture"
-    command = [sys.executable, "-m", "aloft", "run", str(HOPS), "--no-record", "--params", name]
+    # at the pace of the clock, so that it still runs when the page is there
+    words = ["run", str(HOPS), "--no-record", "--params", name, "--set", "clock.kind=paced"]
+    command = [sys.executable, "-m", "aloft", *words]
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         server = LiveServer(_live(name), Path("hops-tuned.yaml"), "parameters")

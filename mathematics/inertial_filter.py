@@ -110,15 +110,21 @@ def orientation_from_gravity(specific_force: Array1D, orientation: Array1D) -> N
 
 @kernel
 def misalignment(
-    orientation: Array1D, points: Array2D, forward: Array1D, out: Array1D, place: Array1D
+    orientation: Array1D,
+    points: Array2D,
+    forward: Array1D,
+    gradient: Array1D,
+    out: Array1D,
+    place: Array1D,
 ) -> bool:
-    """The rotation (3,) [rad, world] that brings all points to one height and ``forward`` to x.
+    """The rotation (3,) [rad, world] that brings all points to the ground and ``forward`` to x.
 
     A small rotation (a, b) about the world's x and y axes changes the height of a point at (x, y)
     relative to the points' mean by a y - b x; a and b are the least-squares solution over all
     points. Where the points lie in one line the function returns False and the rotation is zero.
 
     Args:
+        gradient: how much the ground rises along x and y, (2,); zeros: it is level.
         forward: the direction the feet point [body].
         place: scratch (3,).
     """
@@ -133,6 +139,7 @@ def misalignment(
     for i in range(n):
         rotate(orientation, points[i], place)
         x, y, z = place[0] - mean_x, place[1] - mean_y, place[2] - mean_z
+        z -= gradient[0] * x + gradient[1] * y
         xx, xy, yy, xz, yz = xx + x * x, xy + x * y, yy + y * y, xz + x * z, yz + y * z
     determinant = xx * yy - xy * xy
     out[0] = out[1] = out[2] = 0.0

@@ -16,6 +16,7 @@ from .robot_description import (
     BASE_VELOCITIES,
     ActuatorProfile,
     Appearance,
+    Box,
     ContactPoint,
     Foot,
     Joint,
@@ -27,6 +28,7 @@ from .robot_description import (
     Sensors,
     Shape,
     Transmission,
+    TurnedPart,
     Vector3,
 )
 from .validation import RobotError, RobotFault, find_faults
@@ -281,6 +283,7 @@ __all__ = [
     "BASE_VELOCITIES",
     "ActuatorProfile",
     "Appearance",
+    "Box",
     "ContactPoint",
     "Foot",
     "Joint",
@@ -294,6 +297,7 @@ __all__ = [
     "Sensors",
     "Shape",
     "Transmission",
+    "TurnedPart",
     "Vector3",
     "find_robot",
     "read_description",

@@ -386,7 +386,8 @@ def slide(
     That place is the foot of the perpendicular from the hip to the plane of the sole, or if even
     this is out of reach the plane's point on the base's z axis through the hip, where every angle
     of the hip is small. The place in reach that is nearest to the target on the line between both
-    is found by bisection, to within a 256th of their distance.
+    is found by bisection, to within a 256th of their distance. Where a flat sole is out of reach at the end of
+    that line, because the ankle would pass its limit, a sole that is not flat counts as in reach.
 
     Args:
         leg, softness, kept_yaw, level: as for ``inverse``.
@@ -406,9 +407,9 @@ def slide(
     sz = min(max(sole[2], -_FARTHEST), _FARTHEST)
     depth = nx * (hx - sx) + ny * (hy - sy) + nz * (hz - sz)
     line = rotation[:, 0]
-    for axis in range(2):
+    for attempt in range(4):
         ax, ay, az = hx - depth * nx, hy - depth * ny, hz - depth * nz
-        if axis == 1:
+        if attempt > 1:
             ax, ay, az = hx, hy, hz - depth / nz
         near, far, share = 0.0, 1.0, 1.0
         for step in range(_HALVINGS + 2):
@@ -419,7 +420,7 @@ def slide(
             place[1] = ay + part * (sy - ay)
             place[2] = az + part * (sz - az)
             inside, kept = inverse(leg, place, line, softness, kept_yaw, level, angles)
-            if inside:
+            if inside or (attempt % 2 == 1 and kept == 1.0 and within_limits(leg, angles)):
                 near, share = part, kept
             elif step == 0:
                 break
@@ -429,6 +430,15 @@ def slide(
                 return True, share
     inverse(leg, sole, line, softness, kept_yaw, level, angles)
     return False, 1.0
+
+
+@kernel
+def within_limits(leg: Leg, angles: Array1D) -> bool:
+    """Whether no joint above the ankle is at a limit."""
+    inside = True
+    for i in range(4):
+        inside = inside and leg.limits[i, 0] < angles[i] < leg.limits[i, 1]
+    return inside
 
 
 @kernel

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,9 @@ from ..mathematics.constants import GRAVITY
 from ..mathematics.linear_algebra import inverse, product
 
 Vector3 = tuple[float, float, float]
+Color = Annotated[str, Field(pattern="^#[0-9a-fA-F]{6}$")]
+Length = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Radius = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 class Part(BaseModel):
@@ -82,20 +85,55 @@ class Mesh(Part):
 
     ``file`` is a path, or ``package://NAME/PATH`` of an installed package. The file's corners times
     ``scale``, turned by ``orientation`` (a quaternion x, y, z, w) and moved by ``position`` [m], are
-    in the link's frame.
+    in the link's frame. ``color`` is ``#RRGGBB``.
     """
+
+    later = ("color",)
 
     file: str
     position: Vector3 = (0.0, 0.0, 0.0)
     orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
     scale: Vector3 = (1.0, 1.0, 1.0)
+    color: Color | None = None
+
+
+class Box(Part):
+    """A box that a link is drawn as: its ``size`` [m] along x, y, z, its edges rounded by ``round`` [m].
+
+    Its middle is at ``position`` [m, link frame], and ``orientation`` (a quaternion x, y, z, w) turns it;
+    ``color`` is ``#RRGGBB``.
+    """
+
+    size: tuple[Length, Length, Length]
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    round: Radius = 0.0
+    color: Color | None = None
+
+
+class TurnedPart(Part):
+    """A part as from a lathe that a link is drawn as: ``profile`` turned about ``axis``.
+
+    A point of the profile is a radius and a place along the axis [m], counted from ``position``
+    [m, link frame]; ``color`` is ``#RRGGBB``.
+    """
+
+    profile: Annotated[tuple[tuple[Radius, float], ...], Field(min_length=2)]
+    position: Vector3 = (0.0, 0.0, 0.0)
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    color: Color | None = None
 
 
 class Appearance(Part):
-    """What a link is drawn as: ``meshes``, and capsules for the rest."""
+    """What a link is drawn as, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts,
+    and capsules for the rest of what an imported file shows."""
 
-    meshes: tuple[Mesh, ...]
+    later = ("boxes", "turned")
+
+    meshes: tuple[Mesh, ...] = ()
     shapes: tuple[Shape, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    turned: tuple[TurnedPart, ...] = ()
 
 
 class Link(Part):

@@ -21,6 +21,8 @@ from hashlib import blake2b
 from struct import Struct
 from typing import Any
 
+from ..runtime.language.errors import need_extra
+
 _NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")
 _ATTACHMENT = Struct("<qqB16s")
 ATTACHMENT = _ATTACHMENT.size
@@ -225,7 +227,8 @@ _LOCK = threading.Lock()
 
 
 def join(address: NodeAddress) -> Node:
-    """The node of this address, for one more block."""
+    """The node of this address, for one more block. Raises ``MissingExtraError``."""
+    need_extra("zenoh", "ros2", "a topic of ROS 2")
     with _LOCK:
         node = _NODES.setdefault(address, Node(address))
         node.users += 1

@@ -3,10 +3,11 @@
 #
 #   sh scripts/release.sh [PYTHON ...]
 #
-# A source distribution, a wheel made of that, and their checksums go to dist/. In an empty folder the wheel
-# alone is installed for every PYTHON (without any: each of 3.11 to 3.14 that is found), from the package index
-# and without what is installed here. There BRUCE must jump with the run hash that .venv gives, and a new
-# project must be checked, run and pass its tests. SIGN=KEY signs what was built with that key of gpg.
+# A source distribution, a wheel made of that with the machine code of all shipped graphs, and their checksums
+# go to dist/. In an empty folder the wheel alone is installed for every PYTHON (without any: each of 3.11 to
+# 3.14 that is found), from the package index and without what is installed here. There BRUCE must jump with
+# the run hash that .venv gives, without compiling a kernel, and a new project must be checked, run and pass
+# its tests. SIGN=KEY signs what was built with that key of gpg.
 set -eu
 cd "$(dirname "$0")/.."
 here=$PWD
@@ -45,12 +46,24 @@ rm -rf dist
 mkdir dist
 build sdist "$folder/source" "$folder/sdist"
 tar xzf "$folder"/sdist/*.tar.gz -C "$folder/unpacked"
+ln -s "aloft_robotics-$number" "$folder/unpacked/aloft"
+PYTHONPATH=$folder/unpacked PYTHONDONTWRITEBYTECODE=1 \
+    "$here/.venv/bin/python" "$folder/source/scripts/ship_kernels.py"
 build wheel "$folder/unpacked/aloft_robotics-$number" "$folder/sdist"
 cp "$folder"/sdist/* dist/
 
 tell='import json, sys; told = json.load(sys.stdin); print(told["run_hash"] if told["success"] else told["reason"])'
 jump() { (cd "$2" && "$1/aloft" jump --no-record --json 2>/dev/null | "$1/python" -c "$tell"); }  # with this bin, there
 expected=$(jump "$here/.venv/bin" "$here")
+compiled='
+import sys
+from pathlib import Path
+import aloft
+from aloft.mathematics.compiling.compile_calls import watchers
+told = []
+watchers.append(lambda done, total: told.append(total))
+aloft.load(Path(aloft.__file__).parent / "graphs/jump.yaml").run(0.01)
+print(max(told, default=0))'
 
 for python in "$@"; do
     echo "== try the wheel alone with $("$python" --version)"
@@ -59,8 +72,14 @@ for python in "$@"; do
     bin=$folder/environment/bin
     "$bin/python" -m pip install -qq --disable-pip-version-check dist/*.whl pytest
     mkdir "$folder/empty"
+    export XDG_CACHE_HOME="$folder/environment/cache"
+    count=$(cd "$folder/empty" && "$bin/python" -c "$compiled")
+    [ "$count" = 0 ] || { echo "$count kernels were compiled, which the wheel should bring along" >&2; exit 1; }
+    rm -rf "$XDG_CACHE_HOME"
+    begin=$(date +%s)
     found=$(jump "$bin" "$folder/empty")
     [ "$found" = "$expected" ] || { echo "BRUCE jumps with $found instead of $expected" >&2; exit 1; }
+    echo "its first run took $(($(date +%s) - begin)) s"
     (
         cd "$folder/empty"
         PATH=$bin:$PATH

@@ -169,7 +169,7 @@ def corrected_parameters(graph: FlatGraph) -> dict[str, str]:
         if kind not in found:
             raise AloftError(
                 f"{graph.file}: no parameter takes what a rehearsal learns, {{from: plan.{kind}}}: "
-                "include controllers/rehearsed.yaml, and set targets." + kind + " nowhere"
+                "include controllers/planned.yaml, and set targets." + kind + " nowhere"
             )
     return found
 

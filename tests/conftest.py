@@ -16,7 +16,7 @@ from hypothesis import settings
 from aloft.cli import COLLECTED_AFTER
 
 ROOT = Path(__file__).parent.parent
-UNTRACKED = ("recordings", "build", "dist", "aloft_robotics.egg-info", "__pycache__", ".*")
+UNTRACKED = ("recordings", "build", "dist", "aloft_robotics.egg-info", "__pycache__", ".*", "*.zip")
 
 # The same examples every time: what passes here passes there. No deadline: machines are shared.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
@@ -77,6 +77,12 @@ def wheel(tracked_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
 def source_distribution(tracked_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A source distribution of the tracked files."""
     return built("sdist", tracked_files, tmp_path_factory.mktemp("sdist"))
+
+
+@pytest.fixture(scope="session")
+def build() -> Callable[[str, Path, Path], Path]:
+    """Builds a "wheel" or an "sdist" of a checkout into a folder."""
+    return built
 
 
 def built(kind: str, source: Path, folder: Path) -> Path:

@@ -16,6 +16,7 @@ NOT_SHIPPED = ("tests", "docs", "scripts")
 BY = {
     "PIL": "pillow",
     "dask": "distributed",
+    "lsprotocol": "pygls",
     "mujoco": "mujoco-core",
     "fmu_manipulation_toolbox": "fmu-manipulation-toolbox",
     "pinocchio": "pin",

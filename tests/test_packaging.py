@@ -1,11 +1,14 @@
 """What is shipped: every sub-package, every data file, and a command line that starts at once."""
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
 import tomllib
 import zipfile
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -13,6 +16,7 @@ import pytest
 import yaml
 
 import aloft
+from aloft.mathematics.compiling.machine_code import process_triple
 
 ROOT = Path(__file__).parent.parent
 NOT_SHIPPED = {
@@ -75,6 +79,57 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
         f"pip install --editable aloft_robotics-{aloft.__version__}",
     ):
         assert f"    {command}\n" in done.stderr
+
+
+FIRST_RUN = """
+import json
+from pathlib import Path
+import aloft
+from aloft.mathematics.compiling.compile_calls import watchers
+
+told = []
+watchers.append(lambda done, total: told.append(total))
+result = aloft.load(Path(aloft.__file__).parent / "graphs/jump.yaml").run({duration})
+print(json.dumps([aloft.__file__, told, result.run_hash]))
+"""
+
+
+@pytest.mark.long
+def test_a_wheel_with_machine_code_compiles_nothing_on_its_first_run(
+    tracked_files: Path, tmp_path: Path, build: Callable[[str, Path, Path], Path]
+) -> None:
+    def python(*arguments: str, path: Path) -> str:
+        packages = [entry for entry in sys.path if entry.endswith("site-packages")]
+        environment = {
+            "PYTHONPATH": os.pathsep.join([str(path), *packages]),
+            "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        }
+        command = [sys.executable, "-S", *arguments]
+        done = subprocess.run(
+            command, env=os.environ | environment, cwd=empty, check=False, capture_output=True, text=True
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    empty, source, installed = (tmp_path / name for name in ("empty", "aloft", "installed"))
+    empty.mkdir()
+    shutil.copytree(tracked_files, source)
+    ship = [str(ROOT / "scripts" / "ship_kernels.py"), str(source / "graphs" / "jump.yaml")]
+    told = python(*ship, "--triple", process_triple(), path=tmp_path)
+    assert told.startswith(f"{process_triple()}.zip: ")
+    zipfile.ZipFile(build("wheel", source, tmp_path / "wheel")).extractall(installed)
+    shutil.rmtree(tmp_path / "cache", ignore_errors=True)
+    file, compiled, run_hash = json.loads(
+        python("-c", FIRST_RUN.format(duration=0.2), path=installed)
+    )
+    assert file.startswith(str(installed)) and compiled == []
+    here = aloft.load(ROOT / "graphs" / "jump.yaml").run(0.2)
+    assert run_hash == here.run_hash
+    # a source that has changed is compiled
+    with (installed / "aloft/blocks/jumping/landing_heuristic.py").open("a") as source_file:
+        source_file.write("\n# changed\n")
+    _, compiled, run_hash = json.loads(python("-c", FIRST_RUN.format(duration=0.2), path=installed))
+    assert compiled and run_hash == here.run_hash
 
 
 @pytest.mark.long

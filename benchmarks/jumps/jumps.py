@@ -2,12 +2,15 @@
 
 Each task of ``random_tasks`` is planned from nothing, with one recipe for all, and its plan is run in
 ``graphs/jump.yaml`` with the robust trial once a seed; ground and expectation follow from the task.
-A run lands if ``blocks.JumpScore`` says so. What has been run is kept in ``results/jumps`` and not
+A run lands if ``blocks.JumpScore`` says so. ``trial`` chooses another trial, such as ``uneven``. With a ``push`` the
+torso gets that impulse within 10 ms, in a direction and at a moment of the flight that are drawn for each run, and what
+counts as landed is what ``graphs/push_12cm.yaml`` says. What has been run is kept in ``results/jumps`` and not
 run again unless the code changes.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing, suppress
@@ -16,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...mathematics.constants import GRAVITY
 from ...planner.checking.validity import InvalidPlanError, why_not
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
@@ -35,28 +39,38 @@ COUNT = 200
 RUNS = range(9000, 9004)
 """The seeds of the trial that each jump is run with; nothing is tuned on them."""
 FOLDER = Path("results") / "jumps"
+TRIAL = "robust"
 LANDED_GOAL = 0.05
 """The largest good share of planned jumps that do not land."""
 MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
 """s; CPU time of planning: the median's, that of 95 % of the tasks, and the worst."""
 
 
+LAST_PUSH, PUSH_TIME = 0.9, 0.01
+"""The share of the flight within which a push begins, and how long it lasts [s]."""
+
+
 @dataclass(frozen=True)
 class JumpJob:
-    """A task, the seeds to run it with, where its plan goes, and what is there already."""
+    """A task, the seeds to run it with, where its plan goes, and what is there already; the trial,
+    and the impulse of a push [N s]."""
 
     task: JumpTask
     seeds: tuple[int, ...]
     folder: Path
     planned: bool
+    trial: str = TRIAL
+    push: float = 0.0
 
 
 def jumps(
     count: int = COUNT,
     seed: int = SEED,
-    runs: Sequence[int] = RUNS,
+    seeds: Sequence[int] = RUNS,
     folder: Path = FOLDER,
     harder: bool = False,
+    trial: str = TRIAL,
+    push: float = 0.0,
 ) -> list[Row]:
     """Rows: the share of tasks without a plan, and what binds; of runs that do not land, with its
     95 % interval; and the CPU time of planning, from nothing to checked."""
@@ -68,9 +82,12 @@ def jumps(
         jobs, owners = [], []
         for task, name in zip(tasks, names, strict=True):
             planned = journal.outcomes.get(name)
-            missing = tuple(s for s in runs if f"{name}:{s}" not in journal.outcomes)
+            missing = tuple(
+                s for s in seeds if f"{name}{run_key(trial, push, s)}" not in journal.outcomes
+            )
             if planned is None or (planned.success and missing):
-                jobs.append(JumpJob(task, missing, folder / "plans", planned is not None))
+                found_before = planned is not None
+                jobs.append(JumpJob(task, missing, folder / "plans", found_before, trial, push))
                 owners.append(name)
         compiling = compile_functions([job.task for job in jobs], robot)
         with closing(job_results(plan_and_run, jobs)) as results:
@@ -79,12 +96,13 @@ def jumps(
                     journal.add(f"{owners[result.index]}{part}", outcome)
         plans = [journal.outcomes[name] for name in names]
         found = [
-            (task.name, s, journal.outcomes[f"{name}:{s}"])
+            (task.name, s, journal.outcomes[f"{name}{run_key(trial, push, s)}"])
             for task, name, plan in zip(tasks, names, plans, strict=True)
             if plan.success
-            for s in runs
+            for s in seeds
         ]
-    return [*_plan_rows(tasks, plans, seed), _compiling_row(compiling), _landing_row(found)]
+    under = f"{trial} trial" + (f", pushed by {push:g} N s" if push else "")
+    return [*_plan_rows(tasks, plans, seed), _compiling_row(compiling), _landing_row(found, under)]
 
 
 def compile_functions(tasks: Sequence[JumpTask], robot: RobotDescription) -> float:
@@ -107,7 +125,7 @@ def _kind(task: JumpTask) -> tuple[bool, ...]:
 
 
 def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
-    """The outcomes of one task: of its plan with an empty key, then of each run by its seed."""
+    """The outcomes of one task: of its plan with an empty key, then of each run by its ``run_key``."""
     robot = find_robot("bruce")
     library = PlanLibrary(robot, job.folder, ())
     found = []
@@ -121,17 +139,40 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
         found.append(("", Outcome(not reason, reason, metrics={"cpu_s": cpu_time() - started})))
         if reason:
             return found
-    return found + [(f":{seed}", run_once(job, seed)) for seed in job.seeds]
+    keys = {seed: run_key(job.trial, job.push, seed) for seed in job.seeds}
+    return found + [(key, run_once(job, seed)) for seed, key in keys.items()]
+
+
+def run_key(trial: str, push: float, seed: int) -> str:
+    """What a run is kept under, behind its task's key."""
+    return f":{trial}:{push:g}:{seed}"
 
 
 def run_once(job: JumpJob, seed: int) -> Outcome:
-    """One run of a planned task in the robust trial."""
-    return bruce_jumps().run(job.task, job.folder, seed)
+    """One run of a planned task."""
+    jumping = pushed_jumps(job, seed) if job.push else bruce_jumps(job.trial)
+    return jumping.run(job.task, job.folder, seed)
 
 
-def bruce_jumps() -> JumpGraph:
-    """The graph in which BRUCE jumps, in the robust trial."""
-    return JumpGraph("bruce", shipped_folder() / "jump.yaml", trial_settings("robust"))
+def bruce_jumps(trial: str = TRIAL) -> JumpGraph:
+    """The graph in which BRUCE jumps, in a trial."""
+    return JumpGraph("bruce", shipped_folder() / "jump.yaml", trial_settings(trial))
+
+
+def pushed_jumps(job: JumpJob, seed: int) -> JumpGraph:
+    """The same graph with a push in the flight, in a direction and at a moment drawn by task and seed."""
+    rng = np.random.default_rng([seed, *job.task.name.encode()])
+    rise, drop = job.task.rise or 0.0, job.task.landing_height or 0.0
+    flight = sum(math.sqrt(2.0 * max(h, 0.0) / GRAVITY) for h in (rise, rise - drop))
+    push = {
+        "push.force": job.push / PUSH_TIME,
+        "push.duration": PUSH_TIME,
+        "push.angle": float(rng.uniform(0.0, 2.0 * math.pi)),
+        "push.delay": float(rng.uniform(0.0, LAST_PUSH)) * flight,
+    }
+    return JumpGraph(
+        "bruce", shipped_folder() / "push_12cm.yaml", {**trial_settings(job.trial), **push}
+    )
 
 
 def _plan_rows(tasks: Sequence[JumpTask], plans: Sequence[Outcome], seed: int) -> list[Row]:
@@ -156,7 +197,7 @@ def _compiling_row(seconds: float) -> Row:
     )  # fmt: skip
 
 
-def _landing_row(found: Sequence[tuple[str, int, Outcome]]) -> Row:
+def _landing_row(found: Sequence[tuple[str, int, Outcome]], under: str) -> Row:
     failed = [(name, seed, outcome.reason) for name, seed, outcome in found if not outcome.success]
     n = len(found)
     low, high = wilson_interval(n - len(failed), n)
@@ -167,6 +208,6 @@ def _landing_row(found: Sequence[tuple[str, int, Outcome]]) -> Row:
         len(failed) / n if n else None,
         "",
         goal=LANDED_GOAL,
-        note=f"{n - len(failed)} of {n} runs land, 95 % interval {low:.3f} to {high:.3f}, robust trial"
+        note=f"{n - len(failed)} of {n} runs land, 95 % interval {low:.3f} to {high:.3f}, {under}"
         + (f"; failures by task: {told}" if told else ""),
     )

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 from ...mathematics.arrays import Array1D, Flags1D, Vector3
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import cos, sin
 from ...mathematics.inertial_filter import (
     StandingPoints,
     correct_by_contacts,
@@ -25,7 +26,7 @@ from ...robots.contact_kinematics import (
     contact_motion,
 )
 from ...runtime.language.block import Block, Input, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
+from ...runtime.language.parameters import Parameters, TwoNumbers, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import BaseState, ContactState, ImuReading, JointState
 
@@ -73,6 +74,9 @@ class InertialParameters(Parameters):
     flight: Literal["imu", "ballistic"] = parameter(
         "imu", text="the prediction in flight: by the IMU, or by a free fall of the CoM"
     )
+    slope: TwoNumbers = parameter(
+        (0.0, 0.0), unit="rad", text="by which the ground rises ahead and to the left at the start"
+    )
     velocity_gain: float = live_parameter(
         0.03, gt=0.0, le=1.0, text="gain of the legs' velocity correction, per tick"
     )
@@ -97,6 +101,9 @@ class InertialConstants(Signal):
     filtering = Field(unit="", text="share of a change that the low-pass takes over in a tick")
     block_size = Field(dtype="int64", text="samples in a block from which a bias is learnt")
     starts_level = Field(dtype="bool", text="whether the contact points give the first tilt")
+    gradient = Field(
+        2, unit="", text="how much the ground rises ahead and to the left at the start"
+    )
 
 
 class InertialScratch(Signal):
@@ -171,6 +178,8 @@ class InertialEstimator(Block):
         constants.filtering = min(period / 0.02, 1.0)
         constants.block_size = max(round(0.03 / period), 1)
         constants.starts_level = self.starts_level
+        for axis, angle in enumerate(self.params.slope):
+            constants.gradient[axis] = sin(angle) / cos(angle)
 
 
 @kernel
@@ -221,7 +230,7 @@ def start(
     constants: InertialConstants,
     scratch: InertialScratch,
 ) -> None:
-    """Start with the robot standing on level ground at the origin, its feet heading along x."""
+    """Start with the robot standing at the origin, its feet heading along x."""
     motion, error, vector = legs.motion, scratch.error, scratch.vector
     orientation_from_gravity(scratch.force, estimate.orientation)
     contact_motion(
@@ -229,7 +238,9 @@ def start(
         scratch.joint_rates, motion,
     )  # fmt: skip
     for _ in range(20):
-        misalignment(estimate.orientation, motion.points, motion.forward, error, vector)
+        misalignment(
+            estimate.orientation, motion.points, motion.forward, constants.gradient, error, vector
+        )
         limit(error, 0.2, error)
         if not constants.starts_level:
             error[0] = error[1] = 0.0
@@ -239,7 +250,9 @@ def start(
         estimate.position[:2] -= vector[:2] / motion.soles.shape[0]
     for point in range(motion.points.shape[0]):
         rotate(estimate.orientation, motion.points[point], vector)
-        estimate.position[2] -= vector[2] / motion.points.shape[0]
+        x, y = estimate.position[0] + vector[0], estimate.position[1] + vector[1]
+        height = vector[2] - constants.gradient[0] * x - constants.gradient[1] * y
+        estimate.position[2] -= height / motion.points.shape[0]
     estimate.mean_joint_rate[:] = 1.0  # it counts as moving until it is seen at rest
     estimate.started = True
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +36,7 @@ from ...robots.contact_kinematics import (
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
-from ...runtime.language.block import Block, Input, Output, State
+from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..signals import BaseState, ContactState, EstimatorHealth, ImuReading, JointState
 from .invariant_update import (
@@ -132,6 +132,19 @@ class InvariantKalmanFilter(Block):
     params: InvariantFilterParameters
     constants: InvariantConstants
     scratch: InvariantScratch
+
+    @classmethod
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a start on ground that leans."""
+        if isinstance(params, InvariantFilterParameters) and any(params.slope):
+            ahead, left = map(math.degrees, params.slope)
+            yield UnmetRequirement(
+                "this filter takes the ground on which it begins for level",
+                parameter="slope",
+                expected="a start on level ground",
+                found=f"ground that rises by {ahead:.4g} deg ahead and {left:.4g} deg to the left",
+                fix=f"{context.path}.use: blocks.StateEstimator",
+            )
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
     joints = Input(JointState, text="joint angles and velocities")
@@ -288,7 +301,9 @@ def start(
     """Start with the robot standing on level ground at the origin, its feet heading along x."""
     error, place, vector = scratch.residual, estimate.vectors[1], scratch.vector
     for _ in range(20):
-        misalignment(estimate.orientation, motion.points, motion.forward, error, vector)
+        misalignment(
+            estimate.orientation, motion.points, motion.forward, constants.gradient, error, vector
+        )
         error[:] = min(max(error, -0.2), 0.2)
         rotate_in_world(estimate.orientation, error[0], error[1], error[2])
     to_matrix(estimate.orientation, scratch.rotation)

@@ -17,7 +17,7 @@ from ...mathematics.invariant_filter import (
 )
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, to_matrix
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters, TwoNumbers, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import ContactState, EstimatorHealth
 
@@ -59,6 +59,11 @@ class InvariantFilterParameters(Parameters):
     trial, whose uniform biases and offsets have these standard deviations.
     """
 
+    slope: TwoNumbers = parameter(
+        (0.0, 0.0),
+        unit="rad",
+        text="of the ground at the start: this filter begins on level ground only",
+    )
     gyro_noise: float = parameter(0.02, unit="rad/s", gt=0, text="noise of a gyroscope sample")
     gyro_aliasing: float = parameter(
         0.29,
@@ -130,6 +135,7 @@ class InvariantConstants(Signal):
 
     foot = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     height = Field("n_contacts", unit="m", text="of the tracked points over the ground")
+    gradient = Field(2, unit="", text="how much the ground rises at the start: zero, it is level")
     heading_levers = Field(("n_contacts", 2), unit="m", text="see ``ContactKinematics``")
     place_noise = Field((3, 3), unit="m^2", text="covariance of a point's measured place")
     gyro_range = Field(unit="rad/s", text="the gyroscope saturates here; infinite: never")

@@ -89,7 +89,7 @@ class StateEstimator(InertialEstimator):
       lift-off. ``gate`` grows while all points are rejected or in the air, so that the estimate
       recovers from a wrong prediction.
     * While all points are in contact and the robot moves slowly, before the first flight, the feet are flat on level ground.
-      Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
+      Or it leans as ``slope`` says. Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
       3 mrad, where a biased accelerometer has 10 mrad), and the feet give the heading while they
       stand. The drift of both, by a least-squares line over up to 250 ticks, gives the gyroscope's
       bias. While the robot stands still before the first flight, the accelerometer's reading minus
@@ -102,8 +102,8 @@ class StateEstimator(InertialEstimator):
     then on the CoM falls freely, and the base follows from the joints. That does not drift, but it
     also does not notice a push.
 
-    It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground: the world's origin is
-    midway between the soles, and x is the heading of the feet; for feet of one contact point it is
+    It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``: the world's
+    origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
     the height of the ground is known only through the anchors. The block never waits and raises no
     errors in a run.
@@ -187,7 +187,9 @@ def align_with_ground(
     trust.aligned = min(trust.aligned + 1, 250)
     n = max(trust.aligned, 30)
     angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
-    misalignment(estimate.orientation, motion.points, motion.forward, error, drift)
+    misalignment(
+        estimate.orientation, motion.points, motion.forward, constants.gradient, error, drift
+    )
     if not trust.facing:
         trust.heading = -error[2]
         trust.facing = True

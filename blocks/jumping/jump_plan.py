@@ -207,6 +207,7 @@ class JumpPlan(Block):
         return {
             "scene": scene,
             "jumps": len(hops),
+            "slope": list(task.places()[0].slope),
             "landing_height": round(end.z, 9),
             "distance": [round(end.x, 9), round(end.y, 9)],
             "yaw": end.heading,

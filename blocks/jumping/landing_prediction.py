@@ -44,7 +44,7 @@ class PredictionGains(Parameters):
         0.5, ge=0.0, text="feet apart per lateral momentum, in units of 1/(m w)"
     )
     tilt_cost: tuple[float, float] = live_parameter(
-        (0.1, 0.3),
+        (0.3, 0.3),
         text="cost of a rad of roll and pitch at touchdown, in standing heights off the best place",
     )
     free_tilt: tuple[float, float, float] = live_parameter(

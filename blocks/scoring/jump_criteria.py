@@ -192,8 +192,9 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
     if target is None and planned:
         target = float(r.planned_apex - r.planned_standing)
     if target is not None:
+        off = c.ground_tolerance if c.jumps > 1 else 0.0  # of the ground where a jump lifts off
         yield (
-            abs(rise - target) <= c.rise_tolerance * target,
+            abs(rise - target) <= c.rise_tolerance * target + off,
             (
                 f"rose {1e3 * rise:.1f} mm above standing, not within {c.rise_tolerance:.0%} of "
                 f"{1e3 * target:.1f} mm"

@@ -88,12 +88,13 @@ class JumpScore(Block):
        every contact point above ground of the ``landing_height``. Targets are the parameters
        ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
 
-    On ground that is not as level as the task says (``ground_tolerance``) three of them differ. The simulator lets soles
+    On ground that is not as level as the task says (``ground_tolerance``) these differ. The simulator lets soles
     of several points touch the ground between these points, and counts that in its metric
     ``robot_sole_contacts``. Load there is not measured, so rest (6) is judged by what the robot does: tilt
     and speeds; soles need not be flat, and neither load share nor support count. A foot without a loaded point
     counts as off the ground (7) only if all its points are higher above it than the tolerance. The ground under
-    a contact point may be so far above or below the ``landing_height``.
+    a contact point may be so far above or below the ``landing_height``, so a flight (3) may be shorter. In a row
+    all jumps but the first lift off from such ground, too, and the apexes may differ by as much.
 
     A jump begins with its plan: a robot that is put down from a gantry before is not judged.
 
@@ -310,7 +311,7 @@ def record_flight(
         record.touchdown_time = now - constants.period
         record.touchdown_speed = -record.vertical_speed
         if series.made + 1 < params.jumps:  # more jumps must follow
-            record_jump(record, series, constants.planned)
+            record_jump(record, series, params, constants.planned)
             record.peak_tilt = 0.0
             return
     if record.touchdown_time == NEVER:
@@ -369,10 +370,13 @@ def end_run(scratch: RunEnd, ending: int, landed: float) -> None:
 
 
 @kernel
-def record_jump(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
+def record_jump(
+    record: JumpRecord, series: JumpSeries, params: JumpCriteria, planned: bool
+) -> None:
     """Record a jump of a row that has touched down, and prepare for the next lift-off.
 
-    ``planned`` says that there is a reference to compare the jump with.
+    ``planned`` says that there is a reference to compare the jump with. All but the first may lift off from
+    ground that is higher or lower than the task says, and all may land there.
     """
     made = series.made + 1
     series.made = made
@@ -381,6 +385,11 @@ def record_jump(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
         series.flight_share = 1e9
     if planned:
         flight = record.touchdown_time - record.lift_off_time
+        off = params.ground_tolerance
+        below = 0.0
+        if made > 1:
+            below = off
+        flight += (off + below) / max(abs(record.planned_speed), 1e-9)
         share = flight / max(record.planned_flight, 1e-9)
         if share < series.flight_share:
             series.flight_share = share
@@ -389,7 +398,8 @@ def record_jump(record: JumpRecord, series: JumpSeries, planned: bool) -> None:
         error = abs(record.lift_off_speed - speed) / max(abs(speed), 1e-9)
         keep_worst(series.speed_error, series.speed_jump, error, made)
         rise = record.planned_apex - record.planned_standing
-        error = abs(record.apex_height - record.standing_height - rise) / max(rise, 1e-9)
+        error = abs(record.apex_height - record.standing_height - rise)
+        error = max(error - below, 0.0) / max(rise, 1e-9)
         keep_worst(series.rise_error, series.rise_jump, error, made)
     record.lift_off_time = NEVER
     record.touchdown_time = NEVER

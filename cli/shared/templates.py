@@ -122,11 +122,17 @@ A graph of blocks for [aloft](https://pypi.org/project/aloft-robotics).
 
 | file | what it is |
 |---|---|
-| `graph.yaml` | the graph; `graph.schema.json` lets editors complete it |
+| `graph.yaml` | the graph; `graph.schema.json` lets editors complete it, `.vscode/settings.json` tells VS Code so |
 | `{module}.py` | a block of your own |
 | `test_{module}.py`, `test_graph.py` | the tests of both |
 
 `aloft new block Name` adds a block with its test; `aloft blocks` lists those that are there.
+"""
+
+EDITOR = """\
+{
+  "yaml.schemas": {"./graph.schema.json": ["graph.yaml"]}
+}
 """
 
 IGNORE = "recordings/\n__pycache__/\n.pytest_cache/\n"

@@ -27,10 +27,9 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     shown as it is.
     """
     from ...logs.file.messages import NoRunError
-    from ...logs.file.reader import read
     from ...logs.recording.drawn_run import write_view
     from ...logs.viewing.blueprint import blueprint_with, layout_beside, read_layout
-    from ...logs.viewing.robot_shapes import missing_meshes
+    from ...robots.surfaces import missing_meshes
 
     try:
         run = read(recording)

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
-import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from ... import __version__
 from ...clib.cut import Cut, Terminal, cut, start_of
 from ...clib.part import NeedsPython
 from ...clib.write import prepare
 from ...logs.file.surroundings import named_file
+from ...runtime.carried import copy_module, with_robot_beside
 from ...runtime.language.errors import AloftError
-from ...runtime.loading.flattening.flat import ROBOT_FILES
 from .native import compiler, write_native
 from .slave import GRAPH, INTERFACE
 
-_OURS = Path(__file__).parents[2]
-_ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)
 _SCRIPT = '''\
 """A graph of aloft as an FMU; the graph is in the folder ``graph``."""
 from aloft.fmi.exporting.slave import GraphSlave
@@ -136,15 +130,7 @@ def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -
 def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
     """Write the graph, its interface, and the files and modules that it names."""
     graph, text = cut_out.graph, cut_out.text
-    found = _ROBOT.search(text)
-    if (
-        found
-        and graph.robot is not None
-        and str(yaml.safe_load(found["name"])).endswith(ROBOT_FILES)
-    ):
-        data = yaml.safe_dump(graph.robot.content(), sort_keys=False)
-        (folder / "robot.yaml").write_text(data, encoding="utf-8")
-        text = _ROBOT.sub("robot: robot.yaml", text, count=1)
+    text = with_robot_beside(graph, text, folder)
     overrides: dict[str, Any] = {}
     for block in cut_out.inside:
         spec = graph.block(block.path)
@@ -156,7 +142,7 @@ def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
                 shutil.copyfile(file, folder / copy)
                 overrides[f"{block.path}.{name}"] = copy.as_posix()
         if ":" in block.use:
-            _copy_module(block.use.partition(":")[0], spec.block_type.__module__, folder)
+            copy_module(block.use.partition(":")[0], spec.block_type.__module__, folder)
     (folder / GRAPH).write_text(text, encoding="utf-8")
     inputs = [{**t.plain(), "start": list(start_of(t))} for t in cut_out.inputs]
     outputs = [t.plain() for t in cut_out.outputs]
@@ -170,43 +156,6 @@ def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
     content = json.dumps([interface, text], sort_keys=True).encode()
     interface["token"] = hashlib.sha256(content).hexdigest()[:32]
     (folder / INTERFACE).write_text(json.dumps(interface, indent=1), encoding="utf-8")
-
-
-def _copy_module(name: str, imported: str, folder: Path) -> None:
-    """Copy a user's module, and the modules beside it that it imports, as they are below its root;
-    an installed module is not copied."""
-    file = Path(getattr(sys.modules.get(imported), "__file__", None) or "")
-    if not file.is_file() or "site-packages" in file.parts:
-        return
-    root = file.resolve().parents[len(name.split(".")) - (0 if file.name == "__init__.py" else 1)]
-    pending = [file.resolve()]
-    while pending:
-        each = pending.pop()
-        copy = folder / each.relative_to(root)
-        if copy.exists():
-            continue
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(each, copy)
-        pending += [p for p in _imported(each, root) if not (folder / p.relative_to(root)).exists()]
-
-
-def _imported(file: Path, root: Path) -> Iterator[Path]:
-    """The files below ``root`` that a module imports, with the packages they are in."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        names: list[str] = []
-        base = root
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = file.parents[node.level - 1] if node.level else root
-            module = node.module or ""
-            names = [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
-        for name in filter(None, names):
-            parts = name.split(".")
-            places = [base.joinpath(*parts[:k], "__init__.py") for k in range(1, len(parts) + 1)]
-            for place in (*places, base.joinpath(*parts).with_suffix(".py")):
-                if place.is_file() and place.is_relative_to(root) and _OURS not in place.parents:
-                    yield place
 
 
 def _hash(folder: Path) -> str:

@@ -389,7 +389,8 @@ class Plant:
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
         tilt, level = attitude * params.initial_attitude_error, bool(self.variation.link_length)
-        place_standing(model, data, base, robot, tilt, level)
+        normal = self._params.build_scene(robot).normal(0.0, 0.0)
+        place_standing(model, data, base, robot, tilt, level, normal)
         if self.gantry is not None and params.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.gantry.height]))
             mujoco.mj_kinematics(model, data)

@@ -21,6 +21,7 @@ from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
+from ...runtime.language.terrain import Vector
 from .base import BASES, FixedBase
 from .unsupported import uneven_contacts
 
@@ -28,6 +29,12 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 
+UPWARDS: Vector = (0.0, 0.0, 1.0)
+"""The normal of level ground."""
+_REACHED = 1e-12
+"""m; what the legs leave between contact points and their places."""
+_LEAN_ROUNDS = 12
+"""Of the search for the base's place on ground that leans."""
 _SINGULAR = 1e-12
 _DAMPING = 1e-8
 
@@ -38,13 +45,14 @@ class StartError(BlockError):
 
 def place_standing(
     model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array,
-    level: bool = False,
+    level: bool = False, normal: Vector = UPWARDS,
 ) -> None:  # fmt: skip
     """Put the robot into its standing pose with the soles flat on the ground around the origin and
     the base rotated by the rotation vector ``attitude`` [rad, world].
 
     The legs take the base's rotation up (Newton's method on the contact points), and with ``level``
-    also what links longer or shorter than described leave between soles and ground. A robot without
+    also what links longer or shorter than described leave between soles and ground. Where the ground leans
+    (``normal`` [world]) base and centre of mass are as the planner has them, see ``StanceFinder``. A robot without
     feet is put down upright on its lowest shape instead; a fixed base stays where it is.
 
     Raises:
@@ -75,28 +83,72 @@ def place_standing(
     places += down
     if level:
         places[:, 2] = below
+    if normal != UPWARDS:
+        _lean_ground(model, data, base, robot, places, normal)
     base.turn(attitude)
-    legs = _leg_joints(robot)
-    jacobian = np.zeros((3, model.nv))
-    for _ in range(20):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        error = places - np.array([data.site(name).xpos for name in names])
-        if float(np.abs(error).max()) < 1e-12:
-            return
-        rows = []
-        for name in names:
-            mujoco.mj_jacSite(model, data, jacobian, None, data.site(name).id)
-            rows.append(jacobian[:, base.velocities + legs])
-        data.qpos[base.positions + legs] += _solve_normal(np.vstack(rows), error.ravel())
+    error = _reach(model, data, base, robot, places)
+    if error < _REACHED:
+        return
     position, limits = data.qpos[base.positions :], robot.joint_limits
     outside = np.any(position < limits[:, 0]) or np.any(position > limits[:, 1])
-    if outside or float(np.abs(error).max()) > 1e-6:
+    if outside or error > 1e-6:
         raise StartError(
             f"{robot.name} cannot stand with its torso rotated by {attitude} rad and its feet where "
             "they are in the standing pose; legs of fewer than five joints cannot take up any "
             "attitude: set initial_attitude_error to 0"
         )
+
+
+def _reach(
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, places: Array
+) -> float:
+    """Move the legs until the contact points are at their ``places`` (n_contacts, 3) [m, world]; returns
+    what is missing [m]."""
+    import mujoco
+
+    names, legs = [contact.name for contact in robot.contacts], _leg_joints(robot)
+    jacobian = np.zeros((3, model.nv))
+    for _ in range(20):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        error = places - np.array([data.site(name).xpos for name in names])
+        if float(np.abs(error).max()) < _REACHED:
+            break
+        rows = []
+        for name in names:
+            mujoco.mj_jacSite(model, data, jacobian, None, data.site(name).id)
+            rows.append(jacobian[:, base.velocities + legs])
+        data.qpos[base.positions + legs] += _solve_normal(np.vstack(rows), error.ravel())
+    return float(np.abs(error).max())
+
+
+def _lean_ground(
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, places: Array,
+    normal: Vector,
+) -> None:  # fmt: skip
+    """Turn the ``places`` of the contact points on level ground onto ground with that normal, lower the
+    base as far as the lowest sole is, and move it until the centre of mass is where it was."""
+    import mujoco
+
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    com = data.subtree_com[0].copy()
+    x, y, z = normal
+    ahead = math.hypot(x, z)
+    turn = np.array(
+        [[z / ahead, -x * y / ahead, x], [0.0, ahead, y], [-x / ahead, -y * z / ahead, z]]
+    )
+    soles = np.array(_soles(data, robot))
+    lowest = min(product(turn, sole).item(2) for sole in soles)
+    base.shift(np.array([0.0, 0.0, min(0.0, lowest)]))
+    places[:] = [product(turn, place) for place in places]
+    for _ in range(_LEAN_ROUNDS):
+        _reach(model, data, base, robot, places)
+        missed = com - data.subtree_com[0]
+        missed[2] = 0.0
+        if float(np.abs(missed).max()) < 1e-10:
+            break
+        base.shift(missed)
 
 
 def holding_torque(
@@ -227,19 +279,26 @@ def _solve_positive(square: Array, right: Array, solution: Array) -> None:
     mujoco.mju_cholSolve(solution, factor, right)
 
 
-def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
+def _soles(data: MjData, robot: RobotDescription) -> list[Array]:
+    """Where each foot's sole is; of a foot that is one ball, its centre."""
     import mujoco
 
     from .mujoco_model import body_name  # not for a check
 
-    middle, offset = np.zeros(3), np.zeros(3)
-    soles = [np.array(foot.sole) for foot in robot.feet]
+    soles, offset, found = [np.array(foot.sole) for foot in robot.feet], np.zeros(3), list[Array]()
     for ball in ball_feet(robot):  # the lowest point is straight below the centre
         soles[ball.foot] = ball.centre
     for foot, sole in zip(robot.feet, soles, strict=True):
         body = data.body(body_name(foot.link))
         mujoco.mju_mulMatVec(offset, body.xmat.reshape(3, 3), sole)
-        middle += (body.xpos + offset) / len(robot.feet)
+        found.append(body.xpos + offset)
+    return found
+
+
+def _sole_middle(data: MjData, robot: RobotDescription) -> Array:
+    middle = np.zeros(3)
+    for sole in _soles(data, robot):
+        middle += sole / len(robot.feet)
     return middle
 
 

@@ -26,14 +26,14 @@ import numpy as np
 from ...hal.sensors.sensor import RosMessage
 from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import RobotDescription
+from ...robots.surfaces import quaternion_from_z, robot_surfaces
 from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError
-from ...runtime.language.terrain import HeightField
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
 from ..viewing.drawing import Moments
-from ..viewing.robot_shapes import quaternion_from_z, shapes_of
+from ..viewing.robot_shapes import shapes_of
 from ..viewing.scene_ports import IMU, JOINTS, ScenePorts, port_of, ports_of, scene_ports
 from ..viewing.scene_sensors import sensor_ports
 from .named_columns import NamedColumn, NamedColumns
@@ -203,9 +203,19 @@ def _poses(
 
 
 def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dict[str, Any]:
-    """A ``foxglove.SceneUpdate``: the links' shapes, each fixed to its link's frame, and the ground."""
-    entities = []
+    """A ``foxglove.SceneUpdate``: the links' surfaces or else their shapes, each fixed to its link's frame,
+    and the ground."""
+    entities, surfaces = [], robot_surfaces(robot).links
     for link in robot.links:
+        if link.name in surfaces:
+            seen = [
+                _triangles(
+                    part.corners, part.triangles, GREY if part.color is None else _rgba(part.color)
+                )
+                for part in surfaces[link.name]
+            ]
+            entities.append(_entity(link.name, link.name, instant, {"triangles": seen}))
+            continue
         cylinders, spheres = [], []
         for shape in shapes_of(robot, link):
             start, end = np.array(shape.start), np.array(shape.end)
@@ -229,7 +239,7 @@ def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dic
             )
             for block in terrain.blocks
         ]
-        fields = [_triangles(field) for field in terrain.fields]
+        fields = [_triangles(*field.triangles(), GROUND) for field in terrain.fields]
         shown = {"cubes": cubes, "triangles": fields}
         entities.append(_entity("ground", WORLD, instant, shown))
     return {"deletions": [], "entities": entities}
@@ -263,16 +273,21 @@ def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
     }
 
 
-def _triangles(field: HeightField) -> dict[str, Any]:
-    """A height field as a ``foxglove.TriangleListPrimitive``."""
-    corners, triangles = field.triangles()
-    solid = _solid((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (), GROUND)
+def _rgba(color: int) -> tuple[float, float, float, float]:
+    """Red, green, blue and alpha of 0xRRGGBB."""
+    red, green, blue = (byte / 255.0 for byte in color.to_bytes(3, "big"))
+    return red, green, blue, 1.0
+
+
+def _triangles(corners: Any, triangles: Any, color: Any) -> dict[str, Any]:
+    """A surface as a ``foxglove.TriangleListPrimitive``."""
+    solid = _solid((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), color)
     return {
         "pose": solid["pose"],
-        "points": [dict(zip("xyz", corner, strict=True)) for corner in corners],
+        "points": [dict(zip("xyz", map(float, corner), strict=True)) for corner in corners],
         "color": solid["color"],
         "colors": [],
-        "indices": [corner for triangle in triangles for corner in triangle],
+        "indices": [int(corner) for triangle in triangles for corner in triangle],
     }
 
 

@@ -16,9 +16,10 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
+from ...robots.surfaces import robot_surfaces
 from ..viewing.contacts import ARROW_RADIUS, force_arrows
 from ..viewing.drawing import Colors, opened_stream
-from ..viewing.robot_shapes import drawn_link, eye_controls, read_meshes, scale_of
+from ..viewing.robot_shapes import drawn_link, eye_controls, scale_of
 
 COLORS = Colors()
 
@@ -119,10 +120,10 @@ def _write_world(stream: Any, motion: MotionRecording) -> None:
     poses = link_poses(
         robot, motion.base_position, motion.base_orientation, motion.joint_position
     )  # fmt: skip
-    meshes = read_meshes(robot)
+    surfaces = robot_surfaces(robot)
     for link in robot.links:
         entity = f"world/robot/{link.name}"
-        for below, drawn in drawn_link(robot, link, meshes, COLORS.robot).items():
+        for below, drawn in drawn_link(robot, link, surfaces, COLORS.robot).items():
             stream.log(f"{entity}{below}", drawn, static=True)
         position, rotation = poses.of(link.name)
         transforms = rr.Transform3D.columns(translation=position, mat3x3=rotation)

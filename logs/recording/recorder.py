@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Literal
 
 from ...processes.child_process import ChildError
+from ...robots.surfaces import missing_meshes
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
@@ -27,7 +28,6 @@ from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
-from ..viewing.robot_shapes import missing_meshes
 from .place import cause_of, part_of, remedy, replaced, take_place
 from .recorder_link import RecorderLink, rerun_is_installed
 from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask

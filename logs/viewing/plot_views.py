@@ -142,6 +142,8 @@ def looks(lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> str:
         return f" · bold {shown[0].label}, thin {shown[1].label}"
     how = {"estimated": "bright: estimated", "planned": "dark: planned"}
     told = [how[line.label] for line in lines if line.label in how]
+    if told and lines[0].field.shape == (3,):
+        told.insert(0, "xyz: RGB")
     return f" · {', '.join(told)}" if told else ""
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import quaternions_of_matrices
+from ...robots.surfaces import robot_surfaces
 from ...runtime.language.terrain import Ground, HeightField
 from ..file.format import EVENTS, WORLD, Header, RecordedRows, time_columns, timed
 from .contacts import (
@@ -28,7 +29,7 @@ from .contacts import (
     force_arrows,
 )
 from .drawing import Colors, Detail, Moments, ScenePart
-from .robot_shapes import capsules, drawn_link, eye_height, read_meshes, shapes_of
+from .robot_shapes import capsules, drawn_link, eye_height, shapes_of
 from .scene_ports import PoseSource, ScenePorts
 from .scene_sensors import SensorPart
 
@@ -68,7 +69,7 @@ class RobotPart(ScenePart):
     def _write_shapes(self, moments: Moments) -> None:
         import rerun as rr
 
-        meshes = read_meshes(self.robot)
+        surfaces = robot_surfaces(self.robot)
 
         self.log(EYE, rr.Points3D([[0.0, 0.0, 0.0]], radii=[0.0], colors=[0x00000000]))
         width = 0.0006 * self.scale
@@ -79,11 +80,14 @@ class RobotPart(ScenePart):
                     shapes = shapes_of(self.robot, link)
                     self.log(entity, capsules(shapes, color, wires=True, line_radius=width))
                     continue
-                for below, drawn in drawn_link(self.robot, link, meshes, color, width).items():
+                parts = drawn_link(
+                    self.robot, link, surfaces, color, width, own_colors=color == Colors.robot
+                )
+                for below, drawn in parts.items():
                     self.log(f"{entity}{below}", drawn)
-        if meshes.problems:
-            texts = rr.TextLog.columns(text=meshes.problems, level=["WARN"] * len(meshes.problems))
-            ticks = np.full(len(meshes.problems), moments.batch.ticks[moments.due[0]])
+        if problems := surfaces.problems:
+            texts = rr.TextLog.columns(text=problems, level=["WARN"] * len(problems))
+            ticks = np.full(len(problems), moments.batch.ticks[moments.due[0]])
             root = self.world.removesuffix(WORLD)
             self.stream.send_columns(f"{root}{EVENTS}", time_columns(self.header, ticks), texts)
 

@@ -1,4 +1,4 @@
-"""Gives calls of kernels their machine code: from memory, from the cache, or by compiling it now."""
+"""Gives calls of kernels their machine code: from memory, the cache or the package, or by compiling."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from typing import Any
 
 from ...processes.child_process import ChildProcess
 from ..kernel import kernels
-from . import store
+from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
@@ -56,13 +57,16 @@ class _Compilation:
     def __init__(self, calls: Sequence[KernelCall]) -> None:
         self._calls = calls
         self._types = [tuple(type_of(a) for a in call.arguments) for call in calls]
-        self._names = [_name(call, types) for call, types in zip(calls, self._types, strict=True)]
+        known: dict[Any, bytes] = {}
+        self._names = [
+            _name(call, types, known) for call, types in zip(calls, self._types, strict=True)
+        ]
 
     def finish(self) -> str:
         """Compile what is missing, and change over all calls; returns what did not compile."""
         missing: dict[str, int] = {}
         for k, name in enumerate(self._names):
-            if name not in _loaded and not self._load_from_cache(name):
+            if name not in _loaded and not self._load(name, self._kept(name, k)):
                 missing.setdefault(name, k)
         refused = self._compile(missing)
         for call, name in zip(self._calls, self._names, strict=True):
@@ -75,8 +79,11 @@ class _Compilation:
             call.compiled = code, words
         return "; ".join(refused)
 
-    def _load_from_cache(self, name: str) -> bool:
-        code = store.load(name)
+    def _kept(self, name: str, k: int) -> bytes | None:
+        """The machine code of call ``k`` from the cache, or from the package."""
+        return store.load(name) or shipped.load(self._calls[k].kernel, self._types[k])
+
+    def _load(self, name: str, code: bytes | None) -> bool:
         if code is None:
             return False
         with suppress(RuntimeError, ValueError):  # of another LLVM, or damaged: compiled again
@@ -101,7 +108,7 @@ class _Compilation:
             for process in processes:
                 _wait(process, len(own), others)
         for job in others:
-            if not self._load_from_cache(job.name):
+            if not self._load(job.name, store.load(job.name)):
                 self._translate(job, translator, refused)
         _tell(len(jobs), len(jobs))
         return refused
@@ -133,11 +140,11 @@ def _wait(process: ChildProcess, own: int, others: Sequence[CompileJob]) -> None
         _tell(own + _finished(others), own + len(others))
 
 
-def _name(call: KernelCall, types: tuple[ArgumentType, ...]) -> str:
+def _name(call: KernelCall, types: tuple[ArgumentType, ...], known: dict[Any, bytes]) -> str:
     """The name of a call's machine code in the cache."""
     key = call.kernel, types
     if key not in _names:
         if kernels().get(call.name) is not call.kernel:
             raise CompileError(f"{call.name} is not marked with @kernel")
-        _names[key] = fingerprint(call.kernel, types, tools())
+        _names[key] = fingerprint(call.kernel, types, tools(), known=known)
     return _names[key]

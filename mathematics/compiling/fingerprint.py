@@ -2,6 +2,8 @@
 
 It covers the byte code of the kernel and of all kernels that it calls, in whichever module, and the
 constants that they read. Comments, line numbers and the place of the source count for nothing.
+Byte code differs between versions of Python. What a wheel brings along is named by the files of the
+sources instead.
 """
 
 from __future__ import annotations
@@ -10,6 +12,8 @@ import hashlib
 import types
 from collections.abc import Callable, Iterator, Mapping
 from enum import IntEnum
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from .arguments import ArgumentType
@@ -18,22 +22,45 @@ from .kernel_registry import kernels, written_code
 from .kinds import argument_kinds
 
 
-def fingerprint(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], tools: str) -> str:
+def fingerprint(
+    kernel: Callable[..., Any],
+    signature: tuple[ArgumentType, ...],
+    tools: str,
+    *,
+    by_source: bool = False,
+    known: dict[Any, bytes] | None = None,
+) -> str:
     """The name (32 hexadecimal digits) of the machine code of ``kernel`` for these types.
 
     Args:
         tools: whatever else decides on the machine code: versions, options, the processor.
+        by_source: whether the content of the kernels' files counts, and not their byte code.
+        known: what other kernels of the same moment have found of the functions that they share.
+
+    Raises:
+        OSError: a source file cannot be read, with ``by_source``.
     """
     digest = hashlib.blake2b(digest_size=16)
     digest.update(f"{tools}; equations {VERSION}".encode())
     for part in signature:
         digest.update(f"|{part}".encode())
     marked = {id(function) for function in kernels().values()}
-    for function in closure(kernel, marked):
-        digest.update(f"|{function.__qualname__}".encode())
-        for text in _texts(function, marked):
-            digest.update(text.encode())
+    functions = closure(kernel, marked)
+    if by_source:  # in an order that the byte code has no part in
+        functions = functions[:1] + sorted(functions[1:], key=_name)
+    for function in functions:
+        text = None if known is None else known.get(function)
+        if text is None:
+            parts = (f"|{function.__qualname__}", *_texts(function, marked, by_source))
+            text = "".join(parts).encode()
+            if known is not None:
+                known[function] = text
+        digest.update(text)
     return digest.hexdigest()
+
+
+def _name(function: Any) -> tuple[str, str]:
+    return function.__module__, function.__qualname__
 
 
 def closure(kernel: Any, marked: set[int]) -> list[Any]:
@@ -50,13 +77,16 @@ def closure(kernel: Any, marked: set[int]) -> list[Any]:
     return found
 
 
-def _texts(function: Any, marked: set[int]) -> Iterator[str]:
-    """The byte code of a function, and the constants of its module that it reads."""
+def _texts(function: Any, marked: set[int], by_source: bool) -> Iterator[str]:
+    """The byte code or the source of a function, and the constants of its module that it reads."""
     code = written_code(function)
-    yield from _code_texts(code)
+    if by_source:
+        yield file_digest(code.co_filename)
+    else:
+        yield from _code_texts(code)
     yield f"|{argument_kinds(function)}{reports_event(function)}"
     scope: Mapping[str, Any] = function.__globals__
-    for name in code.co_names:
+    for name in sorted(set(code.co_names)) if by_source else code.co_names:
         if name in scope and id(scope[name]) not in marked:
             value = scope[name]
             if isinstance(value, type) and issubclass(value, IntEnum):
@@ -64,6 +94,12 @@ def _texts(function: Any, marked: set[int]) -> Iterator[str]:
                 continue
             plain = isinstance(value, types.ModuleType | type) or callable(value)
             yield f"|{name}={getattr(value, '__name__', '') if plain else repr(value)}"
+
+
+@cache
+def file_digest(file: str) -> str:
+    """The digest of a file's content. Raises ``OSError`` where there is none."""
+    return hashlib.blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
 
 
 def _code_texts(code: types.CodeType) -> Iterator[str]:

@@ -17,6 +17,12 @@ ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
 OPTIONS = "strict floating point, errors as in Python, loops kept, 4"
 """What is asked of the compiler; the number at the end counts changes of the calling convention."""
+OLDEST = {
+    "x86_64-unknown-linux-gnu": "x86-64",
+    "aarch64-unknown-linux-gnu": "generic",
+    "wasm32-unknown-unknown": "generic",
+}
+"""LLVM's name of the oldest processor of a kind, whose code runs on all of the kind."""
 
 
 @cache
@@ -28,11 +34,10 @@ def tools() -> str:
     """
     import platform
 
-    binding = _binding()
     names = (
         f"python {platform.python_version()}",
         f"llvmlite {version('llvmlite')}",
-        f"{binding.get_process_triple()} {' '.join(processor())}",
+        f"{process_triple()} {' '.join(processor())}",
         OPTIONS,
     )
     return "; ".join(names)
@@ -45,6 +50,12 @@ def _binding() -> Any:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding
+
+
+def process_triple() -> str:
+    """LLVM's name of the kind of processor and system that this process runs on."""
+    triple: str = _binding().get_process_triple()
+    return triple
 
 
 def processor() -> tuple[str, str]:
@@ -78,7 +89,7 @@ def optimised(assembly: str) -> bytes:
         RuntimeError: the module is not valid.
     """
     machine = target_machine()
-    module = _optimised(assembly, _binding().get_process_triple(), machine)
+    module = _optimised(assembly, process_triple(), machine)
     code: bytes = machine.emit_object(module)
     return code
 

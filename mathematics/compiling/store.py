@@ -27,8 +27,7 @@ def load(name: str) -> bytes | None:
         content = _place(name).read_bytes()
     except OSError:
         return None
-    checksum, code = content[:_DIGEST], content[_DIGEST:]
-    return code if _checksum(code) == checksum else None
+    return unsealed(content)
 
 
 def holds(name: str) -> bool:
@@ -44,7 +43,7 @@ def save(name: str, code: bytes) -> None:
         handle, temporary = tempfile.mkstemp(dir=place.parent, suffix=".part")
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(_checksum(code) + code)
+                file.write(sealed(code))
             os.replace(temporary, place)
         except BaseException:
             Path(temporary).unlink(missing_ok=True)
@@ -53,6 +52,17 @@ def save(name: str, code: bytes) -> None:
 
 def _place(name: str) -> Path:
     return cache_folder() / name[:2] / f"{name[2:]}.o"
+
+
+def sealed(code: bytes) -> bytes:
+    """Machine code behind its checksum."""
+    return _checksum(code) + code
+
+
+def unsealed(content: bytes) -> bytes | None:
+    """The machine code behind its checksum, or ``None`` where that does not fit."""
+    checksum, code = content[:_DIGEST], content[_DIGEST:]
+    return code if _checksum(code) == checksum else None
 
 
 def _checksum(code: bytes) -> bytes:

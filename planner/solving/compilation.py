@@ -25,6 +25,7 @@ from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..problem.stage_functions import PIECES, StageFunction, make_piece
+from ..task.files import need_planner
 from ..task.plan import PlannedJump
 from ..task.task import Knots
 
@@ -83,6 +84,7 @@ def content_hash(
 ) -> str:
     """The name of a library: the same for the same content; ``more`` is anything else that decides
     it."""
+    need_planner()
     import casadi as ca
 
     digest = hashlib.sha256()

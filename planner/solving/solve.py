@@ -30,7 +30,7 @@ from ..problem.problem import FullProblem, ProblemBuilder
 from ..problem.stage_functions import PIECES, SLOPED, SLOPED_PIECES, make_coordinates
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
-from ..task.files import JumpTaskError, PlanError
+from ..task.files import JumpTaskError, PlanError, need_planner
 from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES, Hop
@@ -193,6 +193,7 @@ def solve_jump(
         PlanError: no motion was found; ``family`` names the constraints that could not be met.
         JumpTaskError: the task names joints that the robot has not.
     """
+    need_planner()
     try:
         robot = task.equipped(robot)
         chosen = [choice.as_json() for choice in choices(task, robot)]

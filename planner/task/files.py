@@ -17,7 +17,7 @@ from typing import Any
 from ...files.document import read_value
 from ...files.nodes import ListNode, MapNode, Node, plain
 from ...files.problems import Position, Problems
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, need_extra
 
 
 class JumpTaskError(AloftError, ValueError):
@@ -32,6 +32,11 @@ class PlanError(AloftError):
         super().__init__(message)
         self.family = family
         self.violation = violation
+
+
+def need_planner() -> None:
+    """Raises ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
+    need_extra("casadi", "plan", "planning a jump")
 
 
 Key = str | int

@@ -33,7 +33,6 @@ FOOTING = 0.02
 
 Stretch = tuple[float, float, StanceLocation]
 """From, to [m, along the axis], and where the ground between them is the one stood on, going on."""
-START = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class _Edges:
     """The ground along one axis of the world: ``axis`` 0 is ahead, 1 to the left."""
 
     axis: int
-    stretches: tuple[Stretch, ...] = ((-math.inf, math.inf, START),)
+    stretches: tuple[Stretch, ...]
 
     def with_edge(self, at: float, forward: bool, place: StanceLocation) -> _Edges:
         """The ground whose whole part beyond an edge is that of another place."""
@@ -65,6 +64,11 @@ class _Edges:
         return float(place.height(x, y))
 
 
+def _everywhere(place: StanceLocation, axis: int = 0) -> _Edges:
+    """Ground without edges: that of a place, going on."""
+    return _Edges(axis, ((-math.inf, math.inf, place),))
+
+
 def _sorted(stretches: list[Stretch]) -> tuple[Stretch, ...]:
     return tuple(sorted(stretches, key=lambda stretch: stretch[:2]))
 
@@ -79,19 +83,13 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
     stairs.
 
     Raises:
-        JumpTaskError: it starts on ground that leans, a jump lands higher or lower or behind a gap where it stood, or two jumps of a row need different
+        JumpTaskError: a jump lands higher or lower or behind a gap where it stood, or two jumps of a row need different
             ground at the same place.
     """
     places, ground = task.places(), None
     hops = task.hops()
     if task.stairs is not None:
         return _stairs(task, robot)
-    if places[0].slope != LEVEL:
-        raise JumpTaskError(
-            f"{task.name}: slope: robots in simulation are put down on level ground, and their "
-            "estimators begin there; plan it with 'aloft plan', or begin with a jump from level "
-            "ground: jumps: [{landing_slope: [5 deg, 0]}, {}]"
-        )
     bottom = min(place.z for place in places) - GAP_DEPTH
     for number, hop in enumerate(hops):
         changes = changes_ground(hop, places[number])
@@ -99,7 +97,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
             continue
         axis, at, forward = _edge(task, hop, places[number])
         if ground is None:
-            ground = _Edges(axis)
+            ground = _everywhere(places[0], axis)
         if ground.axis != axis:
             raise JumpTaskError(
                 f"{task.name}: landing_height: one jump has its step ahead and another aside; "
@@ -109,8 +107,9 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
             ground = ground.with_edge(at, forward, places[number + 1])
         if hop.gap:
             ground = ground.with_gap(at - 0.5 * hop.gap, at + 0.5 * hop.gap, bottom)
-    if ground is None:
+    if ground is None and not task.leans:
         return "flat"
+    ground = ground or _everywhere(places[0])
     _require_ground(task, robot, ground)
     return _leaning_scene(robot, ground, places) if task.leans else _scene(ground, places)
 

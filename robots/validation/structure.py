@@ -6,12 +6,12 @@ A mesh that is not there is no fault: the robot runs without.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...files.problems import listing
-from ..robot_description import Appearance, Joint, Link
+from ..robot_description import Appearance, Box, Joint, Link, Mesh
 from .faults import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
@@ -271,20 +271,45 @@ def _check_inertia(draft: Draft, path: Path, link: Link) -> None:
 
 
 def check_looks(draft: Draft) -> None:
-    """Report looks of unknown links, and meshes that would be nowhere or have no direction."""
+    """Report looks of unknown links, and parts that would be nowhere or have no direction."""
     links = draft.names("links")
     for name, value in draft.entries("looks"):
         if name not in links:
             draft.unknown(("looks", name), "the link of a look", name, "link", links)
         look = read(Appearance, value)
-        for k, mesh in enumerate(look.meshes if look is not None else ()):
-            numbers = (*mesh.position, *mesh.orientation, *mesh.scale)
-            path = ("looks", name, "meshes", k)
-            if not all(map(math.isfinite, numbers)):
-                draft.add(path, f"a mesh of link {name} is nowhere", "finite numbers", "others")
-            elif not any(mesh.orientation):
+        if not isinstance(look, Appearance):
+            continue
+        solid: Mapping[str, Sequence[Mesh | Box]] = {"meshes": look.meshes, "boxes": look.boxes}
+        for kind, parts in solid.items():
+            for k, part in enumerate(parts):
+                path = ("looks", name, kind, k)
+                what = f"{'a mesh' if kind == 'meshes' else 'a box'} of link {name}"
+                more = part.scale if isinstance(part, Mesh) else ()
+                if not all(map(math.isfinite, (*part.position, *part.orientation, *more))):
+                    draft.add(path, f"{what} is nowhere", "finite numbers", "others")
+                elif not any(part.orientation):
+                    draft.add(
+                        (*path, "orientation"), f"{what} has no orientation",
+                        "a quaternion x, y, z, w that is not zero", str(list(part.orientation)),
+                        "orientation: [0, 0, 0, 1]",
+                    )  # fmt: skip
+                if isinstance(part, Box) and 2.0 * part.round > min(part.size):
+                    draft.add(
+                        (*path, "round"), f"{what} is rounded by more than half of its least side",
+                        f"at most {0.5 * min(part.size):g} m", f"{part.round:g} m",
+                    )  # fmt: skip
+        for k, turned in enumerate(look.turned):
+            path = ("looks", name, "turned", k)
+            what = f"a turned part of link {name}"
+            places = [along for _, along in turned.profile]
+            if not all(map(math.isfinite, (*turned.position, *turned.axis, *places))):
+                draft.add(path, f"{what} is nowhere", "finite numbers", "others")
+            elif not any(turned.axis):
                 draft.add(
-                    (*path, "orientation"), f"a mesh of link {name} has no orientation",
-                    "a quaternion x, y, z, w that is not zero", str(list(mesh.orientation)),
-                    "orientation: [0, 0, 0, 1]",
+                    (*path, "axis"), f"{what} has an axis without direction",
+                    "a vector x, y, z that is not zero", str(list(turned.axis)), "axis: [0, 0, 1]",
                 )  # fmt: skip
+            elif not any(radius for radius, _ in turned.profile):
+                draft.add(
+                    (*path, "profile"), f"{what} has no thickness", "a radius above zero", "0 m"
+                )

@@ -37,7 +37,7 @@ border-left:1px solid GrayText;box-sizing:border-box} .node{cursor:pointer;outli
 h1{font-size:17px;margin:0 0 2px} h2{font-size:13px;margin:14px 0 4px} p,pre{margin:4px 0}
 pre{white-space:pre-wrap;font:inherit} table{border-collapse:collapse;width:100%}
 td{vertical-align:top;padding:2px 8px 2px 0;overflow-wrap:anywhere} td:first-child{font-weight:bold;white-space:nowrap} p{overflow-wrap:anywhere}
-.soft{opacity:.72} button{font:inherit} header{display:flex;gap:.8em;align-items:baseline}
+:not(text).soft{opacity:.72} button{font:inherit} header{display:flex;gap:.8em;align-items:baseline}
 .wide{flex-direction:column} .wide main{flex:none;max-height:72vh} .wide aside{flex:1;width:auto;
 border-left:0;border-top:1px solid GrayText} .wide #panel{columns:25em;column-gap:2em}
 #panel>h1{column-span:all} #panel h2{break-after:avoid} tr,.whole{break-inside:avoid}

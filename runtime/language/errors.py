@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from importlib.util import find_spec
 from typing import Any
 
 
@@ -43,6 +44,26 @@ class UnknownBlockError(AloftError, LookupError):
 
 class BlockError(AloftError):
     """A block cannot go on; the block raises this with a message for the user."""
+
+
+class MissingExtraError(AloftError):
+    """A library is not installed that only an extra of aloft's brings."""
+
+
+def need_extra(module: str, extra: str, what: str) -> None:
+    """Say how to install what ``what`` is done with, before something imports it.
+
+    Raises:
+        MissingExtraError: there is no such module; the text has the line for pip.
+    """
+    try:
+        found = find_spec(module) is not None
+    except ValueError:  # it was imported in a way that left no specification
+        found = True
+    if not found:
+        raise MissingExtraError(
+            f"{what} needs the library {module}: pip install 'aloft-robotics[{extra}]'"
+        )
 
 
 class RunError(AloftError):

@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".mp4", ".png")
-FRAMING = 3.0
+FRAMING = 2.4
 """The camera's distance, in sizes of the robot: the largest extent of its links' origins at the start."""
 FOLLOW_WINDOW = 0.5
 """The seconds over which the place of a base is averaged that the camera follows."""
 COLORS = 128
 """The colours of a GIF: few make the file small, and the scene has few."""
+SAMPLES = 8
+"""The pictures from which they are chosen."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Camera:
 
     width: int = 480
     height: int = 400
-    azimuth: float = 112.0
+    azimuth: float = 135.0
     elevation: float = -9.0
     distance: float = 0.0
     follow: bool = False
@@ -214,8 +216,9 @@ def write_film(path: Path, frames: Iterator[Image], rate: float) -> int:
         return 1
     from PIL.Image import Dither
 
-    palette = first.quantize(COLORS)
-    others = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in frames]
+    rest = list(frames)
+    palette = _sample([first, *rest]).quantize(COLORS)
+    others = [frame.quantize(palette=palette, dither=Dither.NONE) for frame in rest]
     first.quantize(palette=palette, dither=Dither.NONE).save(
         path,
         save_all=True,
@@ -225,6 +228,18 @@ def write_film(path: Path, frames: Iterator[Image], rate: float) -> int:
         optimize=True,
     )
     return 1 + len(others)
+
+
+def _sample(frames: Sequence[Image]) -> Image:
+    """Some of the pictures below each other: one that has the colours of all."""
+    from PIL import Image as Images
+
+    some = frames[:: max(1, len(frames) // SAMPLES)]
+    width, height = some[0].size
+    sheet = Images.new("RGB", (width, height * len(some)))
+    for k, frame in enumerate(some):
+        sheet.paste(frame, (0, k * height))
+    return sheet
 
 
 def _write_mp4(path: Path, frames: Iterator[Image], rate: float) -> int:

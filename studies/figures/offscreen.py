@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...hal.simulated.mujoco_model import mujoco_spec
+from ...hal.simulated.mujoco_model import body_name, mujoco_spec
 from ...mathematics.arrays import Array
+from ...robots.surfaces import normals, robot_surfaces
 from ...runtime.language.errors import AloftError
 from ...runtime.language.terrain import Terrain
 
@@ -139,7 +140,8 @@ def _context(width: int, height: int) -> Any:
 
 
 def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -> Any:
-    """The simulator's own model with a floor pattern, colours, lights and bones between joints."""
+    """The simulator's own model with a floor pattern, lights, the surfaces of links, and colours and bones of those
+    without."""
     import mujoco
 
     spec = mujoco_spec(robot, scene=scene)
@@ -171,8 +173,28 @@ def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -
         else:
             part = next((c for p, c in PAINT.items() if p in geom.name), PAINT["foot"])
             geom.rgba = [*part, 1.0]
+    drawn = robot_surfaces(robot).links
+    for link, parts in drawn.items():
+        for geom in spec.body(body_name(link)).geoms:
+            geom.rgba = [0.0, 0.0, 0.0, 0.0]
+        for k, surface in enumerate(parts):
+            name = f"look/{link}/{k}"
+            spec.add_mesh(
+                name=name, uservert=surface.corners.ravel(), userface=surface.triangles.ravel(),
+                usernormal=normals(surface).ravel(), userfacenormal=surface.triangles.ravel(),
+                inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+            )  # fmt: skip
+            color = (
+                BONE
+                if surface.color is None
+                else [b / 255.0 for b in surface.color.to_bytes(3, "big")]
+            )
+            spec.body(body_name(link)).add_geom(
+                type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0, contype=0, conaffinity=0,
+                rgba=[*color, 1.0],
+            )  # fmt: skip
     for joint in robot.joints:
-        if max(abs(x) for x in joint.origin) > 0.0:
+        if joint.parent not in drawn and max(abs(x) for x in joint.origin) > 0.0:
             spec.body(joint.parent).add_geom(
                 type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.012, 0, 0], mass=0.0, contype=0,
                 conaffinity=0, fromto=[0.0, 0.0, 0.0, *joint.origin], rgba=[*BONE, 1.0],

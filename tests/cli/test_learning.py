@@ -53,4 +53,4 @@ def test_a_real_robot_is_asked_for_one_jump_at_a_time(call_json: CallJson) -> No
 def test_a_graph_that_takes_no_corrections_is_refused(folder: Path, call_json: CallJson) -> None:
     deaf = "targets.velocity_correction=[0, 0, 0]"
     found = call_json("jump", "--learn", "mine.json", "--set", deaf, code=2)
-    assert "include controllers/rehearsed.yaml" in found["reason"]
+    assert "include controllers/planned.yaml" in found["reason"]

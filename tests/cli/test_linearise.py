@@ -39,9 +39,33 @@ def test_a_model_as_a_table(loop: str) -> None:
     assert "slowest poles" in out
 
 
+def test_a_root_locus_as_json_table_and_picture(loop: str, tmp_path: Path) -> None:
+    png, svg = tmp_path / "locus.png", tmp_path / "locus.svg"
+    asked = (
+        "linearise",
+        loop,
+        "--from",
+        "k.y",
+        "--to",
+        "x.y",
+        "--at",
+        "0.1",
+        "--locus",
+        "k.gain=-50:-150",
+    )
+    told = run_for_json(*asked, "--steps", "5", "--png", str(png), "--svg", str(svg))
+    assert told["values"] == [-50.0, -75.0, -100.0, -125.0, -150.0]
+    assert len(told["poles"]) == 5 and len(told["poles"][0]) == 2
+    assert told["limits"] == [pytest.approx(-100.0, rel=1e-2)]  # |z|^2 = K T
+    assert png.read_bytes()[:4] == b"\x89PNG" and "real part [1/s]" in svg.read_text()
+    out = run_here(*asked, "--steps", "4").stdout
+    assert "the limit of stability is at -100" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["--from", "k.y", "--open", "--at", "1", "--locus", "k.gain=1:2"], "leave out --open"),
         (["--from", "k.y"], "say about which instant: --at 0.4 or --when"),
         (["--from", "k.y", "--to", "x.y", "--at", "1", "--png", "a.png"], "diagrams show an opened loop"),
         (["--from", "k.z", "--at", "1"], "there is no signal 'k.z'"),

@@ -1,5 +1,6 @@
 """``aloft new``: what it writes works, tests included, and it overwrites nothing."""
 
+import json
 import os
 import subprocess
 import sys
@@ -42,6 +43,10 @@ def test_a_project_with_a_block_and_a_graph_and_a_robot_passes_its_tests(
         report = check(here / "my_robot" / f"{name}.yaml")
         assert report.ok, report.text()
     assert passing_tests(here / "my_robot") == 6
+    settings = json.loads((here / "my_robot" / ".vscode" / "settings.json").read_text())
+    ((schema, graphs),) = settings["yaml.schemas"].items()
+    assert (here / "my_robot" / schema).is_file()
+    assert all((here / "my_robot" / name).is_file() for name in graphs)
 
 
 def test_the_project_runs_from_its_folder(

@@ -56,6 +56,16 @@ def test_a_film_has_a_picture_for_each_step_of_time(
     assert film.read_bytes() == again.read_bytes()
 
 
+@pytest.mark.parametrize(
+    "words", [["render"], ["plot", "a.b"], ["view", "--save", "x.rrd", "--no-show"]]
+)
+def test_a_recording_that_is_not_there_is_one_line(words: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "n.rrd"
+    done = run_here(words[0], str(file), *words[1:], code=2)
+    assert str(file) in done.stderr.replace("\n", "") and "Traceback" not in done.stderr
+    assert "there is no" in done.stderr
+
+
 def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path: Path) -> None:
     one, two = tmp_path / "one.png", tmp_path / "two.png"
     run_here("render", str(pushed), "-o", str(one), "--at", "0.3", *SMALL, "--caption", "a")
@@ -70,7 +80,7 @@ def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path:
         int(((p[..., 0] > 120) & (p[..., 1] < 60) & (p[..., 2] < 80)).sum())
         for p in (alone, np.asarray(Image.open(bare)))
     ]
-    assert red[0] > 5 and red[1] == 0, "the forces on the feet"
+    assert red[0] > 2 and red[1] == 0, "the forces on the feet"
 
 
 def test_mp4(pushed: Path, renderer: None, tmp_path: Path) -> None:

@@ -94,16 +94,17 @@ def test_the_tilt_correction_converges_to_upright_and_keeps_the_heading():
     assert rotations.yaw(q) == pytest.approx(before, abs=0.03)
 
 
-@given(small, small, small)
-def test_misalignment_levels_the_feet_and_faces_forward(x, y, z):
+@given(small, small, small, st.sampled_from([(0.0, 0.0), (0.2, -0.1)]))
+def test_misalignment_puts_the_feet_on_the_ground_and_faces_forward(x, y, z, gradient):
     true = quaternion_of((0.5, 0.3, -0.2))
     place = np.array([[0.05, -0.08, 0], [-0.035, -0.08, 0], [0.05, 0.08, 0], [-0.035, 0.08, 0]])
+    place[:, 2] = place[:, :2] @ gradient
     points = np.array([turned_back(true, row - [0.01, 0.02, 0.38]) for row in place])
     forward = turned_back(true, [2.0, 0.0, 0.0])
     q, error = true.copy(), np.empty(3)
     inertial.rotate_in_world(q, x, y, z)
     for _ in range(10):
-        assert inertial.misalignment(q, points, forward, error, np.empty(3))
+        assert inertial.misalignment(q, points, forward, np.array(gradient), error, np.empty(3))
         inertial.rotate_in_world(q, *error.tolist())
     assert np.abs(turn_between(q, true)).max() < 1e-9
 
@@ -112,7 +113,7 @@ def test_misalignment_is_first_order_exact():
     """One step takes a small error away up to its square."""
     points = np.array([[0.05, -0.08, -0.4], [-0.03, -0.08, -0.4], [0.05, 0.08, -0.4]])
     q, error = quaternion_of((1e-3, -2e-3, 3e-3)), np.empty(3)
-    inertial.misalignment(q, points, np.array([1.0, 0, 0]), error, np.empty(3))
+    inertial.misalignment(q, points, np.array([1.0, 0, 0]), np.zeros(2), error, np.empty(3))
     assert error == pytest.approx([-1e-3, 2e-3, -3e-3], abs=1e-5)
 
 
@@ -121,7 +122,7 @@ def test_points_in_one_line_say_nothing():
     error = np.ones(3)
     forward = np.array([1.0, 0, 0])
     assert not inertial.misalignment(
-        quaternion_of((0.1, 0, 0)), points, forward, error, np.empty(3)
+        quaternion_of((0.1, 0, 0)), points, forward, np.zeros(2), error, np.empty(3)
     )
     assert not error.any()
 

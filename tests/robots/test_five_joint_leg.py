@@ -10,10 +10,13 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from aloft.mathematics import rotations
 from aloft.robots import five_joint_leg as legs
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import inverse_velocity
 from aloft.robots.kinematics import link_poses
+
+from ..turns import quaternion_of
 
 ROBOT = find_robot("bruce")
 LEGS = [legs.read_leg(ROBOT, foot) for foot in range(len(ROBOT.feet))]
@@ -247,3 +250,24 @@ def test_a_leg_of_another_kind_is_refused_by_name():
     beside = tuple(foot.model_copy(update={"sole": (0.0, 0.01, -0.02)}) for foot in ROBOT.feet)
     with pytest.raises(ValueError, match="beside the leg plane"):
         legs.read_leg(ROBOT.model_copy(update={"feet": beside}), 0)
+
+
+def test_a_foot_out_of_reach_stays_where_it_is_as_its_ankle_reaches_the_limit():
+    """The torso leans to the left by 19.5 deg and pitches slowly; the left hip is at its limit."""
+    leg = LEGS[1]._replace(limits=np.add(LEGS[1].limits, [0.15, -0.15]))
+    last, most, ankles = None, 0.0, []
+    for pitch in np.linspace(0.1, -0.1, 201):
+        rotation = np.empty((3, 3))
+        rotations.to_matrix(quaternion_of((0.0, -pitch, 0.0)), rotation)
+        lean = np.empty((3, 3))
+        rotations.to_matrix(quaternion_of((0.34, 0.0, 0.0)), lean)
+        sole, angles = np.array([0.059 + 0.1 * pitch, 0.208, -0.266]), np.empty(5)
+        found, _ = legs.slide(leg, sole, rotation @ lean, 0.0, 0.0, 0.3, np.empty(3), angles)
+        assert found
+        if last is not None:
+            most = max(most, np.abs(angles - last).max())
+        last = angles
+        ankles.append(angles[4])
+    assert max(ankles) == pytest.approx(leg.limits[4, 1])
+    assert min(ankles) < leg.limits[4, 1] - 0.02
+    assert most < 0.01

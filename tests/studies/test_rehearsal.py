@@ -122,7 +122,7 @@ def test_the_parameters_that_follow_the_plan_are_found() -> None:
         "velocity_correction": "targets.velocity_correction",
         "momentum_correction": "targets.momentum_correction",
     }
-    with pytest.raises(AloftError, match=r"include controllers/rehearsed.yaml, and set targets"):
+    with pytest.raises(AloftError, match=r"include controllers/planned.yaml, and set targets"):
         corrected_parameters(flatten(GRAPHS / "somersault_forward_35cm.yaml"))
 
 

@@ -1,6 +1,7 @@
 """Random jumps in closed loop: what is planned, run, kept, and how it is told."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -28,7 +29,8 @@ def outcomes(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         if job.task.name == "high":
             return [("", Outcome(False, "motor speed", metrics={"cpu_s": 3.0}))]
         return [("", Outcome(True, "", metrics={"cpu_s": 1.0}))] + [
-            (f":{seed}", Outcome(seed != 9002, "fell")) for seed in job.seeds
+            (module.run_key(job.trial, job.push, seed), Outcome(seed != 9002, "fell"))
+            for seed in job.seeds
         ]
 
     tasks = [make_task({"name": "low", "rise": 0.1}), make_task({"name": "high", "rise": 0.9})]
@@ -60,6 +62,29 @@ def test_what_is_kept_is_not_run_again(outcomes: list[str], tmp_path: Path) -> N
     assert again[-1].value == pytest.approx(1 / 3)
     lines = (tmp_path / "runs.jsonl").read_text().splitlines()
     assert len({json.loads(line)["key"] for line in lines}) == 2 + 3
+
+
+def test_another_trial_and_a_push_are_runs_of_their_own(
+    outcomes: list[str], tmp_path: Path
+) -> None:
+    jumps(2, 1, range(9000, 9002), tmp_path)
+    uneven = jumps(2, 1, range(9000, 9002), tmp_path, trial="uneven")
+    pushed = jumps(2, 1, range(9000, 9002), tmp_path, push=0.5)
+    assert outcomes == ["low", "high", "low", "low"]
+    assert ", uneven trial" in uneven[-1].note
+    assert ", robust trial, pushed by 0.5 N s" in pushed[-1].note
+
+
+def test_a_push_is_drawn_within_the_flight_and_always_the_same() -> None:
+    task = make_task({"name": "low", "rise": 0.1, "landing_height": -0.1, "distance_x": 0.2})
+    job = module.JumpJob(task, (), Path(), False, push=0.5)
+    drawn = [module.pushed_jumps(job, seed).settings for seed in range(30)]
+    delays = [each["push.delay"] for each in drawn]
+    flight = math.sqrt(0.2 / 9.81) + math.sqrt(0.4 / 9.81)
+    assert 0.0 < min(delays) < 0.1 * flight and 0.7 * flight < max(delays) < 0.9 * flight
+    assert len({each["push.angle"] for each in drawn}) == 30
+    assert drawn[0]["push.force"] == 50.0
+    assert module.pushed_jumps(job, 3).settings == drawn[3]
 
 
 def test_a_task_without_a_plan_says_what_binds(tmp_path: Path) -> None:

@@ -13,10 +13,12 @@ from tests.robots.limbed_robots import quadruped
 from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter, tracked_points
 from aloft.mathematics import extended_pose, rotations
 from aloft.mathematics.inertial_filter import rotate_in_world
+from aloft.planner.library.library import shipped_folder
 from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
 from aloft.runtime.language.errors import BlockError
+from aloft.runtime.loading import LoadError, load
 from aloft.runtime.testing import BlockBench
 
 from ...turns import quaternion_of, turn_in_body
@@ -373,3 +375,12 @@ def test_of_a_foot_that_is_a_ball_it_tracks_the_centre():
     for ball in ball_feet(robot):
         assert points[ball.point].tolist() == ball.centre.tolist()
         assert heights[ball.point] == ball.radius > 0.0
+
+
+def test_no_start_where_the_ground_leans():
+    jump = shipped_folder() / "jump.yaml"
+    task = {"name": "odd", "rise": 0.1, "slope": ["5 deg", 0]}
+    with pytest.raises(LoadError, match="takes the ground on which it begins for level") as error:
+        load(jump, {"plan.task": task, "estimator.use": "blocks.InvariantKalmanFilter"})
+    assert "ground that rises by 5 deg ahead and 0 deg to the left" in str(error.value)
+    assert "estimator.use: blocks.StateEstimator" in str(error.value)

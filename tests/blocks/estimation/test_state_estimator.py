@@ -26,15 +26,16 @@ class Motion:
     """A base motion given as functions of time, with the feet where ``feet`` says, and what
     perfect sensors read of it."""
 
-    def __init__(self, position, attitude, feet, heading=lambda time: 0.0):
+    def __init__(self, position, attitude, feet, heading=lambda time: 0.0, rise=0.0):
         self.position, self.attitude, self.feet = position, attitude, feet
-        self.heading = heading
+        self.heading, self.rise = heading, rise
 
     def joints(self, time):
         matrix = np.empty((3, 3))
         rotations.to_matrix(quaternion_of(self.attitude(time)), matrix)
         joints, heading = np.empty(10), self.heading(time)
-        line = matrix.T @ [np.cos(heading), np.sin(heading), 0.0]
+        line = matrix.T @ [np.cos(heading), np.sin(heading), self.rise]
+        line /= np.linalg.norm(line)
         for leg, foot in zip(LEGS, self.feet(time), strict=True):
             out = np.empty(5)
             sole = matrix.T @ (foot - self.position(time))
@@ -123,6 +124,8 @@ squat = Motion(
     lambda t: np.array([0.02, 0.4, 0.05]) * smooth(0.5, 1.0, t),
     lambda t: FEET,
 )
+SLOPE = (0.1, -0.08)
+"""rad; of the ground ahead and to the left."""
 LIFT_OFF = 0.6
 
 
@@ -166,6 +169,18 @@ def test_starts_at_the_truth():
 def test_starts_from_the_feet_not_from_a_biased_accelerometer():
     bias = (0.1, -0.1, 0.1)
     assert Run(still, accelerometer=bias).to(PERIOD).errors()[2] < 1e-9
+
+
+def test_stands_where_the_ground_leans_as_it_is_told():
+    ahead, left = np.tan(SLOPE)
+    feet = np.array([[x, y, ahead * x + left * y] for x, y, _ in FEET])
+    motion = Motion(still.position, still.attitude, lambda t: feet, rise=ahead)
+    assert max(Run(motion, slope=SLOPE).to(PERIOD).errors()) < 1e-3
+    position, velocity, attitude = Run(motion, slope=SLOPE).to(0.4).errors()
+    assert position < 1e-3
+    assert velocity < 1e-6
+    assert attitude < 1e-6
+    assert Run(motion).to(0.4).errors()[2] > 0.1
 
 
 @pytest.mark.parametrize("kind", [StateEstimator, ComplementaryFilter])

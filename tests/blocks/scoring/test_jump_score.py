@@ -515,6 +515,20 @@ def test_each_jump_is_judged(change: Callable[[float, Fields], None], words: str
     assert metrics["success"] is False
 
 
+@pytest.mark.parametrize(
+    ("change", "too_little", "words", "enough"),
+    [
+        (low, 0.015, "jump 2: apex 11% off the planned rise, limit 10%", 0.017),
+        (short, 0.04, "jump 2: flight of 88% of the planned one, below 90%", 0.046),
+    ],
+)
+def test_on_uneven_ground_a_row_lifts_off_and_lands_higher_or_lower(
+    change: Callable[[float, Fields], None], too_little: float, words: str, enough: float
+) -> None:
+    assert run_row(change, ground_tolerance=too_little)[0]["reason"] == words
+    assert run_row(change, ground_tolerance=enough)[0]["success"] is True
+
+
 def test_a_bounce_is_no_jump() -> None:
     landed = LIFT_OFFS[0] + FLIGHT
 

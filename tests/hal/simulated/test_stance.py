@@ -19,6 +19,8 @@ from aloft.hal.simulated.stance import (
     holding_torque,
     place_standing,
 )
+from aloft.planner.models.robot_model import StanceFinder
+from aloft.planner.task.sequence import Slope, StanceLocation, ground_axes
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
@@ -42,6 +44,18 @@ def test_soles_are_flat_on_the_ground_under_a_turned_torso(attitude: Any) -> Non
     np.testing.assert_allclose(places[:, 0], [0.0425, -0.0425] * 2, atol=1e-9)
     half = np.linalg.norm(attitude) / 2
     assert np.linalg.norm(data.qpos[4:7]) == pytest.approx(np.sin(half))
+
+
+@pytest.mark.parametrize("slope", [(0.15, 0.0), (-0.1, 0.2)])
+def test_on_ground_that_leans_it_stands_as_the_planner_has_it(slope: Slope) -> None:
+    data, axes = mujoco.MjData(MODEL), ground_axes(slope)
+    x, y, z = axes[:, 2].tolist()
+    place_standing(MODEL, data, FloatingBase(data), ROBOT, np.zeros(3), normal=(x, y, z))
+    place = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)
+    planned = StanceFinder(ROBOT).on_ground(np.array(ROBOT.standing_position), place)
+    np.testing.assert_allclose(data.qpos[:3], planned.coordinates[:3], atol=1e-8)
+    np.testing.assert_allclose(data.qpos[7:], planned.coordinates[6:], atol=1e-7)
+    np.testing.assert_allclose(data.qpos[3:7], [1.0, 0.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_holding_torque_leaves_no_acceleration() -> None:

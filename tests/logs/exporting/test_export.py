@@ -129,7 +129,9 @@ def test_the_scene_and_the_log_are_foxgloves(
     assert set(entities) == {link.name for link in robot.links} | {"ground"}
     assert entities["ground"]["frame_id"] == "world" and entities["ground"]["cubes"]
     assert all(entities[link.name]["frame_id"] == link.name for link in robot.links)
-    assert entities[robot.base]["cylinders"][0]["size"]["z"] > 0.0
+    (shell,) = {tuple(part["color"].values()) for part in entities[robot.base]["triangles"][1:2]}
+    assert shell == (0xE6 / 255.0, 0xE9 / 255.0, 0xEE / 255.0, 1.0)
+    assert entities["right_hip_shaft"]["spheres"], "a link without shapes is its bones"
     texts = [json.loads(message.data)["message"] for *_, message in messages["/log"]]
     assert "running" in texts
 

@@ -232,3 +232,18 @@ def test_a_process_ends_with_one_that_died_before_it_had_a_task() -> None:
     # which returns when the standard error, that of the recorder too, is closed
     done = subprocess.run(command, stderr=subprocess.PIPE, check=True, timeout=60.0)
     assert done.stderr == b""
+
+
+def test_the_process_imports_no_pandas_and_arrow_does_without() -> None:
+    code = (
+        "import sys\n"
+        "from aloft.logs.recording.recorder_process import WithoutPandas\n"
+        "sys.meta_path.insert(0, WithoutPandas())\n"
+        "import pyarrow\n"
+        "import rerun\n"
+        "rerun.AnyValues(text='a', number=1.0).as_component_batches()\n"
+        "print(pyarrow.array(['a', 'b']).to_pylist(), 'pandas' in sys.modules)"
+    )
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert done.stdout == "['a', 'b'] False\n"

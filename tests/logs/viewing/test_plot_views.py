@@ -80,7 +80,7 @@ def test_the_first_plots_are_few_and_say_what_is_what(header: Header) -> None:
     views = main_plots(header, scene_ports(header), (ShownRun(),))
     names = names_of(views)
     assert len(views) <= MOST_IN_TAB
-    assert "centre of mass [m], world · dark: planned" in names
+    assert "centre of mass [m], world · xyz: RGB, dark: planned" in names
     assert "vertical force on each foot [N]" in names
     assert not any("contact_force" in name for name in names)
     two = main_plots(

@@ -11,18 +11,9 @@ from aloft import load
 from aloft.logs import read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
-from aloft.logs.viewing.robot_shapes import (
-    MOST_TRIANGLES,
-    Surface,
-    capsules,
-    drawn_link,
-    missing_meshes,
-    normals,
-    reach_of,
-    read_meshes,
-    shapes_of,
-)
+from aloft.logs.viewing.robot_shapes import capsules, drawn_link, reach_of, shapes_of
 from aloft.robots.description import Appearance, Mesh, RobotDescription, Shape, find_robot
+from aloft.robots.surfaces import joined, missing_meshes, robot_surfaces
 
 from ...robots.example_robots import needs_robots
 
@@ -76,26 +67,29 @@ def test_a_link_is_drawn_as_its_meshes(tmp_path: Path) -> None:
 
     (tmp_path / "a.obj").write_text(TETRAHEDRON)
     robot = with_look(tmp_path, "a.obj", "a.obj")
-    meshes = read_meshes(robot)
-    assert meshes.problems == [] and list(meshes.surfaces) == [robot.base]
-    surface = meshes.surfaces[robot.base]
+    surfaces = robot_surfaces(robot)
+    assert surfaces.problems == [] and list(surfaces.links) == [robot.base]
+    surface = joined(surfaces.links[robot.base])
     assert surface.corners.shape == (8, 3) and surface.triangles.shape == (8, 3)
     assert np.ptp(surface.corners, axis=0) == pytest.approx([0.1, 0.1, 0.2])
     assert surface.corners[:, 2].min() == pytest.approx(0.5)
-    drawn = drawn_link(robot, robot.link(robot.base), meshes, 0x90A4AEFF)
+    drawn = drawn_link(robot, robot.link(robot.base), surfaces, 0x90A4AEFF)
     assert [type(each) for each in drawn.values()] == [rr.Mesh3D, rr.Capsules3D]
     assert list(drawn) == ["", "/beside"]
     other = next(link for link in robot.links if link.name != robot.base)
-    assert isinstance(drawn_link(robot, other, meshes, 0x90A4AEFF)[""], rr.Capsules3D)
+    assert isinstance(drawn_link(robot, other, surfaces, 0x90A4AEFF)[""], rr.Capsules3D)
 
 
-def test_normals_point_out_of_a_surface() -> None:
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]], dtype=float)
-    surface = Surface(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
-    found = normals(surface)
-    assert np.linalg.norm(found, axis=1) == pytest.approx(1.0)
-    middle = corners[:4].mean(axis=0)
-    assert ((corners[:4] - middle) * found[:4]).sum(axis=1).min() > 0.0
+def test_a_painted_link_keeps_its_colours_unless_another_run_is_shown_beside_it() -> None:
+    surfaces, torso = robot_surfaces(BRUCE), BRUCE.link("torso")
+    parts = surfaces.links["torso"]
+    own = drawn_link(BRUCE, torso, surfaces, 0x90A4AEFF)[""]
+    found = own.vertex_colors.as_arrow_array().to_pylist()
+    assert found[0] == parts[0].color << 8 | 0xFF and len(set(found)) > 3
+    assert len(found) == sum(len(part.corners) for part in parts)
+    other = drawn_link(BRUCE, torso, surfaces, 0xD7A86EFF, own_colors=False)[""]
+    assert other.vertex_colors is None
+    assert other.albedo_factor.as_arrow_array().to_pylist() == [0xD7A86EFF]
 
 
 @pytest.mark.parametrize(
@@ -113,24 +107,13 @@ def test_what_is_missing_is_a_warning_and_the_shapes_are_drawn(
     if content is not None:
         (tmp_path / "a.obj").write_text(content)
     robot = with_look(tmp_path, "a.obj")
-    meshes = read_meshes(robot)
-    assert meshes.surfaces == {}
-    (problem,) = meshes.problems
+    surfaces = robot_surfaces(robot)
+    assert surfaces.links == {}
+    (problem,) = surfaces.problems
     assert re.match(told.replace("base", robot.base), problem)
     assert missing_meshes(robot) == ([problem] if content is None else [])
-    drawn = drawn_link(robot, robot.link(robot.base), meshes, 0x90A4AEFF)
+    drawn = drawn_link(robot, robot.link(robot.base), surfaces, 0x90A4AEFF)
     assert [type(each) for each in drawn.values()] == [rr.Capsules3D]
-
-
-@needs_robots
-@pytest.mark.parametrize("name", ["g1", "go2", "talos"])
-def test_a_published_robot_takes_little_of_a_recording(name: str) -> None:
-    robot = find_robot(name)
-    meshes = read_meshes(robot)
-    assert meshes.problems == [] and len(meshes.surfaces) == len(robot.links)
-    assert sum(len(each.triangles) for each in meshes.surfaces.values()) <= MOST_TRIANGLES
-    bytes_ = sum(24 * len(s.corners) + 12 * len(s.triangles) for s in meshes.surfaces.values())
-    assert bytes_ < 600_000
 
 
 @pytest.mark.long

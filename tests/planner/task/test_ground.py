@@ -95,11 +95,20 @@ def test_the_score_is_told_what_the_ground_rises_under_the_feet_alone() -> None:
     assert built(distance_x=0.2, jumps=level_again).uneven == 0.0
 
 
-def test_no_robot_is_put_down_where_the_ground_leans() -> None:
-    with pytest.raises(
-        JumpTaskError, match="slope: robots in simulation are put down on level ground"
-    ):
-        scene(distance_x=0.2, slope=["5 deg", 0])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"slope": ["5 deg", "-3 deg"]},
+        {"slope": ["-8 deg", 0], "distance_x": 0.2},
+        {"slope": [0, "8 deg"], "distance_x": 0.2, "landing_slope": [0, 0]},
+    ],
+)
+def test_a_start_where_the_ground_leans(values: dict[str, Any]) -> None:
+    task, ground = make_task({"name": "odd", "rise": 0.12, **values}), built(**values)
+    for place in task.places():
+        for x, y in ((0.0, 0.0), (0.06, 0.1), (-0.06, -0.1)):
+            at = place.x + x, place.y + y
+            assert ground.height(*at) == pytest.approx(float(place.height(*at)), abs=1e-6)
 
 
 def test_where_it_stood_the_ground_cannot_lean_otherwise() -> None:

@@ -1,0 +1,40 @@
+"""A library that only an extra brings is asked for in one line."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from aloft.planner.solving.solve import solve_jump
+from aloft.planner.task.read_task import read_task
+from aloft.robots.description import find_robot
+from aloft.ros2.node import NodeAddress, join
+from aloft.runtime.language.errors import MissingExtraError, need_extra
+from aloft.runtime.language.stages import MachineSpec
+from aloft.runtime.transports.zenoh_transport import ZenohTransport
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_what_is_there_is_not_asked_for() -> None:
+    need_extra("numpy", "plan", "counting")
+
+
+def test_planning_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = read_task(ROOT / "graphs" / "tasks" / "in_situ_12cm.yaml")
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    with pytest.raises(MissingExtraError) as raised:
+        solve_jump(task, find_robot("bruce"))
+    assert str(raised.value) == (
+        "planning a jump needs the library casadi: pip install 'aloft-robotics[plan]'"
+    )
+
+
+def test_links_and_topics_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    transport = ZenohTransport("test", [MachineSpec("a", "tcp/127.0.0.1:1")])
+    for use in (lambda: transport.open("a", print), transport.observe):
+        with pytest.raises(MissingExtraError, match=r"link .* 'aloft-robotics\[machines\]'"):
+            use()
+    with pytest.raises(MissingExtraError, match=r"topic of ROS 2 .* 'aloft-robotics\[ros2\]'"):
+        join(NodeAddress("tcp/127.0.0.1:1", 0, "", "n"))
