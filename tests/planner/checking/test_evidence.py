@@ -68,6 +68,15 @@ def test_the_standing_robot() -> None:
     ]  # fmt: skip
 
 
+def test_a_leg_that_ends_in_a_ball_counts_beyond_the_ball() -> None:
+    robot = find_robot("solo12")
+    place, turn = np.array([[0.0, 0.0, 0.5]]), np.array([[0.0, 0, 0, 1]])
+    pose = link_poses(robot, place, turn, np.zeros((1, len(robot.joints))))
+    heights = body_heights(robot, make_task({"name": "a", "rise": 0.1}), pose, np.zeros(1))
+    # The leg hangs straight down from the hips, 0.32 m long; its knee is halfway.
+    assert heights["FL_LOWER_LEG"][0] == pytest.approx(0.5 - 0.16 - 0.013, abs=0.02)
+
+
 def closest(first: list, second: list, k: int) -> float:  # type: ignore[type-arg]
     """The least distance between the capsules of two legs at an instant, by trying many points."""
     share = np.linspace(0.0, 1.0, 60)[:, None]

@@ -43,6 +43,12 @@ def test_nearly_the_same_is_made_the_same_and_no_more() -> None:
     assert sagittal_coordinates(SymbolicModel(askew(quadruped(), 0.05))) is None
 
 
+def test_a_small_products_sign_does_not_matter() -> None:
+    """ANYmal C's hips have a product of inertia of the other sign, 2 % of their largest moment."""
+    pairs = mirrored_pairs(find_robot("anymal_c"))
+    assert pairs is not None and [pair.limbs for pair in pairs] == [(0, 1), (2, 3)]
+
+
 def test_angles_that_are_almost_the_same() -> None:
     robot = quadruped()
     pairs = mirrored_pairs(robot) or ()

@@ -24,6 +24,24 @@ ROBOT = find_robot("bruce")
 MODEL = SymbolicModel(ROBOT)
 
 
+def test_the_last_link_of_a_leg_that_ends_in_a_ball_is_kept_off_a_step_by_its_upper_half() -> None:
+    robot = find_robot("go2")
+    model = SymbolicModel(robot)
+    coordinates = full_coordinates(model)
+    points = obstacle_points(model, coordinates)
+    ends = {foot.link: np.array(foot.sole) for foot in robot.feet}
+    shanks = [(np.array(place), link) for kind, (link, place), _ in points if kind == "shank"]
+    assert {link for _, link in shanks} == set(ends)
+    assert all(np.linalg.norm(place - ends[link]) > 0.1 for place, link in shanks)
+    rows = ObstacleRows(model, coordinates)
+    level = make_task({"robot": "go2", "name": "a", "rise": 0.1, "distance_x": 0.5})
+    step = level.model_copy(update={"landing_height": 0.08})
+    for task, edge, share in ((level, None, 0), (step, 0.25, len(shanks))):
+        stance = layout(task.resolved(robot), robot)[0]
+        found = rows.rows(task.hops()[0], edge, stance, False)
+        assert sum(points[k][0] == "shank" for k in found) == share
+
+
 def standing(x: float) -> np.ndarray:
     return np.concatenate([[x, 0.0, 0.3796, 0.0, 0.0, 0.0], ROBOT.standing_position])
 

@@ -4,6 +4,7 @@ import pytest
 from tests.robots.limbed_robots import quadruped
 
 from aloft.planner.task.recipe import choices, demand
+from aloft.planner.task.scaling import size_of
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import find_robot
 
@@ -178,6 +179,19 @@ def test_a_robot_without_soles_has_no_toe_phase() -> None:
     assert task.phases is None
     assert task.margins is not None
     assert task.margins.landing_limits, "it has knees all the same"
+
+
+def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:
+    soles, balls = find_robot("bruce"), quadruped()
+    chosen = {}
+    for robot in (soles, balls):
+        task = make_task({"name": "a", "rise": 0.12, "distance_x": 0.3, "landing_height": 0.05})
+        chosen[robot.name] = {c.parameter: c.value for c in choices(task, robot)}
+    slow = size_of(balls).slow
+    assert chosen["bruce"]["margins.touchdown_slide"] == pytest.approx(0.6, rel=0.02)
+    assert chosen[balls.name]["margins.touchdown_slide"] == pytest.approx(1.2 * slow, rel=0.02)
+    sag = chosen[balls.name]["margins.step"] - chosen["bruce"]["margins.step"]
+    assert sag == pytest.approx(0.04 * size_of(balls).height, abs=1e-3)
 
 
 def test_a_row_comes_to_balance_between_its_jumps_and_leaves_on_the_toes() -> None:
