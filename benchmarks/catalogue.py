@@ -18,6 +18,7 @@ from .background import background
 from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
+from .export import export
 from .frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.identification import identification
@@ -41,6 +42,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "loading": loading,
     "scheduler": scheduler,
     "general_blocks": general_blocks,
+    "export": export,
     "planner": planner,
     "recorder": recorder,
     "background": background,
@@ -65,8 +67,8 @@ LONG = (
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
-    "seconds": ("recorder", "background"),
-    "count": ("agreement", "jumps"),
+    "seconds": ("recorder", "background", "export"),
+    "count": ("agreement", "jumps", "export"),
     "seed": ("agreement", "jumps"),
     "seeds": (
         "jumps",
@@ -81,7 +83,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     ),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
-    "tsid": ("tick",),
+    "tsid": ("tick", "export"),
     "since": ("tick",),
     "arms": ("real_robot",),
     "robot": ("real_robot",),

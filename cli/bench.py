@@ -60,7 +60,8 @@ def bench(
     count: Annotated[
         int | None,
         typer.Option(
-            help="How many tasks 'jumps' draws (200), or programs 'agreement' (50000).", min=1
+            help="How many tasks 'jumps' draws (200), programs 'agreement' (50000), or ticks 'export' runs in C (1000000).",
+            min=1,
         ),
     ] = None,
     seed: Annotated[
@@ -79,7 +80,7 @@ def bench(
         str, typer.Option(help="The share of messages that 'link_delays' loses: '5 %'.")
     ] = "",
     tsid: Annotated[
-        str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick'.")
+        str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick' and 'export'.")
     ] = "",
     since: Annotated[
         str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")

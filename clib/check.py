@@ -52,7 +52,7 @@ def check(description: Path, recording: Path) -> Checked:
     about = json.loads(description.read_text(encoding="utf-8"))
     run = read(recording)
     _expect_fitting(about, run)
-    steps = _inputs(about, run)
+    steps = input_rows(about, run.header.bus.layout(), run.rows)
     memories, step = _run(description, about, steps)
     codes = memories[:, 8:12].copy().view(np.int32)[:, 0]
     counts = {Status(int(c)).name: int(np.sum(codes == c)) for c in np.unique(codes) if c}
@@ -99,11 +99,12 @@ def _expect_fitting(about: Mapping[str, Any], run: RecordedRun) -> None:
         raise AloftError(f"{run.path} is of another graph; it has no {', '.join(missing[:5])}")
 
 
-def _inputs(about: Mapping[str, Any], run: RecordedRun) -> NDArray[np.uint8]:
-    """The struct of the inputs in every tick, (ticks, bytes)."""
-    data = np.zeros((len(run.ticks), about["input_bytes"]), np.uint8)
+def input_rows(
+    about: Mapping[str, Any], layout: Layout, rows: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """The struct of the inputs in every tick, (ticks, bytes), from the bus of each, (ticks, bus bytes)."""
+    data = np.zeros((len(rows), about["input_bytes"]), np.uint8)
     targets = views(data, about["inputs"])
-    layout, rows = run.header.bus.layout(), run.rows
     for each in about["inputs"]:
         targets[each["name"]][...] = layout.view(rows, each["source"])
     return data
@@ -149,15 +150,7 @@ def _program(description: Path, about: Mapping[str, Any], folder: Path) -> list[
         sizes = [str(about[f"{each}_bytes"]) for each in ("memory", "input", "output")]
         driver = str(_DRIVERS / "driver.mjs")
         return [*target.runner, driver, str(description.with_suffix(".wasm")), name, *sizes]
-    (folder / "library.h").write_text(
-        f'#include "{name}.h"\n'
-        + "".join(
-            f"#define lib_{each} {name}_{each}\n" for each in ("init", "step", "inputs", "outputs")
-        )
-        + f"#define LIB {name}\n#define LIB_MEMORY_SIZE {about['memory_bytes']}\n"
-        + f"#define LIB_INPUT_SIZE {about['input_bytes']}\n",
-        encoding="utf-8",
-    )
+    write_names(about, folder)
     source, made = description.parent.resolve(), folder / "driver"
     command = [
         linker, "-O1", "-static", f"-I{source}", f"-I{folder}", str(_DRIVERS / "driver.c"),
@@ -167,6 +160,21 @@ def _program(description: Path, about: Mapping[str, Any], folder: Path) -> list[
     if done.returncode:
         raise AloftError(f"{linker} fails: {done.stderr.strip()}")
     return [*target.runner, str(made)]
+
+
+def write_names(about: Mapping[str, Any], folder: Path) -> None:
+    """Write ``library.h``, by which a program in C calls any library: ``lib_step`` and so on."""
+    name = about["name"]
+    (folder / "library.h").write_text(
+        f'#include "{name}.h"\n'
+        + "".join(
+            f"#define lib_{each} {name}_{each}\n"
+            for each in ("init", "reset", "step", "inputs", "outputs")
+        )
+        + f"#define LIB {name}\n#define LIB_MEMORY_SIZE {about['memory_bytes']}\n"
+        + f"#define LIB_INPUT_SIZE {about['input_bytes']}\n",
+        encoding="utf-8",
+    )
 
 
 def _first_difference(

@@ -35,6 +35,7 @@ from result_tables import (
     ground_table,
     impulse_table,
     quarter_table,
+    ratio_table,
     real_table,
     results_sentence,
     results_table,
@@ -308,6 +309,11 @@ def write_late(file: Path) -> None:
     refresh(DOCS / "real_robots.md", "late", effects_table(read_json(file)["rows"]))
 
 
+def write_export(file: Path) -> None:
+    """How long a tick of the exported library takes."""
+    refresh(DOCS / "c_library.md", "export", ratio_table(read_json(file)))
+
+
 def write_tick(file: Path) -> None:
     """How long a tick takes, with a picture, and some of it in README."""
     found = read_json(file)
@@ -339,6 +345,7 @@ PAGES = {
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
     "excerpts": Page(write_excerpts),
+    "export": Page(write_export, "aloft bench export --tsid FOLDER --json > FILE", "FILE"),
     "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),

@@ -331,7 +331,6 @@ REACHED, FLOOR, MISSED = "goal reached", "floor reached", "missed"
 
 def tick_tables(found: Row) -> str:
     """What was measured, the picture, and two tables: of blocks, and of ratios."""
-    machine, load = found["machine"], found["load"]
     rows: Sequence[Row] = found["rows"]
     blocks = {prefix: _blocks(rows, prefix) for prefix, _ in BARS}
     shown = [(prefix, label) for prefix, label in BARS if blocks[prefix]]
@@ -341,12 +340,24 @@ def tick_tables(found: Row) -> str:
     ]
     ratios = [_ratio(row) for row in rows if not row["name"].startswith(tuple(blocks))]
     return (
-        f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}; load before "
-        f"{load['before'][0]:g}, after {load['after'][0]:g}. Ratios bear load well, times do not.\n\n"
+        f"{_circumstances(found)}\n\n"
         f"![The blocks of one tick in all tiers]({TICK_PICTURE})\n\n"
         + table(("median [us]", *(label for _, label in shown)), times)
         + "\n"
         + table(TICK_HEAD, ratios)
+    )
+
+
+def ratio_table(found: Row) -> str:
+    """What was measured, and one row each."""
+    return f"{_circumstances(found)}\n\n" + table(TICK_HEAD, map(_ratio, found["rows"]))
+
+
+def _circumstances(found: Row) -> str:
+    machine, load = found["machine"], found["load"]
+    return (
+        f"{machine['processor']}, {machine['cores']} cores, Python {machine['python']}; load before "
+        f"{load['before'][0]:g}, after {load['after'][0]:g}. Ratios bear load well, times do not."
     )
 
 

@@ -128,6 +128,7 @@ def checked_cells(
             add.add(
                 Code.MISSING_KEY, f"graph {task.path} has no parameter called 'seed'", task.where,
                 at=task.name, expected="a block whose parameter 'seed' makes runs differ",
+                fix="noise: {use: blocks.WhiteNoise, with: {std: 0.1, seed: 0}}",
             )  # fmt: skip
             problems.update(dict.fromkeys(add.report("").problems))
             continue

@@ -102,7 +102,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "studies": ("processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
     "analysis": ("mathematics", "robots", "runtime", "blocks/signals", "logs", "plotting"),
     "benchmarks": (
-        "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
+        "clib", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
     ),
     "cli": PACKAGES,
     "graphs": (),

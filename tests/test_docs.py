@@ -1,5 +1,6 @@
 """The documentation is true: its files work as they stand, its links lead somewhere."""
 
+import json
 import re
 import subprocess
 import sys
@@ -80,6 +81,18 @@ def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:
     # a proportional controller follows a slow sine with a lag of 1 / gain
     error = result.signal("error.y.value")
     assert 0.1 < abs(error[-100:]).max() < 1.0
+
+
+def test_the_first_study_on_its_page_tells_three_filters_apart(tmp_path: Path) -> None:
+    for name, text in FILE.findall((ROOT / "docs" / "studies.md").read_text()):
+        (tmp_path / name).write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-m", "aloft", "study", "filters.yaml", "--json"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
+    rows = json.loads(done.stdout.splitlines()[-1])["rows"]
+    assert [row["n"] for row in rows] == [10, 10, 10]
+    assert [row["rate"] for row in rows] == [0.0, 0.9, 0.0]
 
 
 def test_a_task_of_the_users_own_is_used_by_the_whole_body_controller(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ ROOT = Path(__file__).parent.parent
 PLACES = {
     "README.md": ("results", "tasks", "tick"),
     "docs/bring_up.md": ("twin",),
+    "docs/c_library.md": ("export",),
     "docs/compiled.md": ("tick",),
     "docs/frontier.md": ("frontier",),
     "docs/landing.md": tuple(

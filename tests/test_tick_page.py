@@ -44,6 +44,13 @@ def test_the_tables(script: ModuleType) -> None:
     assert "| period | 100 us |  |  | 250 us | 50 us | floor reached |" in page
 
 
+def test_the_table_of_a_benchmark_without_blocks(script: ModuleType) -> None:
+    page = script.ratio_table(FOUND)
+    assert page.startswith("Quick, 2 cores, Python 3.11; load before 0.5, after 0.75. Ratios bear")
+    assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in page
+    assert "| block wbc | 20 us |" in page
+
+
 def test_readme_has_its_rows_and_all_that_miss_their_goal(script: ModuleType) -> None:
     one, *_ = script.README_TICK
     rows = [

@@ -90,22 +90,33 @@ function shapeOf(kind, size) {
 
 function build(world) {
   for (const part of parts) scene.remove(part.mesh);
-  const { model } = world;
+  const { model, about } = world;
   parts = [];
-  for (let k = 0; k < model.ngeom; k += 1) {
-    const kind = model.geom_type[k];
-    if (kind === PLANE) continue;
-    const size = model.geom_size.slice(3 * k, 3 * k + 3);
-    const name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM.value, k) ?? "";
-    const side = Object.keys(SIDES).find((each) => name.startsWith(each));
-    const material = new THREE.MeshStandardMaterial({
-      color: side ? SIDES[side] : 0x59636e, roughness: 0.55, metalness: 0.1,
-    });
-    const mesh = new THREE.Mesh(shapeOf(kind, size), material);
+  const add = (shape, color, number, of) => {
+    const material = new THREE.MeshStandardMaterial({ color, roughness: 0.55, metalness: 0.1 });
+    const mesh = new THREE.Mesh(shape, material);
     mesh.castShadow = true;
     mesh.matrixAutoUpdate = false;
     scene.add(mesh);
-    parts.push({ mesh, number: k, robot: model.geom_bodyid[k] !== 0 });
+    parts.push({ mesh, number, of });
+  };
+  const drawn = new Set();
+  for (const { body, corners, triangles, color } of about.looks) {
+    const shape = new THREE.BufferGeometry();
+    shape.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+    shape.setIndex(triangles);
+    shape.computeVertexNormals();
+    const number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY.value, body);
+    drawn.add(number);
+    add(shape, color ?? 0x59636e, number, "body");
+  }
+  for (let k = 0; k < model.ngeom; k += 1) {
+    const kind = model.geom_type[k];
+    if (kind === PLANE || drawn.has(model.geom_bodyid[k])) continue;
+    const size = model.geom_size.slice(3 * k, 3 * k + 3);
+    const name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM.value, k) ?? "";
+    const side = Object.keys(SIDES).find((each) => name.startsWith(each));
+    add(shapeOf(kind, size), side ? SIDES[side] : 0x59636e, k, "geom");
   }
 }
 
@@ -127,8 +138,9 @@ function point(helper, from, vector, scale) {
 }
 
 function draw(world) {
-  const { geom_xpos: place, geom_xmat: turn } = world.data;
-  for (const { mesh, number } of parts) {
+  const { geom_xpos, geom_xmat, xpos, xmat } = world.data;
+  for (const { mesh, number, of } of parts) {
+    const [place, turn] = of === "body" ? [xpos, xmat] : [geom_xpos, geom_xmat];
     const [a, b] = [3 * number, 9 * number];
     mesh.matrix.set(
       turn[b], turn[b + 1], turn[b + 2], place[a], turn[b + 3], turn[b + 4], turn[b + 5], place[a + 1],

@@ -24,11 +24,12 @@ from aloft.clib.cut import Cut
 from aloft.clib.module import Module
 from aloft.clib.part import NeedsPython, Part, needs_python
 from aloft.clib.targets import TARGETS, compile_module, link
-from aloft.hal.simulated.mujoco_model import mujoco_spec
+from aloft.hal.simulated.mujoco_model import body_name, mujoco_spec
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.compiling.library_call import LibraryCall
+from aloft.robots.surfaces import robot_surfaces
 from aloft.runtime.loading.load import load
 from aloft.runtime.running.memory import BoundGraph
 
@@ -185,10 +186,20 @@ def write_world(
             key: [module.image.place(array)[1], str(array.dtype), array.size]
             for key, array in base.arrays.items()
         },
-        "phases": {int(each): each.name.lower() for each in Phase},
+        "looks": _looks(base), "phases": {int(each): each.name.lower() for each in Phase},
     }  # fmt: skip
     (to / f"{name}.json").write_text(json.dumps(about), encoding="utf-8")
     return about
+
+
+def _looks(world: World) -> list[dict[str, Any]]:
+    """The surfaces of the robot's links: the body, corners [m, its frame], triangles, colour 0xRRGGBB."""
+    return [
+        {"body": body_name(link), "corners": part.corners.round(4).ravel().tolist(),
+         "triangles": part.triangles.ravel().tolist(), "color": part.color}
+        for link, parts in robot_surfaces(world.plant._robot).links.items()
+        for part in parts
+    ]  # fmt: skip
 
 
 def _places(world: World, fields: Sequence[str]) -> dict[str, list[int]]:

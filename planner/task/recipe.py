@@ -75,6 +75,8 @@ LANDING_EFFORT = 1.0
 """From touchdown on, where the toes land first: balance takes over there, and the plan is not followed."""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
+HIGH_AND_FAR = (0.42, 0.6)
+"""Rise and distance ahead, as multiples of that height, beyond both of which the same holds."""
 STEP_LEAN = 0.85
 """rad, in front of a step, whatever its distance."""
 
@@ -253,7 +255,10 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     # Only for a single jump: in a row nothing squats that deep in front of a step.
     onto = max(0.0, hops[0].landing_height or 0.0) if len(hops) == 1 else 0.0
     far = max(abs(hop.distance_x or 0.0) for hop in hops) / size_of(robot).height
-    if "squat_lean" not in said and far > FAR:
+    high, ahead = (limit * size_of(robot).height for limit in HIGH_AND_FAR)
+    both = any((hop.rise or 0.0) > high and (hop.distance_x or 0.0) > ahead for hop in hops)
+    lies_down = far > FAR or (both and not onto)
+    if "squat_lean" not in said and lies_down:
         why = f"{far:.2g} times the centre of mass's height ahead; without it the torso lies down"
         yield Choice("margins.squat_lean", SQUAT_LEAN, why)
     elif "squat_lean" not in said and onto:

@@ -144,7 +144,7 @@ def test_bench_refuses_an_unknown_name(call_json: CallJson) -> None:
     result = call_json("bench", "sheduler", code=2)
     assert result["reason"].startswith("there is no benchmark 'sheduler'; there is tick, startup")
     result = call_json("bench", "scheduler", "--seconds", "5", code=2)
-    assert result["reason"] == "--seconds is for recorder, background, not for scheduler"
+    assert result["reason"] == "--seconds is for recorder, background, export, not for scheduler"
 
 
 def test_bench_prints_rows_and_exits_by_the_goals(

@@ -102,6 +102,24 @@ def test_the_example_builds_without_a_warning(written: Path, tmp_path: Path, com
 
 
 @needs_compiler
+def test_the_rust_of_the_page_calls_the_library(written: Path, tmp_path: Path) -> None:
+    if not shutil.which("rustc"):
+        pytest.skip("there is no rustc")
+    page = (Path(aloft.__file__).parent / "docs" / "c_library.md").read_text(encoding="utf-8")
+    (tmp_path / "caller.rs").write_text(page.partition("```rust\n")[2].partition("```")[0])
+    command = ["rustc", "--edition", "2021", "-D", "warnings", "-L", written.parent, "caller.rs"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True)
+    library = Library(written)
+    for tick, line in enumerate(done.stdout.splitlines()):
+        library.inputs["wish"][...], library.inputs["measured"][...] = 1.0, 0.1 * tick
+        library.step()
+        names = ("force", "long_ago")
+        assert [float(x) for x in line.split()] == [library.outputs[n].item() for n in names]
+    assert tick == 9 and library.outputs["force"].item() != 0.0
+
+
+@needs_compiler
 def test_a_library_needs_nothing_of_the_system_but_memory_and_mathematics(written: Path) -> None:
     listed = subprocess.run(
         ["nm", written.with_suffix(".o")], capture_output=True, text=True, check=True

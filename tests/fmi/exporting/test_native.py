@@ -185,6 +185,71 @@ def test_its_sources_make_the_same_binary_by_another_tool(
     unit.close()
 
 
+CALLER = """\
+#include <stdio.h>
+#include "fmi3Functions.h"
+
+int main(void)
+{
+    fmi3ValueReference in[] = {%(inputs)s}, out = %(output)s;
+    fmi3Boolean event, end, early;
+    fmi3Float64 last, given[4], found[2];
+    fmi3Instance unit = fmi3InstantiateCoSimulation(
+        "one", "%(token)s", "", fmi3False, fmi3False, fmi3False, fmi3False, NULL, 0, NULL, NULL, NULL);
+    if (!unit || fmi3EnterInitializationMode(unit, fmi3False, 0.0, 0.0, fmi3False, 0.0) ||
+        fmi3ExitInitializationMode(unit))
+        return 1;
+    for (int k = 0; k < 200; ++k) {
+        for (int j = 0; j < 4; ++j)
+            given[j] = (k * (j + 3) %% 17 + k) / 65536.0;
+        if (fmi3SetFloat64(unit, in, 2, given, 4) ||
+            fmi3DoStep(unit, k / 500.0, 1 / 500.0, fmi3True, &event, &end, &early, &last) ||
+            fmi3GetFloat64(unit, &out, 1, found, 2))
+            return 2;
+        printf("%%a %%a\\n", found[0], found[1]);
+    }
+    fmi3FreeInstance(unit);
+    return 0;
+}
+"""
+
+
+def test_its_sources_compute_the_same_bytes_on_aarch64(folder: Path, tmp_path: Path) -> None:
+    linker, emulator = "aarch64-linux-gnu-gcc", ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu")
+    for each in (linker, emulator[0]):
+        if not shutil.which(each):
+            pytest.skip(f"there is no {each}")
+    fmpy.extract(str(folder / "pd3.fmu"), str(tmp_path))
+    described = fmpy.read_model_description(str(tmp_path))
+    numbers = {each.name: each.valueReference for each in described.modelVariables}
+    names = {
+        "inputs": f"{numbers['wish']}, {numbers['measured']}",
+        "output": numbers["force"],
+        "token": described.instantiationToken,
+    }
+    sources = tmp_path / "sources"
+    (sources / "caller.c").write_text(CALLER % names)
+    files = [each.name for each in sources.glob("*.c")]
+    said = []
+    for compiler, runner in (("cc", ()), (linker, emulator)):
+        made = tmp_path / compiler
+        command = [
+            compiler,
+            "-O2",
+            "-std=gnu11",
+            "-ffp-contract=off",
+            *files,
+            "-lm",
+            "-o",
+            str(made),
+        ]
+        subprocess.run(command, cwd=sources, check=True)
+        done = subprocess.run([*runner, str(made)], check=True, capture_output=True, text=True)
+        said.append(done.stdout.splitlines())
+    assert said[0] == said[1] and len(said[0]) == 200
+    assert len(set(said[0])) > 100  # no constant, and not always at the bound
+
+
 def test_nothing_is_missing_of_the_standard(folder: Path, tmp_path: Path) -> None:
     """Every function that the headers of the standard declare for an FMU is in its binary."""
     headers = Path(fmpy.__file__).parent / "c-code"

@@ -113,6 +113,11 @@ def test_far_jumps_keep_the_torso_off_the_thighs() -> None:
     far = resolved(distance_x=0.5, twist=0.0)
     assert far.margins is not None
     assert far.margins.squat_lean == 0.9
+    for rise, distance, lean in ((0.15, 0.3, 0.9), (0.12, 0.3, None), (0.15, 0.15, None)):
+        margins = resolved(rise=rise, distance_x=distance, twist=0.0).margins
+        assert margins is not None and margins.squat_lean == lean
+    back = resolved(rise=0.15, distance_x=-0.3, twist=0.0).margins
+    assert back is not None and back.squat_lean is None
 
 
 @pytest.mark.parametrize(
