@@ -80,7 +80,7 @@ def bench(
         str, typer.Option(help="The share of messages that 'link_delays' loses: '5 %'.")
     ] = "",
     tsid: Annotated[
-        str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick'.")
+        str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick' and 'export'.")
     ] = "",
     since: Annotated[
         str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")
