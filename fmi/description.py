@@ -151,7 +151,12 @@ def _read(path: Path, file: str) -> Any:
     if not read.fmiVersion.startswith(("2.", "3.")):
         raise BlockError(f"{file} is of FMI {read.fmiVersion}; FMI 2.0 and 3.0 are understood")
     if read.coSimulation is None:
-        raise BlockError(f"{file} is for model exchange only; an FMU for co-simulation is needed")
+        kinds = {
+            "model exchange": read.modelExchange,
+            "scheduled execution": read.scheduledExecution,
+        }
+        found = " and ".join(kind for kind, interface in kinds.items() if interface is not None)
+        raise BlockError(f"{file} is for {found} only; an FMU for co-simulation is needed")
     return read
 
 

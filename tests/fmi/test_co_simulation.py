@@ -9,6 +9,7 @@ import pytest
 
 import aloft
 from aloft.fmi.co_simulation import CoSimulation
+from aloft.fmi.description import describe
 from aloft.logs.file.reader import read
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import BlockError, RunError
@@ -171,6 +172,35 @@ def test_what_does_not_fit_is_reported_at_load(
 ) -> None:
     with pytest.raises(LoadError, match=message):
         aloft.load(folder / "graph.yaml", change)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "found"),
+    [
+        (["ScheduledExecution"], "for scheduled execution only"),
+        (
+            ["ModelExchange", "ScheduledExecution"],
+            "for model exchange and scheduled execution only",
+        ),
+    ],
+)
+def test_an_fmu_of_another_kind_is_refused_by_its_kind(
+    tmp_path: Path, kinds: list[str], found: str
+) -> None:
+    import zipfile
+
+    interfaces = "".join(f'<{kind} modelIdentifier="clocks"/>' for kind in kinds)
+    with zipfile.ZipFile(tmp_path / "clocks.fmu", "w") as file:
+        file.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="3.0" modelName="clocks" instantiationToken="{1}">'
+            f"{interfaces}<ModelVariables>"
+            '<Clock name="tick" valueReference="1" causality="input" intervalVariability="constant" '
+            'intervalDecimal="1.0"/>'
+            "</ModelVariables><ModelStructure/></fmiModelDescription>",
+        )
+    with pytest.raises(BlockError, match=f"clocks.fmu is {found}; an FMU for co-simulation"):
+        describe("clocks.fmu", tmp_path)
 
 
 def test_the_file_travels_in_the_recording_with_its_hash(folder: Path) -> None:
