@@ -86,11 +86,8 @@ class ExpressionTranslator:
         )
         self._fixed: dict[str, Value] = {}
         """Arguments to which nothing is assigned."""
-        self._assigned = {
-            n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-        }
+        self._assigned, self._only_counters = _assignments(tree)
         self._local = self._assigned | {each.arg for each in tree.args.args}
-        self._only_counters = _only_counters(tree)
 
     def _value(self, node: ast.expr) -> Value:
         with self._placed(node):
@@ -351,21 +348,12 @@ def _is_flag(node: ast.expr) -> bool:
     )
 
 
-def _only_counters(tree: ast.FunctionDef) -> set[str]:
-    """The names that only loops assign."""
-    counted = {
-        n.target.id
-        for n in ast.walk(tree)
-        if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
-    }
-    targets = {
-        id(n.target)
-        for n in ast.walk(tree)
-        if isinstance(n, ast.For) and isinstance(n.target, ast.Name)
-    }
-    others = {
-        n.id
-        for n in ast.walk(tree)
-        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store) and id(n) not in targets
-    } | {each.arg for each in tree.args.args}
-    return counted - others
+def _assignments(tree: ast.FunctionDef) -> tuple[set[str], set[str]]:
+    """The names that a function assigns, and those of them that only loops assign."""
+    nodes = list(ast.walk(tree))  # walked once: a walk is slow
+    counters = {id(node.target) for node in nodes if isinstance(node, ast.For)}
+    stored = [n for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    others = {name.id for name in stored if id(name) not in counters}
+    others.update(each.arg for each in tree.args.args)
+    assigned = {name.id for name in stored}
+    return assigned, assigned - others
