@@ -44,7 +44,8 @@ import tomllib
 
 with open("pyproject.toml", "rb") as file:
     told = tomllib.load(file)
-for text in told["project"]["dependencies"]:
+extras = told["project"]["optional-dependencies"]
+for text in [*told["project"]["dependencies"], *extras["plan"], *extras["machines"]]:
     name, oldest = re.match(r"([\w.-]+)>=([\d.]+)", text).groups()
     exact = f"{name}~={oldest}.0" if oldest.count(".") == 1 else f"{name}=={oldest}"
     print(exact if sys.argv[1] == "oldest" else text)
