@@ -266,7 +266,7 @@ UNUSED = {
     "aloft.blocks.scoring.jump_score.record_row": (
         BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
     ),
-    "aloft.blocks.scoring.jump_score.record_jump": (*ROW, True),
+    "aloft.blocks.scoring.jump_score.record_jump": (*ROW, *records({"ground_tolerance": 0.005}), True),
     "aloft.blocks.scoring.jump_score.compare_place": ROW,
     "aloft.blocks.scoring.jump_score.keep_place": (ROW[1],),
     "aloft.blocks.scoring.jump_score.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
@@ -365,6 +365,7 @@ UNUSED = {
             },
         ),
     ),
+    "aloft.robots.five_joint_leg.within_limits": (LEG, np.array([0.0, 0.1, -0.6, 1.2, -0.5])),
     "aloft.robots.five_joint_leg.keep_along": (
         np.array([0.0, 0.6, 0.8]), np.array([0.1, 0.2, 0.3]),
     ),
