@@ -158,10 +158,8 @@ def trim(
     if isinstance(graph, SteppedRun):
         go_to(graph, at, when)
         before = graph.snapshot()
-        search = None
         try:
-            search = _Search(graph, frees, holds, settle, tolerance)
-            found = search.solve()
+            found = _Search(graph, frees, holds, settle, tolerance).solve()
         except BaseException:
             graph.restore(before)
             raise
