@@ -155,7 +155,8 @@ class _Flight:
 
 def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     """The flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
-    angles, speeds, steps, times, knots = [], [], [], [], []
+    angles, speeds = list[Array](), list[Array]()
+    steps, times, knots = list[Array](), list[Array](), list[NDArray[np.int64]]()
     for k in range(lift_off, touchdown):
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
         duration = float(joints.duration)
@@ -190,7 +191,7 @@ def _defects(
     the ends of the lasting intervals."""
     reached, moving = plan.position[:-1, :7].copy(), plan.velocity[:-1, :6].copy()
     reached[lasting], moving[lasting] = places[:, :7], rates[:, :6]
-    for k in np.flatnonzero(np.diff(plan.time) <= 0.0):
+    for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist():
         moving[k] = dynamics.velocity_after_impact(
             plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
         )[0][:6]
@@ -220,7 +221,7 @@ def _sample(
     position = np.concatenate([plan.position, places])[order]
     velocity = np.concatenate([plan.velocity, rates])[order]
     joints = joint_motions(plan.position, plan.velocity, plan.time, interval)
-    lasts = joints.duration > 0.0
+    lasts = np.asarray(joints.duration > 0.0)
     joints = joints._replace(duration=np.where(lasts, joints.duration, 1.0))
     bend = joints.at((instant - plan.time[interval])[:, None])[2]
     force = np.where(lasts[:, :, None], plan.contact_force[interval], 0.0)

@@ -211,10 +211,10 @@ class ExactDynamics:
             len(position),
             len(self.sole_frames),
         )
-        found = FeetStates(
-            *np.empty((3, count, 3)), np.empty((count, len(self.contact_frames), 3)),
-            *np.empty((2, count, feet, 3)), *np.empty((2, count, feet)),
-        )  # fmt: skip
+        place, points = (count, 3), (count, len(self.contact_frames), 3)
+        of_feet, angle = (count, feet, 3), (count, feet)
+        shapes = (place, place, place, points, of_feet, of_feet, angle, angle)
+        found = FeetStates(*(np.empty(shape) for shape in shapes))
         jacobians = np.empty((count, feet, 6, model.nv))
         up = np.empty((count, feet, 3))
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
@@ -292,10 +292,19 @@ class ExactDynamics:
         bend = np.zeros((count, joints)) if bend is None else bend
         force = np.zeros((count, 0, 3)) if force is None else force
         given = GivenMotion(*map(np.ascontiguousarray, (position, velocity, bend, force)))
-        terms = MotionTerms(
-            *np.zeros((3, count, 3)), np.zeros((count, 6)), *np.zeros((3, count, *points)),
-            np.zeros((count, 6)), np.zeros((count, joints)),
-        )  # fmt: skip
+        place, of_points = (count, 3), (count, *points)
+        shapes = (
+            place,
+            place,
+            place,
+            (count, 6),
+            of_points,
+            of_points,
+            of_points,
+            (count, 6),
+            bend.shape,
+        )
+        terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
         _run(KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms))
         terms.torque[:] += bend @ self._rotors.T
         return terms
@@ -406,7 +415,7 @@ class ExactDynamics:
             2 * np.arange(1, len(steps) + 1) + of_step,
         )
         inertia, turn = seen.inertia[:, WHOLE], matrices_of_quaternions(base[:, 3:7])
-        inverse = np.linalg.inv(inertia)
+        inverse: Array = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
         arms = seen.points[:, : force.shape[1]] - seen.com[:, None]
         lever = np.einsum("nci,ncj->nij", arms, np.repeat(force, 2 * counts + 1, axis=0))
         # From the centre of a ball its lowest point is one radius down in the world.
@@ -466,7 +475,9 @@ def rotation_between(first: Array, second: Array) -> Array:
 def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
     """The joints of a plan between that knot and the next."""
     every = joint_motions(plan_position, plan_velocity, time, np.array([knot]))
-    return JointMotion(*(part[0] for part in every[:4]), float(time[knot + 1] - time[knot]))
+    start, end, before, after, _ = every
+    duration = float(time[knot + 1] - time[knot])
+    return JointMotion(start[0], end[0], before[0], after[0], duration)
 
 
 def joint_motions(
@@ -485,7 +496,7 @@ def half_steps(
     """The intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = joints.at(quarters)
+    angles, speeds, _ = joints.at(np.asarray(quarters))
     return [
         Stretch(
             position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
