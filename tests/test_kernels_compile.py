@@ -131,6 +131,7 @@ FAULTS = {
     "faults.lost": {"on": "robot.joints", "kind": "lost", "share": 0.3, "when": "phase.phase == STAND"},
     "faults.drift": {"on": "robot.imu.specific_force", "kind": "drifting", "value": 0.1},
     "faults.flip": {"on": "robot.command.torque", "kind": "flipped", "bit": 3, "share": 0.5},
+    "faults.chirp": {"on": "robot.joints.velocity", "kind": "chirp", "value": 0.01, "low": 5.0, "high": 50.0},
 }  # fmt: skip
 
 
