@@ -19,6 +19,7 @@ from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .export import export
+from .falsification import falsification
 from .frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.identification import identification
@@ -28,6 +29,7 @@ from .jumps.real_robot import real_robot
 from .links.link_delays import link_delays
 from .links.links import links
 from .loading import loading
+from .planner.online_plans import online_plans
 from .planner.planner import planner
 from .recorder import recorder
 from .rows import Row
@@ -42,8 +44,10 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "loading": loading,
     "scheduler": scheduler,
     "general_blocks": general_blocks,
+    "falsification": falsification,
     "export": export,
     "planner": planner,
+    "online_plans": online_plans,
     "recorder": recorder,
     "background": background,
     "links": links,
@@ -68,7 +72,7 @@ LONG = (
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background", "export"),
-    "count": ("agreement", "jumps", "export"),
+    "count": ("agreement", "jumps", "export", "online_plans"),
     "seed": ("agreement", "jumps"),
     "seeds": (
         "jumps",
