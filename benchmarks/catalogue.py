@@ -19,6 +19,7 @@ from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .export import export
+from .falsification import falsification
 from .frontier import frontier
 from .general_blocks import general_blocks
 from .jumps.identification import identification
@@ -42,6 +43,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "loading": loading,
     "scheduler": scheduler,
     "general_blocks": general_blocks,
+    "falsification": falsification,
     "export": export,
     "planner": planner,
     "recorder": recorder,

@@ -12,6 +12,7 @@ from ..runtime.running.run_result import RunResult
 from .batch.jobs import JobPool
 from .expansion import Cell, Job, job, seeded_graph
 from .journal import Journal, Outcome
+from .shared_start import shared_result
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,14 @@ class Run:
 def run_job(work: Job) -> Outcome:
     """Make one run, in the process that does the work.
 
-    A run that fails is an outcome, and so is a graph that cannot be set up.
+    Draws that differ in live parameters share their beginning, with the same bytes. A run that fails is an outcome, and so is a graph that cannot be set up.
 
     Raises:
         AloftError: the process was told to stop.
     """
     begin = perf_counter()
     try:
-        result = seeded_graph(work).run(log=False)
+        result = shared_result(work) or seeded_graph(work).run(log=False)
     except AloftError as error:
         text = str(error)
         return Outcome(False, text, error=text, wall_time_s=perf_counter() - begin)

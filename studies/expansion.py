@@ -43,6 +43,8 @@ class Cell:
     """The study's file, for which the graph is put together."""
     behind: tuple[Path, ...] = ()
     """The files that follow the graph."""
+    base: Mapping[str, Entry] | None = None
+    """Of a draw: the overrides before it was made, which all draws share."""
     key: str = ""
     """What the outcome depends on, but for the seed; set once the cell is checked."""
 
@@ -67,6 +69,8 @@ class Job:
     overrides: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
     behind: tuple[str, ...] = ()
+    drawn: Mapping[str, Any] = field(default_factory=dict)
+    """Overrides after all others; runs that differ in nothing else may share their beginning."""
 
 
 def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
@@ -161,20 +165,24 @@ def seeded_graph(work: Job) -> Graph:
     """
     graph, origin = Path(work.graph), Path(work.origin)
     include, behind = ([Path(file) for file in files] for files in (work.include, work.behind))
-    seeds = load_cell(graph, include, work.overrides, origin, behind).seed_parameters
-    seeded = {**work.overrides, **dict.fromkeys(seeds, work.seed)}
+    overrides = {**work.overrides, **work.drawn}
+    seeds = load_cell(graph, include, overrides, origin, behind).seed_parameters
+    seeded = {**overrides, **dict.fromkeys(seeds, work.seed)}
     return load_cell(graph, include, seeded, origin, behind)
 
 
 def job(cell: Cell, seed: int) -> Job:
     """A run of the cell, for another process."""
+    base = cell.sets if cell.base is None else cell.base
+    drawn = {k: plain(each.value) for k, each in cell.sets.items() if base.get(k) is not each}
     return Job(
         str(cell.graph.absolute()),
         tuple(str(file.absolute()) for file in cell.include),
         str(cell.origin.absolute()),
-        cell.overrides,
+        {key: plain(entry.value) for key, entry in base.items()},
         seed,
         tuple(str(file.absolute()) for file in cell.behind),
+        drawn,
     )
 
 

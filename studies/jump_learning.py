@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..mathematics.arrays import Array
 from ..mathematics.linear_algebra import inverse, product
+from ..mathematics.rotations import wrap
 from ..planner.library.learnt import LARGEST, Lesson, launch_of
 from ..planner.library.rehearsed import Vector
 from ..planner.task.plan import PlannedJump
@@ -136,8 +137,7 @@ def landing_error(signals: Signals, measured_place: tuple[float, float] | None) 
         turned = float(angles[0, 2] - planned[0, 2])  # where the robot looked at the start
         cos, sin = np.cos(turned), np.sin(turned)
         measured_place = (cos * x + sin * y, cos * y - sin * x)
-    yaw = float((angles[first, 2] - angles[0, 2]) - (planned[due, 2] - planned[0, 2]))
-    yaw = float(np.arctan2(np.sin(yaw), np.cos(yaw)))
+    yaw = wrap(float((angles[first, 2] - angles[0, 2]) - (planned[due, 2] - planned[0, 2])))
     tilt = np.clip([roll, pitch, yaw], -MOST_TILT, MOST_TILT)
     return np.array([measured_place[0] - ahead, measured_place[1] - left, *tilt])
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..mathematics.arrays import Array
 from ..mathematics.linear_algebra import inverse, product
+from ..mathematics.rotations import wrap
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..planner.task.plan import PlannedJump
 from ..runtime.graph import load
@@ -217,7 +218,7 @@ def touchdown_of(result: RunResult, allowed: Any) -> Touchdown:
     roll, pitch = 0.5 * (after.min(axis=0) + after.max(axis=0))[:2]
     due = min(int(np.searchsorted(time, landed)), len(time) - 1)
     turned = float(angles[first, 2] - planned[due, 2])
-    heading = float(np.arctan2(np.sin(turned), np.cos(turned)))
+    heading = wrap(turned)
     x, y = (float(metrics[f"jump_distance_{axis}_m"]) for axis in "xy")
     goal = allowed.distance if allowed.distance is not None else [x, y]
     off = np.array([x - goal[0], y - goal[1]])

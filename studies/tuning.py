@@ -171,7 +171,7 @@ def draw_runs(
     """The runs of one set of parameters on checked cells; ``where`` names it in errors."""
     found = []
     for cell in mine:
-        tried = cell.with_sets(values, Position(where, 0, 0))
+        tried = replace(cell.with_sets(values, Position(where, 0, 0)), base=cell.sets)
         if values:
             text = f"{cell.key} {text_of(dict(values))}"
             tried = replace(tried, key=hashlib.sha256(text.encode()).hexdigest()[:24])

@@ -9,10 +9,10 @@ from typing import Literal
 
 from ...mathematics.arrays import Array1D, Matrix3
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.elementary import atan2, cos, sin
+from ...mathematics.elementary import atan2
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import pitch_angle
+from ...mathematics.rotations import pitch_angle, wrap
 from ...robots.five_joint_leg import Leg, find_leg
 from ...robots.limb import chain_to
 from ...runtime.language.block import Context, Input, Output, State, UnmetRequirement
@@ -389,8 +389,7 @@ def excess_pitch(level: Matrix3, pitch: float) -> float:
     Args:
         level: the rotation of a level sole in the base's axes.
     """
-    error = atan2(level[2, 0], level[0, 0]) - pitch
-    return atan2(sin(error), cos(error))
+    return wrap(atan2(level[2, 0], level[0, 0]) - pitch)
 
 
 @kernel

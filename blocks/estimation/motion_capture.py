@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ...mathematics.elementary import atan2, cos, sin, sincos
+from ...mathematics.elementary import sincos
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import multiply, turn_about_vertical, yaw
+from ...mathematics.rotations import multiply, turn_about_vertical, wrap, yaw
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.context import Clock
 from ...runtime.language.errors import BlockError
@@ -162,7 +162,7 @@ class PlaceCorrection(Block):
             sine, cosine = sincos(history.turn)
             px = cosine * x - sine * y + history.offset[0]
             py = sine * x + cosine * y + history.offset[1]
-            history.turn += share * atan2(sin(error), cos(error))
+            history.turn += share * wrap(error)
             sine, cosine = sincos(history.turn)
             history.offset[0] = px + share * (place.position[0] - px) - (cosine * x - sine * y)
             history.offset[1] = py + share * (place.position[1] - py) - (sine * x + cosine * y)

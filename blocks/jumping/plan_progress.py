@@ -7,9 +7,9 @@ from typing import Literal
 
 from ...mathematics.arrays import Array1D, Array2D, Matrix3
 from ...mathematics.constants import GRAVITY
-from ...mathematics.elementary import atan2, cos, sin
+from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import pitch_angle
+from ...mathematics.rotations import pitch_angle, wrap
 from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -301,4 +301,4 @@ def turned_beyond(rotation: Matrix3, orientation: Array1D) -> float:
     of the planned ``orientation``, a quaternion x, y, z, w."""
     planned = pitch_angle(orientation)
     measured = atan2(-rotation[2, 0], rotation[0, 0])
-    return atan2(sin(measured - planned), cos(measured - planned))
+    return wrap(measured - planned)

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
-from ...mathematics.elementary import atan2, cos, sin, sincos
+from ...mathematics.elementary import sincos
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import mean_heading, turn_about_vertical
+from ...mathematics.rotations import mean_heading, turn_about_vertical, wrap
 from ...planner.library.jump_table import (
     FlightRotation,
     TableRows,
@@ -333,7 +333,7 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
         memory.kind = 0 if ahead > 0.0 else 1
     memory.asked[0] = ahead - memory.bias[memory.kind, 0]
     memory.asked[1] = aside - memory.bias[memory.kind, 1]
-    memory.asked[2] = atan2(sin(turn), cos(turn))
+    memory.asked[2] = wrap(turn)
     memory.asked[3] = memory.level - memory.before_level
 
 

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from enum import IntEnum
 from math import degrees, radians, sqrt
 
-from ...mathematics.elementary import atan2, cos, sin, sincos
+from ...mathematics.elementary import atan2, sincos
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import wrap
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import parameter
@@ -259,6 +260,6 @@ def measure_place(record: CourseRecord) -> None:
     record.place_error = sqrt(dx * dx + dy * dy)
     record.place_errors += record.place_error
     record.worst_place_error = max(record.worst_place_error, record.place_error)
-    record.worst_turn_error = max(record.worst_turn_error, abs(atan2(sin(turn), cos(turn))))
+    record.worst_turn_error = max(record.worst_turn_error, abs(wrap(turn)))
     record.measured = True
     record.jumps += 1

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from math import degrees, pi, radians
 
 from ...mathematics.arrays import Array2D
-from ...mathematics.elementary import atan2, cos, sin
+from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
+from ...mathematics.rotations import wrap
 from ...runtime.language.parameters import parameter
 from ...runtime.language.signals import Field, Signal
 from .standing import (
@@ -217,8 +218,7 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
     if turn is None and planned:
         turn = float(r.planned_yaw - r.planned_yaw_start)
     if turn is not None:
-        error = feet_turned(r) - turn
-        error = atan2(sin(error), cos(error))
+        error = wrap(feet_turned(r) - turn)
         yield (
             abs(error) <= c.yaw_tolerance,
             (

@@ -173,6 +173,11 @@ class Executor:
         )
         return replace(result, warnings=tuple(self._finish_sinks(result)))
 
+    def result(self, error: RunError | None = None) -> RunResult:
+        """The outcome so far of a run that is stepped; ``error`` is what has ended it."""
+        clock = self.bound.clock
+        return self._result(clock.tick, 0.0, error, [], Interrupts(clock, self.life))
+
     def _abandon(self, block: str, place: str, stack: str, interrupts: Interrupts) -> None:
         """End a run whose thread cannot be interrupted: the stop cycles go out from this thread,
         and unless somebody works at this interpreter, the process ends."""

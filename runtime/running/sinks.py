@@ -101,6 +101,16 @@ class RunHash:
     def close(self) -> None:
         """Nothing to do."""
 
+    def kept(self) -> RunHash:
+        """A copy of the hash so far, for ``go_on_from``."""
+        copy = RunHash()
+        copy._hash = self._hash.copy()
+        return copy
+
+    def go_on_from(self, kept: RunHash) -> None:
+        """Go back to what ``kept`` has given."""
+        self._hash = kept._hash.copy()
+
     def hexdigest(self) -> str:
         """The hash so far, 32 hexadecimal digits."""
         return self._hash.hexdigest()

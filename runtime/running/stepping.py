@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any, Self
 
@@ -19,11 +20,14 @@ from numpy.typing import NDArray
 
 from ..language.block import Block
 from ..language.errors import AloftError, RunError
+from ..language.parameter_change import Adjustment
 from ..language.signals import Signal
 from ..language.stages import CheckedGraph, ClockSpec
 from .executor import Executor
 from .life_cycle import LifeState
 from .memory import Snapshot
+from .run_result import RunResult
+from .sinks import Sink
 
 
 class SteppedRun:
@@ -35,11 +39,14 @@ class SteppedRun:
         RunError: a block could not be set up or started.
     """
 
-    def __init__(self, graph: CheckedGraph, *, plain: bool = False) -> None:
+    def __init__(
+        self, graph: CheckedGraph, *, plain: bool = False, sinks: Sequence[Sink] = ()
+    ) -> None:
         self.graph = graph
-        executor = Executor(
-            graph, clock=ClockSpec(), log=False, run_hash=False, timing=False, plain=plain
-        )
+        self._executor = executor = Executor(
+            graph, clock=ClockSpec(), sinks=sinks, log=False, run_hash=False, timing=False,
+            plain=plain,
+        )  # fmt: skip
         self._bound, self._life, self._ticker = executor.bound, executor.life, executor.ticker
         try:
             executor.start()
@@ -103,6 +110,23 @@ class SteppedRun:
     def reset(self) -> None:
         """Go back to the start: all signals and states are as they were before the first tick."""
         self.restore(self._first)
+
+    def change(self, adjustment: Adjustment) -> None:
+        """Change live parameters, from the next tick on; ``loading.adjust`` makes the adjustment.
+
+        Raises:
+            AloftError: a block refuses them, and all keep the old ones, or the run is closed.
+        """
+        self._must_be_open()
+        self._bound.parameters.apply(adjustment, self.tick)
+        self._ticker.refresh_chains()
+
+    def result(self, error: RunError | None = None) -> RunResult:
+        """The outcome of what has run so far, as of a run that ends here; ``error`` has ended it.
+
+        The stop cycles come after it.
+        """
+        return self._executor.result(error)
 
     def snapshot(self) -> Snapshot:
         """Everything that the graph remembers now."""

@@ -163,7 +163,7 @@ class Ticker:
                 if requests:
                     call = parameters.answer
                     parameters.answer(tick)
-                    self._refresh_chains()
+                    self.refresh_chains()
                 if wait is not None:
                     call = wait
                     late = wait(tick)
@@ -197,7 +197,8 @@ class Ticker:
             raise self._run_error(call, tick, error) from error
         return tick - first
 
-    def _refresh_chains(self) -> None:
+    def refresh_chains(self) -> None:
+        """Take over the calls of kernels that changed parameters have made anew, between two ticks."""
         for program in self.programs:
             for chain in program.chains:
                 chain.refresh()

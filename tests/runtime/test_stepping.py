@@ -9,6 +9,7 @@ import pytest
 
 from aloft import AloftError, Graph, GraphBuilder, LoadError, RunResult, load
 from aloft.runtime.language.errors import RunError
+from aloft.runtime.loading.checking.parameters import adjust
 
 LOOP = {
     "rate": "100 Hz",
@@ -73,6 +74,29 @@ def test_reset_and_snapshots_repeat_every_byte(graph: Graph) -> None:
         assert run.tick == 0
         run.step(10)
         assert run.snapshot() == again
+
+
+def test_live_parameters_change_between_steps_and_the_outcome_is_there_at_any_time(
+    graph: Graph,
+) -> None:
+    with graph.open() as run:
+        run.step(20)
+        before = run.snapshot()
+        run.step()
+        kept = run["place.y.value"]
+        run.restore(before)
+        noise = run.block("noise")
+        run.change(adjust({"noise": noise}, {"noise.std": 0.0}))
+        run.step(2)
+        assert not np.array_equal(run["place.y.value"], kept)
+        assert np.array_equal(run["sum.y.value"], [1.0, 1.0])
+        result = run.result()
+        assert (result.success, result.ticks, result.error) == (True, 22, None)
+        broken = run.result(RunError("it broke", block="noise", tick=3))
+        assert (broken.success, broken.reason) == (False, "it broke")
+        assert run.step() == 1  # the blocks live on
+    with pytest.raises(AloftError, match="this run is stopped"):
+        run.change(adjust({"noise": noise}, {"noise.std": 1.0}))
 
 
 def test_a_seed_changes_every_seed(graph: Graph) -> None:

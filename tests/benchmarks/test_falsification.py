@@ -1,0 +1,15 @@
+"""The benchmark of falsification: whole and shared runs have the same bytes, and its rows."""
+
+import pytest
+
+from aloft.benchmarks import falsification as benchmark
+
+pytest.importorskip("optuna")
+
+
+@pytest.mark.long
+def test_a_run_that_shares_its_beginning_costs_less() -> None:
+    whole, shared, all_runs = benchmark.falsification(rounds=3)
+    assert whole.value is not None and shared.value is not None and all_runs.value is not None
+    assert shared.ratio is not None and 0.0 < shared.ratio < 1.0
+    assert all_runs.unit == "min" and all_runs.goal == 15.0
