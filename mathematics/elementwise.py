@@ -109,18 +109,21 @@ def multiply(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def divide(a: Array1D, b: Array1D, out: Array1D) -> None:
-    out[:] = _divided(a, b)
+    for i in range(out.shape[0]):
+        out[i] = _divided(a[i], b[i])
 
 
 @kernel
 def remainder(a: Array1D, b: Array1D, out: Array1D) -> None:
     """With the sign of ``b``, as in Python."""
-    out[:] = _rest(a, b)
+    for i in range(out.shape[0]):
+        out[i] = _rest(a[i], b[i])
 
 
 @kernel
 def power(a: Array1D, b: Array1D, out: Array1D) -> None:
-    out[:] = _power(a, b)
+    for i in range(out.shape[0]):
+        out[i] = _power(a[i], b[i])
 
 
 @kernel
@@ -166,7 +169,8 @@ def choose(condition: Array1D, a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def absolute(a: Array1D, out: Array1D) -> None:
-    out[:] = abs(a)
+    for i in range(out.shape[0]):
+        out[i] = abs(a[i])
 
 
 @kernel
@@ -177,7 +181,8 @@ def sign(a: Array1D, out: Array1D) -> None:
 
 @kernel
 def reciprocal(a: Array1D, out: Array1D) -> None:
-    out[:] = _divided(1.0, a)
+    for i in range(out.shape[0]):
+        out[i] = _divided(1.0, a[i])
 
 
 @kernel
@@ -193,82 +198,98 @@ def square_root(a: Array1D, out: Array1D) -> None:
 
 @kernel
 def exponential(a: Array1D, out: Array1D) -> None:
-    out[:] = exp(a)
+    for i in range(out.shape[0]):
+        out[i] = exp(a[i])
 
 
 @kernel
 def logarithm(a: Array1D, out: Array1D) -> None:
-    out[:] = log(a)
+    for i in range(out.shape[0]):
+        out[i] = log(a[i])
 
 
 @kernel
 def logarithm_10(a: Array1D, out: Array1D) -> None:
-    out[:] = _logarithm_10(a)
+    for i in range(out.shape[0]):
+        out[i] = _logarithm_10(a[i])
 
 
 @kernel
 def sine(a: Array1D, out: Array1D) -> None:
-    out[:] = sin(a)
+    for i in range(out.shape[0]):
+        out[i] = sin(a[i])
 
 
 @kernel
 def cosine(a: Array1D, out: Array1D) -> None:
-    out[:] = cos(a)
+    for i in range(out.shape[0]):
+        out[i] = cos(a[i])
 
 
 @kernel
 def tangent(a: Array1D, out: Array1D) -> None:
-    out[:] = _tangent(a)
+    for i in range(out.shape[0]):
+        out[i] = _tangent(a[i])
 
 
 @kernel
 def arc_sine(a: Array1D, out: Array1D) -> None:
-    out[:] = _arc_sine(a)
+    for i in range(out.shape[0]):
+        out[i] = _arc_sine(a[i])
 
 
 @kernel
 def arc_cosine(a: Array1D, out: Array1D) -> None:
-    out[:] = acos(a)
+    for i in range(out.shape[0]):
+        out[i] = acos(a[i])
 
 
 @kernel
 def arc_tangent(a: Array1D, out: Array1D) -> None:
-    out[:] = atan2(a, 1.0)
+    for i in range(out.shape[0]):
+        out[i] = atan2(a[i], 1.0)
 
 
 @kernel
 def angle(y: Array1D, x: Array1D, out: Array1D) -> None:
-    out[:] = atan2(y, x)
+    for i in range(out.shape[0]):
+        out[i] = atan2(y[i], x[i])
 
 
 @kernel
 def hyperbolic_sine(a: Array1D, out: Array1D) -> None:
-    out[:] = _hyperbolic_sine(a)
+    for i in range(out.shape[0]):
+        out[i] = _hyperbolic_sine(a[i])
 
 
 @kernel
 def hyperbolic_cosine(a: Array1D, out: Array1D) -> None:
-    out[:] = _hyperbolic(a, 1.0)
+    for i in range(out.shape[0]):
+        out[i] = _hyperbolic(a[i], 1.0)
 
 
 @kernel
 def hyperbolic_tangent(a: Array1D, out: Array1D) -> None:
-    out[:] = tanh(a)
+    for i in range(out.shape[0]):
+        out[i] = tanh(a[i])
 
 
 @kernel
 def hypotenuse(a: Array1D, b: Array1D, out: Array1D) -> None:
-    out[:] = hypot(a, b)
+    for i in range(out.shape[0]):
+        out[i] = hypot(a[i], b[i])
 
 
 @kernel
 def least(a: Array1D, b: Array1D, out: Array1D) -> None:
-    out[:] = min(a, b)
+    for i in range(out.shape[0]):
+        out[i] = min(a[i], b[i])
 
 
 @kernel
 def greatest(a: Array1D, b: Array1D, out: Array1D) -> None:
-    out[:] = max(a, b)
+    for i in range(out.shape[0]):
+        out[i] = max(a[i], b[i])
 
 
 @kernel
