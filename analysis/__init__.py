@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .branching import branch
     from .explanation import Explanation, explain
+    from .frequency_response import FrequencyResponse, frequency_responses
     from .linearisation import Linearisation, linearise
     from .locus import RootLocus, root_locus
     from .loop_margins import Margins, margins
@@ -17,6 +18,8 @@ _HOMES = {
     "branch": "branching",
     "Explanation": "explanation",
     "explain": "explanation",
+    "FrequencyResponse": "frequency_response",
+    "frequency_responses": "frequency_response",
     "Linearisation": "linearisation",
     "linearise": "linearisation",
     "Margins": "loop_margins",
@@ -28,8 +31,8 @@ _HOMES = {
 }
 
 __all__ = [
-    "Explanation", "Linearisation", "Margins", "RootLocus", "Trim", "branch", "explain", "linearise",
-    "margins", "root_locus", "trim",
+    "Explanation", "FrequencyResponse", "Linearisation", "Margins", "RootLocus", "Trim", "branch", "explain",
+    "frequency_responses", "linearise", "margins", "root_locus", "trim",
 ]  # fmt: skip
 
 

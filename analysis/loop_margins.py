@@ -23,7 +23,10 @@ from ..runtime.language.errors import AloftError
 from .linearisation import Linearisation, import_control, sorted_poles
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from .frequency_response import FrequencyResponse
 
 POINTS = 1000
 """Frequencies at which the response is computed, evenly in their logarithm."""
@@ -111,8 +114,7 @@ def margins(model: Linearisation) -> Margins:
     samples = len(model.inputs) / len(names)  # in a period
     highest = np.log10(np.pi * samples / model.period)
     w = np.logspace(highest - DECADES, highest, POINTS)[:-1]
-    transfer = model.response(w)
-    loops = -_each_alone(transfer)
+    transfer, loops = model.response(w), loop_responses(model, w)
     return Margins(
         {name: _of_channel(w, loops[:, k]) for k, name in enumerate(names)},
         _of_all(w, transfer),
@@ -122,6 +124,12 @@ def margins(model: Linearisation) -> Margins:
         w,
         loops,
     )
+
+
+def loop_responses(model: Linearisation, w: Array) -> Any:
+    """The transfer of each channel of an opened wire with the others closed, negative feedback, (frequencies, n), at
+    frequencies in rad/s."""
+    return -_each_alone(model.response(w))
 
 
 def _each_alone(transfer: Any) -> Any:
@@ -199,8 +207,16 @@ def _margins(
     )  # fmt: skip
 
 
-def margins_figure(found: Margins, title: str, names: Sequence[str] = ()) -> Figure:
-    """The Bode and Nyquist diagrams of all channels, or of some, each with the others closed."""
+def margins_figure(
+    found: Margins,
+    title: str,
+    names: Sequence[str] = (),
+    measured: Mapping[str, FrequencyResponse] | None = None,
+) -> Figure:
+    """The Bode and Nyquist diagrams of all channels, or of some, each with the others closed.
+
+    What was ``measured`` of a channel is drawn as points, with bars of 95 % where that is less than the value.
+    """
     from ..plotting import COLOURS, FAINT, new_figure
 
     figure = new_figure(9.0, 4.5, title)
@@ -215,6 +231,9 @@ def margins_figure(found: Margins, title: str, names: Sequence[str] = ()) -> Fig
         gain.semilogx(hertz, 20.0 * np.log10(np.abs(loop)), color=colour, label=name)
         phase.semilogx(hertz, np.degrees(np.unwrap(np.angle(loop))), color=colour)
         nyquist.plot(loop.real, loop.imag, color=colour)
+        points = (measured or {}).get(name)
+        if points is not None:
+            _draw_measured(points, loop, hertz, gain, phase, colour)
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     nyquist.plot(circle.real, circle.imag, color=FAINT, linewidth=0.7)
     nyquist.plot([-1.0], [0.0], "+", color=FAINT)
@@ -225,3 +244,20 @@ def margins_figure(found: Margins, title: str, names: Sequence[str] = ()) -> Fig
     if len(gain.lines) > 1:
         gain.legend(fontsize=6.0)
     return figure
+
+
+def _draw_measured(
+    points: FrequencyResponse, loop: Any, hertz: Array, gain: Axes, phase: Axes, colour: str
+) -> None:
+    """Points with bars, each phase on the turn of the model's curve."""
+    sure = points.radius < np.abs(points.value)
+    size, share = np.abs(points.value), np.where(sure, points.radius / np.abs(points.value), 0.0)
+    bars = 20.0 * np.log10(np.array([1.0 / (1.0 - share), 1.0 + share]))
+    style = {"fmt": ".", "color": colour, "markersize": 3.0, "elinewidth": 0.7}
+    gain.errorbar(points.frequency, 20.0 * np.log10(size), yerr=bars, **style)
+    model = np.interp(points.frequency, hertz, np.degrees(np.unwrap(np.angle(loop))))
+    angle = np.degrees(np.angle(points.value))
+    angle = angle + 360.0 * np.round((model - angle) / 360.0)
+    phase.errorbar(
+        points.frequency[sure], angle[sure], yerr=np.degrees(np.arcsin(share[sure])), **style
+    )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
-    from ..analysis import Linearisation, Margins, RootLocus
+    from ..analysis import FrequencyResponse, Linearisation, Margins, RootLocus
 
+Number = TypeVar("Number", int, float)
 MOST_POLES = 12
 
 
@@ -44,6 +46,24 @@ def linearise(
         typer.Option(help="The poles over one parameter and its range: pd.kp=10:200, 20 values."),
     ] = "",
     steps: Annotated[int, typer.Option(min=2, help="With --locus: how many values.")] = 20,
+    chirp: Annotated[
+        str,
+        typer.Option(
+            help="Also measure the responses: add a chirp of this root mean square, 50 mN m."
+        ),
+    ] = "",
+    band: Annotated[
+        str, typer.Option(help="With --chirp: its frequencies [Hz], the lowest and the highest.")
+    ] = "1:50",
+    period: Annotated[
+        float, typer.Option(help="With --chirp: the time after which it repeats itself [s].")
+    ] = 1.0,
+    periods: Annotated[
+        int, typer.Option(min=1, help="With --chirp: how many periods of a run count.")
+    ] = 4,
+    seeds: Annotated[
+        str, typer.Option(help="With --chirp: the seeds of the runs, 1000:1005 or 3.")
+    ] = "1000:1005",
     png: Annotated[
         Path | None, typer.Option(help="Draw Bode and Nyquist diagrams, or the locus, here.")
     ] = None,
@@ -52,8 +72,8 @@ def linearise(
     as_json: AsJson = False,
 ) -> None:
     """Linearise a whole graph about an instant: A, B, C, D, poles, and the margins of an opened loop."""
+    from ..analysis import frequency_responses, margins, root_locus
     from ..analysis import linearise as linearise_graph
-    from ..analysis import margins, root_locus
     from ..analysis.locus import locus_figure
     from ..analysis.loop_margins import margins_figure
     from ..runtime.graph import load
@@ -63,6 +83,10 @@ def linearise(
             raise AloftError("say about which instant: --at 0.4 or --when 'phase.phase == STAND'")
         if locus and opened:
             raise AloftError("a locus has the poles of the loop as it runs: leave out --open")
+        if locus and chirp:
+            raise AloftError(
+                "--chirp measures responses, --locus traces poles: ask for one of them"
+            )
         if locus:
             traced = root_locus(
                 graph, locus, inputs=inputs, outputs=outputs or inputs, steps=steps,
@@ -79,14 +103,79 @@ def linearise(
             when=when, opened=opened,
         )  # fmt: skip
         found = margins(model) if loop else None
+        measured: list[FrequencyResponse] = []
+        if chirp:
+            low, high = numbers_of(band, "--band", float)
+            first, *last = numbers_of(seeds, "--seeds", int, 1)
+            measured = [
+                each
+                for signal in inputs
+                for target in ([""] if loop else outputs or inputs)
+                for each in frequency_responses(
+                    load(graph, overrides or []), inputs=signal, outputs=target,
+                    at=model.tick * model.base_period, size=chirp, low=low, high=high, period=period,
+                    periods=periods, seeds=range(first, *(last or [first + 1])),
+                )
+            ]  # fmt: skip
         if found is not None:
             title = f"{Path(graph).stem} at {model.tick * model.base_period:.3f} s"
-            draw(lambda: margins_figure(found, title), png, svg)
+            points = {each.source: each for each in measured}
+            draw(lambda: margins_figure(found, title, list(points), points), png, svg)
     if as_json:
-        about = {} if found is None else {"margins": found.as_data()}
+        about: dict[str, Any] = {} if found is None else {"margins": found.as_data()}
+        told = [
+            each.as_data() | {"within": each.holds(predicted(model, each)).tolist()}
+            for each in measured
+        ]
+        about |= {"measured": told} if chirp else {}
         print_json({"success": True, "graph": graph, **model.as_data(), **about})
         return
     show(console(), model, found)
+    show_measured(console(), model, measured)
+
+
+def numbers_of(text: str, option: str, kind: type[Number], least: int = 2) -> list[Number]:
+    """The numbers of ``a:b``. Raises ``AloftError``."""
+    example = "1000:1005" if kind is int else "1:50"
+    try:
+        found = [kind(part) for part in text.split(":")]
+    except ValueError:
+        found = []
+    if not least <= len(found) <= 2 or found != sorted(found):
+        raise AloftError(f"{option} cannot be {text!r}; write it as {option} {example}")
+    return found
+
+
+def predicted(model: Linearisation, measured: FrequencyResponse) -> Any:
+    """What the model says of a measured response, (frequencies,)."""
+    from ..analysis.loop_margins import loop_responses
+
+    w = 2.0 * math.pi * measured.frequency
+    names = list(dict.fromkeys(name.partition("@")[0] for name in model.inputs))
+    if measured.opened:
+        return loop_responses(model, w)[:, names.index(measured.source)]
+    targets = list(dict.fromkeys(name.partition("@")[0] for name in model.outputs))
+    return model.response(w)[:, targets.index(measured.target), names.index(measured.source)]
+
+
+def show_measured(
+    out: Console, model: Linearisation, measured: Sequence[FrequencyResponse]
+) -> None:
+    """Print the responses beside the model's."""
+    for each in measured:
+        values = predicted(model, each)
+        rows = [
+            (number(f), number(abs(v)), number(abs(g)), number(r), number(c))
+            for f, v, g, r, c in zip(
+                each.frequency, values, each.value, each.radius, each.coherence, strict=True
+            )
+        ]
+        to = "its opened loop" if each.opened else each.target
+        title = f"{each.source} to {to}: {each.samples} periods with a chirp"
+        columns = (">Hz", ">model", ">measured", ">within 95 %", ">coherence")
+        out.print(table(title, columns, rows))
+        share = sum(each.holds(values).tolist())
+        say(out, f"the model lies within the intervals at {share} of {len(rows)} frequencies")
 
 
 def draw(make: Callable[[], Figure], png: Path | None, svg: Path | None) -> None:

@@ -24,7 +24,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "files": ("runtime/language/errors", "runtime/language/units"),
     "mathematics": ("processes",),
     "robots": ("files", "mathematics"),
-    "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/ground_surface"),
+    "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
         "processes", "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array, Flags, Indices
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.ring import Octets, next_entry
+from ...mathematics.elementary import sin
 from ...mathematics.kernel import kernel
 from .block import Block, Input, Metric, Output, State
 from .delay import RingPosition, copy_call, octets, ring_signal
@@ -21,7 +23,7 @@ from .random_stream import RandomStream, StreamState, normal_call, uniform_call
 from .signals import Field, Signal
 
 FaultKind = Literal[
-    "stuck", "lost", "delayed", "biased", "drifting", "noisy", "scaled", "flipped",
+    "stuck", "lost", "delayed", "biased", "drifting", "noisy", "scaled", "flipped", "chirp",
 ]  # fmt: skip
 FOLDER = "faults/"
 """What the paths of faults begin with."""
@@ -36,6 +38,7 @@ OPTIONS: dict[FaultKind, dict[str, bool]] = {
     "noisy": {"value": True},
     "scaled": {"factor": True},
     "flipped": {"bit": True, "share": False},
+    "chirp": {"value": True, "low": True, "high": True, "time": False},
 }
 """The parameters that a kind has beside when it is there, and whether it needs them."""
 
@@ -54,12 +57,19 @@ class FaultParameters(Parameters):
         None, unit="s", gt=0, text="for how long; by default to the end"
     )
     value: float | None = parameter(
-        None, text="the value that is stuck, the bias, or the standard deviation of the noise"
+        None, text="the value that is stuck, the bias, or the root mean square of noise or chirp"
     )
-    time: float = parameter(1.0, unit="s", gt=0, text="a drift has reached `value` after this time")
+    time: float = parameter(
+        1.0,
+        unit="s",
+        gt=0,
+        text="a drift has reached `value` after this time; the period of a chirp",
+    )
     factor: float = parameter(1.0, text="what a scaled value is multiplied by")
     delay: float = parameter(0.0, unit="s", ge=0, text="how late a delayed value is")
     share: float = parameter(1.0, gt=0, le=1, text="share of the runs in which a value is lost or flipped")  # fmt: skip
+    low: float = parameter(1.0, unit="Hz", gt=0, text="the lowest frequency of a chirp")
+    high: float = parameter(10.0, unit="Hz", gt=0, text="the highest frequency of a chirp")
     bit: int = parameter(0, ge=0, le=63, text="the bit that is flipped, from the lowest")
     seed: int = parameter(0, ge=0, text="of the random stream")
 
@@ -187,6 +197,32 @@ def change_elements(
             out[places[k]] = factor * out[places[k]] + added + noise * normal[k]
 
 
+LINES = 40
+"""The most frequencies of a chirp."""
+
+
+def chirp_lines(low: float, high: float, period: float) -> Array:
+    """The frequencies of a chirp [Hz]: multiples of 1 / period from low to high, evenly in their logarithm."""
+    first, last = math.ceil(low * period - 1e-9), math.floor(high * period + 1e-9)
+    if last < first:
+        return np.zeros(0)
+    return np.unique(np.rint(np.geomspace(first, last, LINES))) / period
+
+
+@kernel
+def add_sines(
+    amplitude: float, frequency: Array, phase: Array, age: Array, places: Indices, acts: Flags,
+    out: Array,
+) -> None:  # fmt: skip
+    """y = u + amplitude sum_k sin(2 pi frequency_k age + phase_k) for the elements at ``places``."""
+    if acts[0]:
+        added = 0.0
+        for k in range(frequency.shape[0]):
+            added = added + sin(2.0 * math.pi * frequency[k] * age[()] + phase[k])
+        for k in range(places.shape[0]):
+            out[places[k]] = out[places[k]] + amplitude * added
+
+
 @kernel
 def flip_bit(octet: int, mask: int, places: Indices, acts: Flags, out: Octets) -> None:
     """Flip one bit, ``mask`` of one ``octet``, of the elements at ``places`` of ``out`` (n, bytes)."""
@@ -205,7 +241,10 @@ class Fault(Block):
     * ``delayed``: the value of ``delay`` before;
     * ``biased`` y = u + value; ``drifting`` y = u + value t / time; ``noisy`` y = u + value N(0, 1); ``scaled``
       y = factor u;
-    * ``flipped``: in a ``share`` of the runs a ``bit`` is the other one.
+    * ``flipped``: in a ``share`` of the runs a ``bit`` is the other one;
+    * ``chirp``: y = u + r(t), a sum of sines of equal amplitude from ``low`` to ``high`` that repeats itself after
+      ``time``, with the phases that keep it flat: it sweeps through the frequencies (Schroeder, Synthesis of
+      low-peak-factor signals, IEEE Trans. Information Theory, 1970). It is no fault, but what a response is measured with.
 
     It is there from ``start`` on for ``duration``, counted from the start of the run or from when its event first was.
     Runs are those of the block that writes the signal. Subclasses made by ``fault_block_type`` fix signal and
@@ -310,6 +349,16 @@ class Fault(Block):
             return [
                 KernelCall(flip_bit, octet, mask, places, self._acts, octets(target, target.size))
             ]
+        if kind == "chirp":
+            lines = chirp_lines(params.low, params.high, params.time)
+            share = np.arange(len(lines)) / len(lines)
+            return [
+                KernelCall(
+                    add_sines, value * math.sqrt(2.0 / len(lines)), lines,
+                    np.mod(-math.pi * len(lines) * share * share, 2.0 * math.pi), self.state.age,
+                    places, self._acts, out,
+                )
+            ]  # fmt: skip
         change = {
             "biased": (1.0, value, 0.0, 0.0),
             "drifting": (1.0, 0.0, value / params.time, 0.0),

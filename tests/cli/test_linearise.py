@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from .conftest import run_for_json, run_here
 
+T = 0.01
 GRAPH = """
 rate: 100 Hz
 blocks:
@@ -62,12 +64,48 @@ def test_a_root_locus_as_json_table_and_picture(loop: str, tmp_path: Path) -> No
     assert "the limit of stability is at -100" in out
 
 
+def test_a_response_measured_with_a_chirp_beside_the_model(loop: str, tmp_path: Path) -> None:
+    svg = tmp_path / "loop.svg"
+    asked = (
+        "linearise",
+        loop,
+        "--from",
+        "k.y",
+        "--at",
+        "0.1",
+        "--chirp",
+        "1",
+        "--band",
+        "1:40",
+        "--seeds",
+        "3:6",
+    )
+    told = run_for_json(*asked, "--open", "--svg", str(svg))
+    (measured,) = told["measured"]
+    assert (measured["source"], measured["opened"], measured["samples"]) == (
+        "k.y.value[0]",
+        True,
+        12,
+    )
+    assert len(measured["frequency_hz"]) == len(measured["coherence"]) == len(measured["within"])
+    z = np.exp(2j * np.pi * T * np.array(measured["frequency_hz"]))
+    exact = 30.0 * T / (z * (z - 1.0))
+    assert np.array(measured["real"]) == pytest.approx(exact.real, rel=1e-3, abs=1e-4)
+    assert svg.read_text().count("<use") > len(z)  # points
+    out = run_here(*asked, "--to", "x.y").stdout
+    assert "k.y.value[0] to x.y.value[0]: 12 periods with a chirp" in " ".join(out.split())
+    assert "the model lies within the intervals at" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
         (["--from", "k.y", "--open", "--at", "1", "--locus", "k.gain=1:2"], "leave out --open"),
         (["--from", "k.y"], "say about which instant: --at 0.4 or --when"),
         (["--from", "k.y", "--to", "x.y", "--at", "1", "--png", "a.png"], "diagrams show an opened loop"),
+        (["--from", "k.y", "--at", "1", "--chirp", "1", "--locus", "k.gain=1:2"], "ask for one of them"),
+        (["--from", "k.y", "--at", "1", "--chirp", "1", "--band", "50"], "--band cannot be '50'; write it as --band 1:50"),
+        (["--from", "k.y", "--at", "1", "--chirp", "1", "--seeds", "few"], "--seeds cannot be 'few'"),
         (["--from", "k.z", "--at", "1"], "there is no signal 'k.z'"),
     ],
 )  # fmt: skip

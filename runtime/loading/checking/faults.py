@@ -26,6 +26,7 @@ from ...language.fault import (
     Comparison,
     Fault,
     FaultParameters,
+    chirp_lines,
     fault_block_type,
 )
 from ...language.signals import Field, Signal
@@ -263,6 +264,11 @@ class _FaultReader:
         widest = (
             8 * np.dtype(fields[0].dtype_name).itemsize if fields[0].dtype_name != "bool" else 1
         )
+        if kind_of == "chirp" and not len(chirp_lines(params.low, params.high, params.time)):
+            self._report(f"{self.at} has no frequency: none from low to high is a multiple of 1 / time",
+                         self.node.where, found=f"{params.low:g} to {params.high:g} Hz",
+                         expected=f"a range with a multiple of {1.0 / params.time:g} Hz")  # fmt: skip
+            return None
         if kind_of == "flipped" and params.bit >= widest:
             self._report(f"{self.at}.bit cannot be {params.bit}", self.node.where,
                          expected=f"0 to {widest - 1}, for {fields[0].dtype_name}", found=str(params.bit))  # fmt: skip
@@ -290,6 +296,13 @@ class _FaultReader:
             if delay < 1:
                 self._report(f"{self.at}.delay is below half a period of {port}", self.node.where,
                              expected=f"{1e3 * period:g} ms or more", found=f"{1e3 * params.delay:g} ms")  # fmt: skip
+                return None
+        if params.kind == "chirp" and self.settings.base_rate is not None:
+            highest = 0.5 * self.settings.base_rate / draft.period_ticks
+            if params.high >= highest:
+                self._report(f"{self.at}.high cannot be {params.high:g} Hz", self.node.where,
+                             expected=f"below {highest:g} Hz, half the rate at which {port} is written",
+                             found=f"{params.high:g} Hz")  # fmt: skip
                 return None
         block_type = fault_block_type(
             signal, target, elements, params, delay, compared, event_signal, reads_truth=truth

@@ -10,6 +10,7 @@ import aloft
 from aloft.files.problems import LoadError
 from aloft.logs.replay.replay import KeptRun, Keyframes, replay
 from aloft.runtime.drawing.diagram import subgraphs
+from aloft.runtime.language.fault import chirp_lines
 from aloft.runtime.loading.picture import table
 from aloft.runtime.running.run_result import RunResult
 
@@ -92,6 +93,24 @@ def test_what_is_drawn(tmp_path: Path) -> None:
     assert len(set(begin)) == 3
 
 
+def test_a_chirp_has_its_lines_its_size_and_its_period(tmp_path: Path) -> None:
+    text = 'on: "r.y.value[1]", kind: chirp, value: 3, low: 4 Hz, high: 40 Hz, time: 0.25 s, start: 0.25 s'
+    added = run(tmp_path, f=text).signal("x.y.value") - RAMP
+    assert added[:, 0] == pytest.approx(0.0, abs=1e-12)
+    assert added[:25, 1] == pytest.approx(0.0, abs=1e-12)
+    one, two, three = added[25:, 1].reshape(3, 25)
+    assert two == pytest.approx(one, abs=1e-9) and three == pytest.approx(one, abs=1e-9)
+    assert np.sqrt(np.mean(one**2)) == pytest.approx(3.0)
+    lines = np.abs(np.fft.rfft(one)) / 25
+    assert lines[1:11] == pytest.approx(lines[1]) and lines[[0, 11, 12]] == pytest.approx(
+        0.0, abs=1e-9
+    )  # 4 to 40 Hz
+    assert np.abs(one).max() < 3.0 * np.sqrt(2.0) * 1.7  # flat: ten sines in phase have 4.5
+    assert np.array_equal(chirp_lines(1.0, 4.0, 2.0), np.arange(2, 9) / 2)
+    many = chirp_lines(0.1, 100.0, 10.0)
+    assert (len(many), many[0], many[-1]) == (35, 0.1, 100.0)
+
+
 def test_on_one_input_the_others_read_what_is_written(tmp_path: Path) -> None:
     done = run(tmp_path, f='on: "x.u.value[1]", kind: stuck, value: 7')
     assert (done.signal("x.y.value")[:, 1] == 7.0).all()
@@ -158,6 +177,10 @@ def test_it_is_seen_in_the_table_and_the_diagram(tmp_path: Path) -> None:
         ('on: r.y.value, kind: biased, value: 1 m', "unit", "faults.f.value"),
         ('on: r.y.value, kind: lost, share: 2', "bad-parameter", "faults.f.share"),
         ('on: r.y.value, kind: delayed, delay: 1 ms', "bad-value", "faults.f.delay is below half a period of r.y"),
+        ('on: r.y.value, kind: chirp, value: 1, low: 1 Hz', "missing-key", "a fault that is chirp needs 'high'"),
+        ('on: r.y.value, kind: chirp, value: 1, low: 1.1 Hz, high: 1.9 Hz', "bad-value",
+         "faults.f has no frequency: none from low to high is a multiple of 1 / time"),
+        ('on: r.y.value, kind: chirp, value: 1, low: 1 Hz, high: 50 Hz', "bad-value", "faults.f.high cannot be 50 Hz"),
         ('on: r.y.value, kind: flipped, bit: 99', "bad-parameter", "faults.f.bit"),
         ('on: r.y, kind: stuck, when: now', "bad-value", "'now' is no condition"),
         ('on: r.y, kind: stuck, when: z.v > 1', "unknown-source", "faults.f waits for z.v"),
