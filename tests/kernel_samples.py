@@ -308,8 +308,9 @@ UNUSED = {
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
     "aloft.blocks.scoring.estimator_score.record_landing": (as_record(EstimatorRecord.allocate()),),
-    "aloft.blocks.scoring.footing.unroll": (
-        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
+    "aloft.blocks.scoring.footing.add_roll": (
+        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 3, 3)),
+        DRAW((4, 2)),
     ),
     "aloft.blocks.scoring.jump_score.record_row": (
         BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
