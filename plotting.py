@@ -92,7 +92,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, title: str = "") -> Figure:
-    """An empty figure of that size [inch], with its title at the top left.
+    """An empty figure of this size [inch], with its title at the top left.
 
     The figure belongs to no window, so no display is needed.
     """
