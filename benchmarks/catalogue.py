@@ -29,6 +29,7 @@ from .jumps.real_robot import real_robot
 from .links.link_delays import link_delays
 from .links.links import links
 from .loading import loading
+from .planner.online_plans import online_plans
 from .planner.planner import planner
 from .recorder import recorder
 from .rows import Row
@@ -46,6 +47,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "falsification": falsification,
     "export": export,
     "planner": planner,
+    "online_plans": online_plans,
     "recorder": recorder,
     "background": background,
     "links": links,
@@ -70,7 +72,7 @@ LONG = (
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background", "export"),
-    "count": ("agreement", "jumps", "export"),
+    "count": ("agreement", "jumps", "export", "online_plans"),
     "seed": ("agreement", "jumps"),
     "seeds": (
         "jumps",

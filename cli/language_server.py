@@ -17,6 +17,7 @@ from ..files.nodes import ListNode, MapNode, Node
 from ..files.problems import LoadError, Position, Problem, Problems
 from ..runtime.language.block import Block
 from ..runtime.language.errors import AloftError
+from ..runtime.loading.reading.files import PREFIX, graph_path
 from .shared.output import errors_reported
 
 if TYPE_CHECKING:
@@ -128,8 +129,8 @@ class GraphText:
     def definition(self, line: int, column: int) -> Position | None:
         """Where the thing under the cursor is: a block in its file, a class in Python, an included file."""
         cursor = Cursor.at(self.text, line, column)
-        if cursor.word.endswith((".yaml", ".yml")):
-            file = self.path.parent / cursor.word
+        if cursor.word.endswith((".yaml", ".yml")) or cursor.word.startswith(PREFIX):
+            file = graph_path(cursor.word, self.path.parent)
             return Position(str(file), 1, 1) if file.is_file() else None
         if cursor.keys[-1:] == ("use",):
             block_type = self._class(cursor.word)

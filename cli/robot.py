@@ -97,9 +97,7 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
         say(out, f"{remark['part']}: {remark['found']}; usual: {remark['usual']}")
     say(
         out,
-        f"{len(found['remarks'])} things look unusual"
-        if found["remarks"]
-        else "nothing looks wrong",
+        f"unusual things: {len(found['remarks'])}" if found["remarks"] else "nothing looks wrong",
     )
 
 

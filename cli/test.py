@@ -164,7 +164,8 @@ def report(rows: list[Row], out: Console) -> bool:
         out.print(table("", ("block", "check", "what is wrong"), wrong))
     if rows:
         names = len(dict.fromkeys(row[0] for row in rows))
-        say(out, f"{len(rows) - len(wrong)} of {len(rows)} checks of {names} blocks passed")
+        blocks = f"{names} block{'s' if names > 1 else ''}"
+        say(out, f"{len(rows) - len(wrong)} of {len(rows)} checks of {blocks} passed")
     return not wrong
 
 

@@ -92,18 +92,20 @@ def solve_band(equations: int, band: Array2D, last: Indices1D, vector: Array1D) 
 def smallest_correction(
     starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
     place: Indices1D, equations: Indices1D, regularisation: float,
-    band: Array2D, last: Indices1D, vector: Array1D, out: Array1D, found: Flags1D,
+    band: Array2D, last: Indices1D, vector: Array1D, out: Array1D, factorised: Flags1D, found: Flags1D,
 ) -> None:  # fmt: skip
     """The x with the smallest x'Wx whose chosen rows of A x are the ``vector``, which becomes y.
 
-    ``found`` (1,) tells whether there is one: all equations are inside of the band and independent.
+    If ``factorised`` (1,), ``band`` and ``last`` still hold the factor for the same rows of a matrix near A. ``found``
+    (1,) tells whether there is an x: all equations are inside of the band and independent.
     """
     count = equations[0]
     found[0] = False
-    if not assemble_normal(starts, rows, values, inverse_weights, place, count, band, last):
-        return
-    if not factorise_band(count, regularisation, band, last):
-        return
+    if not factorised[0]:
+        if not assemble_normal(starts, rows, values, inverse_weights, place, count, band, last):
+            return
+        if not factorise_band(count, regularisation, band, last):
+            return
     solve_band(count, band, last, vector)
     for column in range(inverse_weights.shape[0]):
         total = 0.0

@@ -1,4 +1,4 @@
-"""Sine, cosine, arc tangent, arc cosine, exponential, hyperbolic tangent and hypotenuse, with the same bits on every processor.
+"""Sine, cosine, arc tangent, arc cosine, exponential, logarithm, hyperbolic tangent and hypotenuse, with the same bits on every processor.
 
 The C libraries of systems, processors and browsers differ in the last bit of these functions. Here they are made of additions,
 products, quotients and square roots alone, which IEEE 754 defines to the last bit, without fused operations. All errors are below 1 ULP, the
@@ -340,3 +340,48 @@ def tanh(x: float) -> float:
     product, error = product_of(t, bottom)
     rest = ((top - product) - error + top_low - t * bottom_low) / bottom
     return math.copysign(t + rest, x)
+
+
+@kernel
+def parts_of(x: float) -> tuple[float, int]:
+    """A number above zero as ``m`` 2^k with ``m`` from sqrt(1/2) to sqrt(2)."""
+    k, scale = 0, 512
+    if x < 2.2250738585072014e-308:
+        x *= 2.0**54
+        k = -54
+    while scale > 0:
+        if x >= _power_of_two(scale):
+            x *= _power_of_two(-scale)
+            k += scale
+        elif x < _power_of_two(1 - scale):
+            x *= _power_of_two(scale)
+            k -= scale
+        scale //= 2
+    if x > 1.4142135623730951:
+        x *= 0.5
+        k += 1
+    return x, k
+
+
+@kernel
+def log(x: float) -> float:
+    """The natural logarithm: of ``m`` 2^k as k log 2 + 2 artanh((m - 1) / (m + 1)), as in Sun's fdlibm."""
+    if not x > 0.0:
+        return -math.inf if x == 0.0 else math.nan
+    if math.isinf(x):
+        return x
+    m, k = parts_of(x)
+    f = m - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    series = z * (
+        0.6666666666666735 + z * (0.3999999999940942 + z * (0.2857142874366239 + z * (
+            0.22222198432149784 + z * (0.1818357216161805 + z * (
+                0.15313837699209373 + z * 0.14798198605116586
+            ))
+        )))
+    )  # fmt: skip
+    half = 0.5 * f * f
+    return k * 0.6931471803691238 - (
+        (half - (s * (half + series) + k * 1.9082149292705877e-10)) - f
+    )

@@ -1,37 +1,37 @@
-"""Arithmetic expressions as text, checked and compiled to array operations without ``eval``.
+"""Arithmetic expressions as text, checked, and made into calls of kernels without ``eval``.
 
 An expression knows numbers, names, ``+ - * / ** %``, comparisons (1 where they hold, else 0),
-brackets, ``a if condition else b``, and the functions in ``FUNCTIONS``. Every operation works on
-whole vectors and writes into an array that is made once.
+brackets, ``a if condition else b``, and the functions in ``CALLABLE``. Every operation is a call that
+works on whole vectors and writes into an array that is made once.
 """
 
 from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from . import elementwise
 from .arrays import Array
+from .compiling.kernel_call import KernelCall
 
-FUNCTIONS: Mapping[str, tuple[Any, int]] = {
-    "abs": (np.absolute, 1), "sign": (np.sign, 1), "sqrt": (np.sqrt, 1), "exp": (np.exp, 1),
-    "log": (np.log, 1), "sin": (np.sin, 1), "cos": (np.cos, 1), "tan": (np.tan, 1),
-    "asin": (np.arcsin, 1), "acos": (np.arccos, 1), "atan": (np.arctan, 1),
-    "atan2": (np.arctan2, 2), "tanh": (np.tanh, 1), "floor": (np.floor, 1), "ceil": (np.ceil, 1),
-    "min": (np.minimum, 2), "max": (np.maximum, 2), "hypot": (np.hypot, 2),
-}  # fmt: skip
-"""The functions an expression may call, and how many arguments each takes."""
+CALLABLE = (
+    "abs", "sign", "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh",
+    "floor", "ceil", "min", "max", "hypot",
+)  # fmt: skip
+"""The functions that an expression may call."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: Mapping[type[ast.AST], Any] = {
-    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide,
-    ast.Pow: np.power, ast.Mod: np.mod, ast.UAdd: np.positive, ast.USub: np.negative,
-    ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal,
-    ast.Eq: np.equal, ast.NotEq: np.not_equal,
+    ast.Add: elementwise.add, ast.Sub: elementwise.subtract, ast.Mult: elementwise.multiply,
+    ast.Div: elementwise.divide, ast.Pow: elementwise.power, ast.Mod: elementwise.remainder,
+    ast.UAdd: elementwise.positive, ast.USub: elementwise.negative, ast.Lt: elementwise.less,
+    ast.LtE: elementwise.less_equal, ast.Eq: elementwise.equal, ast.NotEq: elementwise.not_equal,
 }  # fmt: skip
+_TURNED: Mapping[type[ast.AST], type[ast.AST]] = {ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 
 
 @dataclass(frozen=True)
@@ -42,20 +42,14 @@ class ParsedExpression:
     tree: ast.expr
     names: tuple[str, ...]
 
-    def compile(self, variables: Mapping[str, Array], size: int) -> Callable[[Array], None]:
-        """A function that writes the expression's value into an array of ``size`` elements.
+    def calls(self, variables: Mapping[str, Array], out: Array) -> list[KernelCall]:
+        """The calls that write the expression's value into an array (n,), in their order.
 
-        ``variables`` are arrays of that size or of one number, which are read at every call.
+        ``variables`` are arrays of that size, which are read at every call.
         """
-        steps: list[tuple[Any, tuple[Array, ...], Array]] = []
-        result = _build(self.tree, variables, size, steps)
-
-        def evaluate(out: Array) -> None:
-            for function, arguments, target in steps:
-                function(*arguments, out=target)
-            np.copyto(out, result)
-
-        return evaluate
+        made: list[KernelCall] = []
+        _build(self.tree, variables, out, made)
+        return made
 
 
 def parse_expression(text: str, known: Iterable[str]) -> ParsedExpression:
@@ -85,9 +79,9 @@ def _check(node: ast.expr, known: tuple[str, ...], names: dict[str, None]) -> No
                 names[name] = None
             return
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-            if name not in FUNCTIONS:
-                raise ValueError(f"there is no function {name!r}; there is {', '.join(FUNCTIONS)}")
-            wanted = FUNCTIONS[name][1]
+            if name not in CALLABLE:
+                raise ValueError(f"there is no function {name!r}; there is {', '.join(CALLABLE)}")
+            wanted = 2 if name in elementwise.OF_TWO else 1
             if len(arguments) != wanted:
                 raise ValueError(f"{name} takes {wanted} arguments, not {len(arguments)}")
             parts = arguments
@@ -95,8 +89,9 @@ def _check(node: ast.expr, known: tuple[str, ...], names: dict[str, None]) -> No
             parts = [left, right]
         case ast.UnaryOp(op=sign, operand=operand) if type(sign) in _OPERATORS:
             parts = [operand]
-        case ast.Compare(left=left, ops=[comparison], comparators=[right]) if (
-            type(comparison) in _OPERATORS
+        case ast.Compare(left=left, ops=[comparison], comparators=[right]) if type(comparison) in (
+            *_OPERATORS,
+            *_TURNED,
         ):
             parts = [left, right]
         case ast.IfExp(test=test, body=body, orelse=other):
@@ -108,45 +103,35 @@ def _check(node: ast.expr, known: tuple[str, ...], names: dict[str, None]) -> No
 
 
 def _build(
-    node: ast.expr,
-    variables: Mapping[str, Array],
-    size: int,
-    steps: list[tuple[Any, tuple[Array, ...], Array]],
-) -> Array:
-    """Append the operations that compute a node; return the array its value will be in."""
+    node: ast.expr, variables: Mapping[str, Array], target: Array, calls: list[KernelCall]
+) -> None:
+    """Append the calls that write the value of a node into ``target``."""
 
     def part(inner: ast.expr) -> Array:
-        return _build(inner, variables, size, steps)
+        if isinstance(inner, ast.Name) and inner.id in variables:
+            return variables[inner.id]
+        if isinstance(inner, ast.Constant | ast.Name):
+            value = inner.value if isinstance(inner, ast.Constant) else CONSTANTS[inner.id]
+            return np.full_like(target, value)
+        room = np.zeros_like(target)
+        _build(inner, variables, room, calls)
+        return room
 
     function: Any
-    arguments: tuple[Array, ...]
     match node:
-        case ast.Constant(value=value):
-            return np.full(size, float(value))  # type: ignore[arg-type]  # a number here
-        case ast.Name(id=name):
-            return np.full(size, CONSTANTS[name]) if name not in variables else variables[name]
         case ast.IfExp(test=test, body=body, orelse=other):
-            arguments, function = (part(test), part(body), part(other)), _choose
-        case ast.Call(func=ast.Name(id=name), args=inner):
-            arguments, function = tuple(part(each) for each in inner), FUNCTIONS[name][0]
+            function, parts = elementwise.choose, [test, body, other]
+        case ast.Call(func=ast.Name(id=name), args=parts):
+            function = {**elementwise.FUNCTIONS, **elementwise.OF_TWO}[name]
         case ast.BinOp(left=left, op=operator, right=right):
-            arguments, function = (part(left), part(right)), _OPERATORS[type(operator)]
+            function, parts = _OPERATORS[type(operator)], [left, right]
         case ast.Compare(left=left, ops=[comparison], comparators=[right]):
-            arguments, function = (part(left), part(right)), _OPERATORS[type(comparison)]
+            turned = _TURNED.get(type(comparison))
+            function = _OPERATORS[turned or type(comparison)]
+            parts = [right, left] if turned else [left, right]
         case ast.UnaryOp(op=sign, operand=operand):
-            arguments, function = (part(operand),), _OPERATORS[type(sign)]
+            function, parts = _OPERATORS[type(sign)], [operand]
         case _:
-            raise AssertionError("the expression was not checked")
-    target = np.zeros(size)
-    if isinstance(node, ast.IfExp):
-        truth = np.zeros(size, bool)
-        steps.append((np.not_equal, (arguments[0], np.zeros(size)), truth))
-        steps.append((function, (truth, *arguments[1:]), target))
-    else:
-        steps.append((function, arguments, target))
-    return target
-
-
-def _choose(truth: Any, body: Any, other: Any, out: Any) -> None:
-    np.copyto(out, other)
-    np.copyto(out, body, where=truth)
+            function, parts = elementwise.positive, [node]
+    arguments = [part(each) for each in parts]
+    calls.append(KernelCall(function, *arguments, target))

@@ -31,7 +31,7 @@ from collections.abc import Callable
 from types import CodeType, FunctionType
 from typing import Any, TypeVar
 
-from .compiling.kernel_registry import is_kernel, register, written_code
+from .compiling.kernel_registry import arguments_of, is_kernel, register, written_code
 from .compiling.kernel_registry import kernels as kernels  # noqa: PLC0414  also imported from here
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -57,10 +57,19 @@ def expand(function: Any) -> None:
         EquationError: a statement cannot be rewritten; the text says where and why.
     """
     if id(function) not in _expanded and is_kernel(function) and function.__closure__ is None:
-        from .compiling.equations import expanded_code
+        code = written_code(function)
+        if not _takes_numbers_only(function):
+            from .compiling.equations import expanded_code
 
-        function.__code__ = expanded_code(function, written_code(function))
+            code = expanded_code(function, code)
+        function.__code__ = code
         _expanded.add(id(function))
+
+
+def _takes_numbers_only(function: FunctionType) -> bool:
+    """Whether a kernel has no arrays, and so no equations."""
+    kinds = [function.__annotations__.get(name) for name in arguments_of(function)]
+    return bool(kinds) and all(kind in ("float", "int", "bool") for kind in kinds)
 
 
 def _expanding_code(function: FunctionType) -> CodeType:

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from ..files.document import read_file
 from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
-from ..files.problems import Code, LoadError, Position, Problems, nearest
+from ..files.problems import Code, LoadError, Position, Problems
+from ..runtime.loading.reading.files import files_like, graph_path
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
 from .sections import (
     Labels,
@@ -44,6 +45,13 @@ def read_study(path: Path) -> Study:
     """
     problems = Problems()
     tree = read_file(path, str(path), problems, ("a study file", "graph, seeds, grid"))
+    if tree is not None and tree.get("blocks") and not any(map(tree.get, GRAPH_KEYS)):
+        problems.add(
+            Code.WRONG_KIND, f"{path} is a graph, not a study", Position(str(path), 1, 1),
+            expected="a file that names a graph, seeds and what differs", found="blocks",
+            fix=f"a file of its own with graph: {path.name} and seeds: 2000:2020",
+        )  # fmt: skip
+        tree = None
     study = _read(tree, path, problems) if tree is not None else None
     if study is None or len(problems):
         raise LoadError(problems.report(str(path)))
@@ -225,13 +233,12 @@ def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[No
         if not isinstance(name, str):
             wrong_kind(node, repr(entry.key), "a file, relative to this one", problems)
             continue
-        file = path.parent / name
+        file = graph_path(name, path.parent)
         if not file.is_file():
-            present = sorted(p.name for p in file.parent.glob("*.y*ml"))
-            near = tuple((Path(name).parent / n).as_posix() for n in nearest(file.name, present))
+            near = files_like(name, file.parent)
             problems.add(
                 Code.FILE, f"there is no file {file}", node.where, at=entry.key, found=name,
-                expected="a file, relative to this one", nearest=near, fix=near[0] if near else "",
+                expected="a file, relative to this one, or a shipped one such as aloft:jump", nearest=near, fix=near[0] if near else "",
             )  # fmt: skip
             continue
         found.append((node, file))

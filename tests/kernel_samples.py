@@ -14,6 +14,14 @@ from aloft.hal.simulated import plant
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.landing_law import LandingCost, flight_map
+from aloft.mathematics.whole_body_motion import (
+    FixedPoints,
+    GivenMotion,
+    MotionTerms,
+    PushedTurns,
+    motion_memory,
+    turn_memory,
+)
 from aloft.mathematics.whole_body_qp import RigidBodyTerms
 from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
@@ -166,6 +174,19 @@ TERRAIN = Terrain(
 ).surface
 CHAIN_STARTS, CHAIN_ROWS = np.array([0, 1, 3, 5, 6]), np.array([0, 0, 1, 1, 2, 2])
 """The non-zeros of a matrix (3, 4) by columns: each row touches two neighbours."""
+AT_TWO = GivenMotion(
+    np.hstack([NORMAL((2, 3)), [[0.1, 0.3, -0.2, 0.9], [0.0, 0.6, 0.0, 0.8]], 0.3 * NORMAL((2, 10))]),
+    NORMAL((2, 16)), NORMAL((2, 10)), 20.0 * NORMAL((2, 4, 3)),
+)  # fmt: skip
+SOLES_OF_TREE = FixedPoints(np.array([5, 5, 10, 10]), 0.05 * NORMAL((4, 3)), np.zeros(4))
+EVALUATED = MotionTerms(
+    *np.zeros((3, 2, 3)), np.tile([1.0, 1.2, 0.9, 0.1, -0.2, 0.05], (2, 1)), *NORMAL((3, 2, 4, 3)),
+    np.zeros((2, 6)), np.zeros((2, 10)),
+)  # fmt: skip
+TURNING = PushedTurns(
+    np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
+    np.array([0, 2]), np.array([[0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 3)), NORMAL((1, 3)),
+)  # fmt: skip
 UNUSED = {
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
@@ -181,7 +202,7 @@ UNUSED = {
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
         np.array([3]), 1e-12, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), NORMAL(3),
-        np.zeros(4), np.zeros(1, dtype=np.bool_),
+        np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
@@ -199,6 +220,33 @@ UNUSED = {
     "aloft.blocks.control.frames.move_model": (*MODEL, TREE, body_motion(10)),
     "aloft.blocks.control.frames.update_frame": (
         MODEL[0], TREE, body_motion(10), 5, np.array([0.1, -0.2, 0.3]), FRAME,
+    ),
+    "aloft.mathematics.whole_body_motion.evaluate_motion": (
+        TREE, SOLES_OF_TREE, AT_TWO, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.place_and_move": (
+        TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
+    ),
+    "aloft.mathematics.whole_body_motion.momentum_terms": (
+        AT_TWO.velocity[1], 1, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.point_terms": (
+        SOLES_OF_TREE, AT_TWO.position[0], 0, body_motion(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.solve_inertia": (
+        EVALUATED.inertia[0], NORMAL(3), np.zeros(3),
+    ),
+    "aloft.mathematics.whole_body_motion.base_acceleration": (
+        AT_TWO, 1, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.joint_torques": (
+        TREE, SOLES_OF_TREE, AT_TWO, 1, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.turn_rate": (
+        TURNING, 1, 0, NORMAL(7), turn_memory(), np.zeros(7),
+    ),
+    "aloft.mathematics.whole_body_motion.follow_turns": (
+        TURNING, turn_memory(), np.zeros((2, 4)), np.zeros((2, 3)),
     ),
     "aloft.mathematics.body_dynamics.rotation_jacobian": (
         TREE, body_motion(10), 5, np.zeros((3, 16)),
@@ -260,8 +308,9 @@ UNUSED = {
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
     "aloft.blocks.scoring.estimator_score.record_landing": (as_record(EstimatorRecord.allocate()),),
-    "aloft.blocks.scoring.footing.unroll": (
-        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
+    "aloft.blocks.scoring.footing.add_roll": (
+        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 3, 3)),
+        DRAW((4, 2)),
     ),
     "aloft.blocks.scoring.jump_score.record_row": (
         BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),

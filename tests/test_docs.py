@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 import aloft
 from aloft.cli.blocks import all_references, reference_page
 from aloft.robots.description import find_robot
+from aloft.robots.importing.urdf_text import find_file
 from aloft.runtime.language.block import Block
 from aloft.runtime.loading import LoadError
 
@@ -34,6 +36,9 @@ def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "test_low_pass.py",
         "filter.yaml",
         "use.py",
+        "hop.yaml",
+        "my_jump.yaml",
+        "my_study.yaml",
     ]
     for name, text in files:
         (folder / name).write_text(text)
@@ -66,6 +71,24 @@ def test_the_tutorial_works(tutorial: Path, command: list[str]) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_tutorials_study_of_ones_own_robot_is_right(tutorial: Path) -> None:
+    source = find_file(
+        "package://example-robot-data/robots/go1_description/urdf/go1.urdf", tutorial
+    )
+    if source is None:
+        pytest.skip("the package example-robot-data is not installed (pip install it)")
+    shutil.copy(source, tutorial / "go1.urdf")
+    for command, says in (
+        (["robot", "import", "go1.urdf"], "go1.yaml"),
+        (["study", "my_study.yaml", "--dry-run"], "3 cells and 10 seeds: 30 runs; no problems"),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "aloft", *command], cwd=tutorial,
+            capture_output=True, text=True, timeout=240, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0 and says in done.stdout, done.stdout + done.stderr
 
 
 def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:

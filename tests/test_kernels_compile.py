@@ -57,6 +57,7 @@ NOT_HOT = {
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",
     "mathematics.body_dynamics.inertias": "memory, when a block is set up",
     "mathematics.body_dynamics.body_motion": "memory, when a block is set up",
+    "mathematics.whole_body_motion.motion_memory": "memory, before plans are checked",
     "mathematics.active_set.active_set_memory": "memory, when a block is set up",
     "mathematics.landing_law.flight_map": "memory, when a block is set up",
     "blocks.control.leg_tracking.limb_memory": "memory, when a block is set up",

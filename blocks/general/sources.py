@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from ...mathematics.elementary import expm1, sin
+from ...mathematics.elementary import expm1, log, sin
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Output
@@ -210,7 +210,7 @@ class Chirp(UnitFromParameters, Block):
         start, end, duration = params.start_frequency, params.end_frequency, params.duration
         inside = min(time, duration)
         cycles = end * (time - inside)
-        ratio = math.log(end / start)
+        ratio = log(end / start)
         if params.sweep == "linear":
             growth = (end - start) / duration
             cycles += start * inside + 0.5 * growth * inside * inside

@@ -9,9 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import field_validator
 
+from ...mathematics.arrays import Array1D, Indices1D
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.elementwise import FUNCTIONS
 from ...mathematics.expression import parse_expression
+from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import UnitError
+from ...runtime.language.kernel_block import KernelBlock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.unit_algebra import ONE, SECOND, over, read_unit, root, times
@@ -28,15 +33,6 @@ Name = Literal[
     "abs", "sign", "negative", "reciprocal", "square", "sqrt", "exp", "log", "log10",
     "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "round",
 ]  # fmt: skip
-UFUNCS: Mapping[str, Any] = {
-    "abs": np.absolute, "sign": np.sign, "negative": np.negative, "reciprocal": np.reciprocal,
-    "square": np.square, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "log10": np.log10,
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos,
-    "atan": np.arctan, "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "floor": np.floor,
-    "ceil": np.ceil, "round": np.rint,
-}  # fmt: skip
-
-
 _SAME = ("abs", "negative", "floor", "ceil", "round")
 _OF_ANGLES = ("sin", "cos", "tan")
 _TO_ANGLES = ("asin", "acos", "atan")
@@ -64,7 +60,7 @@ def _quantity(name: str, inputs: InputQuantities) -> Quantity | None:
     return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
 
 
-class Function(Block):
+class Function(KernelBlock):
     """A function of every element by itself: y = f(u).
 
     Angles are in rad; ``round`` rounds halves to even. Outside a function's domain, such as the
@@ -87,18 +83,16 @@ class Function(Block):
 
     def setup(self) -> None:
         """Choose the function."""
-        self._function = UFUNCS[self.params.function]
-
-    def step(self) -> None:
-        """Evaluate it."""
-        self._function(self.u.value, out=self.y.value)
+        self.kernel_calls = (
+            KernelCall(FUNCTIONS[self.params.function], self.u.value, self.y.value),
+        )
 
 
 INPUTS = ("a", "b", "c", "d", "e", "f", "g", "h")
 ABSENT = {"value": 0.0}
 
 
-class Expression(Block):
+class Expression(KernelBlock):
     """A formula, element by element, of the inputs a to h, the time t [s] and named constants.
 
     It may hold numbers, ``+ - * / ** %``, comparisons (1 where they hold, else 0), brackets,
@@ -110,7 +104,7 @@ class Expression(Block):
     Units are checked in it: ``units: {k: N/m}`` says those of constants, t is in s, and other
     numbers are plain. ``unit: unchecked`` switches this off.
 
-    It is compiled once, never evaluated as Python. Both sides of a choice are computed, so neither
+    It is never evaluated as Python: each operation is a call of a kernel. Both sides of a choice are computed, so neither
     may be outside a function's domain.
     """
 
@@ -199,17 +193,23 @@ class Expression(Block):
     def setup(self) -> None:
         """Compile the formula."""
         p = self.params
-        self._time = np.zeros(())
+        time = np.zeros(p.n)
         ports = (self.a, self.b, self.c, self.d, self.e, self.f, self.g, self.h)
         variables = {name: port.value for name, port in zip(INPUTS, ports, strict=True)}
-        variables |= {name: np.array(value) for name, value in p.constants.items()}
-        variables["t"] = self._time
-        self._evaluate = parse_expression(p.expression, variables).compile(variables, p.n)
+        variables |= {name: np.full(p.n, value) for name, value in p.constants.items()}
+        variables["t"] = time
+        formula = parse_expression(p.expression, variables)
+        calls = formula.calls(variables, self.y.value)
+        if "t" in formula.names:
+            clock = self.context.clock
+            calls.insert(0, KernelCall(_write_time, clock.present, clock.base_period, time))
+        self.kernel_calls = tuple(calls)
 
-    def step(self) -> None:
-        """Evaluate it."""
-        self._time[...] = self.time
-        self._evaluate(self.y.value)
+
+@kernel
+def _write_time(tick: Indices1D, base_period: float, time: Array1D) -> None:
+    """The seconds since the run began, in each element."""
+    time[:] = base_period * tick[0]
 
 
 _RAD = parse_unit("rad")

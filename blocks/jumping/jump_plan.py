@@ -171,7 +171,7 @@ class JumpPlan(Block):
                 fix=f"task: {near[0]}" if near else "",
             )
             return
-        if task.robot != robot.name:
+        if task.robot != robot.name and not _is_file_of(task.robot, context):
             yield UnmetRequirement(
                 f"the task {task.name!r} is for {task.robot}, but the graph's robot is "
                 f"{robot.name}",
@@ -427,6 +427,16 @@ def _as_planned(task: JumpTask, chosen: Literal["full", "paper", "srbm"] | None)
     return task.model_copy(update={"formulation": chosen, "impact": impact})
 
 
+def _is_file_of(name: str, context: Context) -> bool:
+    """Whether a task names the graph's robot by its file."""
+    from ...robots.description import find_robot
+
+    folder = context.graph_folder
+    if not Path(name).suffix or not (folder / name).is_file() or context.robot is None:
+        return False
+    return find_robot(name, folder).name == context.robot.name
+
+
 def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
     """The task of a graph, which gives the name of its file, its parameters, or both.
 
@@ -443,5 +453,5 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
     if file is None:
         robot = {"robot": context.robot.name} if context.robot is not None else {}
         return spoken_name(make_task({"name": "", **robot, **changes}))
-    found = find_task(str(file), context.folder, Path())
+    found = find_task(str(file), context.folder, context.graph_folder, Path())
     return changed_task(found, changes) if changes else read_task(found)

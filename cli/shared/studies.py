@@ -235,7 +235,7 @@ def print_comparisons(screen: Console, comparisons: Sequence[Comparison]) -> Non
     screen.print(table(f"compared with {shown[0].base}, seed by seed", columns, rows))
     left = len(comparisons) - min(len(shown), MOST_COMPARISONS)
     if left:
-        say(screen, f"... and {left} more comparisons of metrics, in the summary")
+        say(screen, f"further comparisons of metrics, in the summary: {left}")
 
 
 def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:

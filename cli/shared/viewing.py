@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import sys
 from pathlib import Path
+from shutil import which
 from typing import TYPE_CHECKING
 
 import typer
@@ -101,7 +102,8 @@ def how_to_view(recording: Path) -> str:
     program = Path(sys.argv[0])
     here = Path.cwd()
     name = program.relative_to(here) if program.is_relative_to(here) else program
-    return f"{name if program.name == 'aloft' else 'aloft'} view {recording}"
+    on_path = program.name != "aloft" or which("aloft") == str(program)
+    return f"{'aloft' if on_path else name} view {recording}"
 
 
 def read(file: Path, *, damaged: bool = False) -> RecordedRun:

@@ -18,7 +18,7 @@ from typing import Any
 
 from .arguments import ArgumentType
 from .equations import VERSION, reports_event
-from .kernel_registry import kernels, written_code
+from .kernel_registry import is_kernel, written_code
 from .kinds import argument_kinds
 
 
@@ -44,14 +44,13 @@ def fingerprint(
     digest.update(f"{tools}; equations {VERSION}".encode())
     for part in signature:
         digest.update(f"|{part}".encode())
-    marked = {id(function) for function in kernels().values()}
-    functions = closure(kernel, marked)
+    functions = closure(kernel)
     if by_source:  # in an order that the byte code has no part in
         functions = functions[:1] + sorted(functions[1:], key=_name)
     for function in functions:
         text = None if known is None else known.get(function)
         if text is None:
-            parts = (f"|{function.__qualname__}", *_texts(function, marked, by_source))
+            parts = (f"|{function.__qualname__}", *_texts(function, by_source))
             text = "".join(parts).encode()
             if known is not None:
                 known[function] = text
@@ -63,21 +62,26 @@ def _name(function: Any) -> tuple[str, str]:
     return function.__module__, function.__qualname__
 
 
-def closure(kernel: Any, marked: set[int]) -> list[Any]:
+def closure(kernel: Any) -> list[Any]:
     """The kernel and all that it calls, each once, in the order in which they are met."""
-    found: list[Any] = []
+    found: dict[int, Any] = {}
     pending = [kernel]
     while pending:
         function = pending.pop()
-        if any(function is other for other in found):
-            continue
-        found.append(function)
-        values = (function.__globals__.get(name) for name in written_code(function).co_names)
-        pending += [value for value in values if id(value) in marked]
-    return found
+        if id(function) not in found:
+            found[id(function)] = function
+            pending += _called(function)
+    return list(found.values())
 
 
-def _texts(function: Any, marked: set[int], by_source: bool) -> Iterator[str]:
+def _called(function: Any) -> list[Any]:
+    """The kernels that a function names."""
+    scope = function.__globals__
+    values = (scope.get(name) for name in written_code(function).co_names)
+    return [value for value in values if is_kernel(value)]
+
+
+def _texts(function: Any, by_source: bool) -> Iterator[str]:
     """The byte code or the source of a function, and the constants of its module that it reads."""
     code = written_code(function)
     if by_source:
@@ -87,7 +91,7 @@ def _texts(function: Any, marked: set[int], by_source: bool) -> Iterator[str]:
     yield f"|{argument_kinds(function)}{reports_event(function)}"
     scope: Mapping[str, Any] = function.__globals__
     for name in sorted(set(code.co_names)) if by_source else code.co_names:
-        if name in scope and id(scope[name]) not in marked:
+        if name in scope and not is_kernel(scope[name]):
             value = scope[name]
             if isinstance(value, type) and issubclass(value, IntEnum):
                 yield f"|{name}={[(member.name, int(member)) for member in value]}"

@@ -7,7 +7,8 @@ from types import CodeType
 from typing import Any
 
 _kernels: dict[str, Callable[..., Any]] = {}
-_marked: set[int] = set()
+_marked: dict[int, Callable[..., Any]] = {}
+"""All of them by identity, also those whose names were taken again; kept, so that no other function gets one."""
 _written: dict[int, CodeType] = {}
 """The code of each kernel before its equations become loops, by the identity of the function."""
 
@@ -15,7 +16,7 @@ _written: dict[int, CodeType] = {}
 def register(function: Any) -> bool:
     """Take a function into the list; returns whether its equations can be rewritten."""
     _kernels[f"{function.__module__}.{function.__qualname__}"] = function
-    _marked.add(id(function))
+    _marked[id(function)] = function
     if function.__closure__ is not None:
         return False
     _written[id(function)] = function.__code__

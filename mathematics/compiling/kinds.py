@@ -58,7 +58,7 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     if annotation in (float, int, bool):
         return NUMBER
     if hasattr(annotation, "kernel_kinds"):
-        return RecordKind(annotation.__name__, annotation.kernel_kinds())
+        return _signal_kind(annotation)
     for mark in getattr(annotation, "__metadata__", ()):
         if isinstance(mark, Rank):
             return ArrayKind(mark.sizes or (None,) * mark.dimensions, mark.element)
@@ -74,6 +74,11 @@ def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
     if isinstance(annotation, type) and issubclass(annotation, IntEnum):
         return NUMBER
     return None
+
+
+@cache
+def _signal_kind(signal: Any) -> Kind:
+    return RecordKind(signal.__name__, signal.kernel_kinds())
 
 
 @cache

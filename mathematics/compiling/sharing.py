@@ -40,8 +40,7 @@ def divide(jobs: Sequence[CompileJob], processors: int) -> list[list[CompileJob]
     A job costs the bytes of Python's code of the functions that its process does not have yet. There
     are no more shares than are worth a process.
     """
-    marked = {id(function) for function in kernels().values()}
-    below = {job.name: _code_below(job.kernel, marked) for job in jobs}
+    below = {job.name: _code_below(job.kernel) for job in jobs}
     everything: dict[int, int] = {}
     for sizes in below.values():
         everything |= sizes
@@ -58,11 +57,9 @@ def divide(jobs: Sequence[CompileJob], processors: int) -> list[list[CompileJob]
     return shares
 
 
-def _code_below(kernel: Any, marked: set[int]) -> dict[int, int]:
+def _code_below(kernel: Any) -> dict[int, int]:
     """The sizes of the code of a kernel and of all that it calls."""
-    return {
-        id(function): len(written_code(function).co_code) for function in closure(kernel, marked)
-    }
+    return {id(function): len(written_code(function).co_code) for function in closure(kernel)}
 
 
 def processors() -> int:

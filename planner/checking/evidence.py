@@ -29,6 +29,7 @@ from ..models.euler_angles import euler_angles
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
+from ..task.scaling import per_robot
 from ..task.sequence import edge_of, ground_axes
 from ..task.task import JumpTask
 from .replay import Replay
@@ -139,26 +140,28 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
     two legs have shapes."""
     lack: Array | None = None
     for gap in _gaps(robot, poses):
-        found = np.minimum(wanted, gap[0]) - gap
+        found = (np.minimum(wanted, gap[:, :1]) - gap).max(axis=0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
 
 def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
-    """The distances (n,) between all capsules of one leg and all of another."""
+    """The distances (pairs, n) between all capsules of one leg and all of another."""
     chains = [
         [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
         for chain in legs(robot)
     ]
     for number, chain in enumerate(chains):
         for other in chains[number + 1 :]:
-            for a, b, radius in chain:
-                for c, d, other_radius in other:
-                    yield segment_distance(a, b, c, d) - radius - other_radius
+            pairs = [(*one, *two) for one in chain for two in other]
+            if not pairs:
+                continue
+            a, b, radius, c, d, other_radius = (np.array(part) for part in zip(*pairs, strict=True))
+            yield segment_distance(a, b, c, d) - (radius + other_radius)[:, None]
 
 
 def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """The distance between the segments a-b and c-d, all (n, 3).
+    """The distance (...) between the segments a-b and c-d, all (..., 3).
 
     The closest points are the crossing of the two lines where it lies in both segments, else an
     end of one of them and what is closest to it on the other.
@@ -172,17 +175,25 @@ def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
         (ac * cb - cc * ab) / np.where(determinant > 0.0, determinant, 1.0),
         0.5,
     )
-    best = np.full(len(a), np.inf)
-    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(len(a)), np.ones(len(a))):
+    best = np.full(aa.shape, np.inf)
+    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(aa.shape), np.ones(aa.shape)):
         t = np.clip((cb + s * ac) / np.where(cc > 0.0, cc, 1.0), 0.0, 1.0)
         s = np.clip((t * ac - ab) / np.where(aa > 0.0, aa, 1.0), 0.0, 1.0)
-        gap = between + s[:, None] * along - t[:, None] * across
+        gap = between + s[..., None] * along - t[..., None] * across
         best = np.minimum(best, np.sqrt(_dot(gap, gap)))
     return best
 
 
 def _dot(x: Array, y: Array) -> Array:
-    return np.asarray((x * y).sum(axis=1))
+    return np.asarray((x * y).sum(axis=-1))
+
+
+@per_robot
+def _asymmetric(robot: RobotDescription) -> bool:
+    """See ``Evidence.asymmetric``."""
+    robot = welded(robot).robot
+    pairs = mirrored_pairs(robot)
+    return pairs is not None and symmetrised(robot, pairs) != robot
 
 
 DEGREE = math.pi / 180.0
@@ -225,9 +236,7 @@ class Evidence:
     def asymmetric(self) -> bool:
         """Whether the robot is nearly the same left and right but not exactly: its plans in
         mirrored coordinates are made for the robot that is."""
-        robot = welded(self.robot).robot
-        pairs = mirrored_pairs(robot)
-        return pairs is not None and symmetrised(robot, pairs) != robot
+        return _asymmetric(self.robot)
 
     def model_error(self, exact: float, nearly: float) -> float:
         """What a test of the planner's own equations allows: ``exact``, or ``nearly`` where the

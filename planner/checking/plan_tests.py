@@ -15,7 +15,7 @@ import numpy as np
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
-from ..models.exact_dynamics import ExactDynamics
+from ..models.exact_dynamics import dynamics_of
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
 from ..task.sequence import ground_axes
@@ -262,7 +262,7 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
         return math.inf, np.zeros(len(e.robot.joints))
-    dynamics = ExactDynamics(e.robot)
+    dynamics = dynamics_of(e.robot)
     q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
     exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
     moved = np.abs(plan.position[knot + 1] - q).max()

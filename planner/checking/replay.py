@@ -15,13 +15,21 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
+from ...mathematics.whole_body_motion import MotionTerms
 from ...robots.description import RobotDescription
 from ..models.euler_angles import coordinates_of, pose_of, twist_of
-from ..models.exact_dynamics import ExactDynamics, joint_motion, rotation_between
+from ..models.exact_dynamics import (
+    ExactDynamics,
+    Stretch,
+    dynamics_of,
+    half_steps,
+    joint_motion,
+    joint_motions,
+    rotation_between,
+)
 from ..task.plan import PlannedJump
 
-Row = tuple[float, int, Array, Array]
-"""A time [s], its interval, and the state."""
 FLIGHT_STEP = 0.002
 """Longest step of the flight's integration [s]; halving it changes a landing by less than 1 um."""
 
@@ -78,25 +86,38 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics = ExactDynamics(robot)
-    flights = flight_knots(plan)
-    flown = [_fly(plan, dynamics, lift_off, touchdown) for lift_off, touchdown in flights]
-    flying = {k for first, end in flights for k in range(first, end)}
-    followed = [_follow_interval(plan, dynamics, k) for k in range(len(plan.time) - 1)]
-    defect = np.array([missed for missed, _ in followed])
+    dynamics, flights = dynamics_of(robot), flight_knots(plan)
+    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
+    single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
+    places, rates = dynamics.follow([*(one.stretch for one in flown), *single])
+    behind = np.cumsum([len(one.stretch.steps) for one in flown])
+    errors = tuple(
+        (float(np.linalg.norm(places[last - 1, :3] - plan.position[end, :3])),
+         float(rotation_between(places[last - 1, 3:7], plan.position[end, 3:7])))
+        for last, (_, end) in zip(behind, flights, strict=True)
+    )  # fmt: skip
+    # Behind the flights every lasting interval has its middle and its end.
+    first = int(behind[-1])
+    defect = _defects(plan, dynamics, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
-    between = [row for rows, _ in flown for row in rows]
-    between += [row for k, (_, row) in enumerate(followed) if row is not None and k not in flying]
-    samples = _sample(plan, dynamics, between)
-    states = [dynamics.centroidal(q, v) for q, v in zip(plan.position, plan.velocity, strict=True)]
-    placed = [dynamics.soles(q) for q in plan.position]
+    grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
+    half = 0.5 * np.diff(plan.time)[lasting[grounded]]
+    samples, terms, knots = _sample(
+        plan, dynamics,
+        np.concatenate([*(one.time for one in flown), plan.time[lasting[grounded]] + half]),
+        np.concatenate([*(one.knot for one in flown), lasting[grounded]]),
+        np.concatenate([places[:first], places[first::2][grounded]]),
+        np.concatenate([rates[:first], rates[first::2][grounded]]),
+    )  # fmt: skip
+    contacts, balls = plan.contact.shape[1], [ball.foot for ball in dynamics.balls]
+    ahead = terms.ahead[knots, contacts:]
+    ahead[:, balls] = matrices_of_quaternions(plan.position[:, 3:7])[:, None, :, 0]
     return Replay(
-        samples, defect, gap, wrench, tuple(error for _, error in flown),
-        np.array([s[0] for s in states]),
-        np.array([s[1] for s in states]),
-        np.array([s[2] for s in states]),
-        np.array([soles for soles, _ in placed]),
-        np.unwrap(np.array([heading for _, heading in placed]), axis=0),
+        samples, defect, gap, wrench, errors,
+        terms.com[knots], terms.com_velocity[knots], terms.momentum[knots],
+        terms.points[knots, contacts:],
+        np.unwrap(np.arctan2(ahead[:, :, 1], ahead[:, :, 0]), axis=0),
         flights,
     )  # fmt: skip
 
@@ -123,25 +144,37 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
     return tuple(found)
 
 
-def _fly(
-    plan: PlannedJump, dynamics: ExactDynamics, lift_off: int, touchdown: int
-) -> tuple[list[Row], tuple[float, float]]:
-    """Integrate the flight from the plan's state at lift-off, and compare its end with the planned touchdown."""
-    q, v = plan.position[lift_off], plan.velocity[lift_off]
-    nothing = np.zeros(plan.contact_force.shape[1:])
-    out = []
+@dataclass(frozen=True)
+class _Flight:
+    """A whole flight: time and interval of the end of every step, (n_steps,)."""
+
+    stretch: Stretch
+    time: Array
+    knot: NDArray[np.int64]
+
+
+def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
+    """The flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
+    angles, speeds = list[Array](), list[Array]()
+    steps, times, knots = list[Array](), list[Array](), list[NDArray[np.int64]]()
     for k in range(lift_off, touchdown):
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        q = np.concatenate([q[:7], plan.position[k, 7:]])
-        v = np.concatenate([v[:6], plan.velocity[k, 6:]])
+        duration = float(joints.duration)
         # An even number of steps, so that the interval's middle is among them.
-        step = 0.5 * joints.duration / math.ceil(0.5 * joints.duration / FLIGHT_STEP)
-        steps = dynamics.integrate(q, v, joints, nothing, step)
-        out += [(float(plan.time[k]) + t, k, there, moving) for t, there, moving in steps]
-        _, q, v = steps[-1]
-    planned = plan.position[touchdown]
-    missed = float(np.linalg.norm(q[:3] - planned[:3])), rotation_between(q[3:7], planned[3:7])
-    return out, missed
+        count = 2 * math.ceil(0.5 * duration / FLIGHT_STEP)
+        step = duration / count
+        own = joints.at(np.asarray(0.5 * step * np.arange(2 * count + 1)[:, None]))
+        kept = slice(1 if angles else 0, None)
+        angles.append(own[0][kept])
+        speeds.append(own[1][kept])
+        steps.append(np.full(count, step))
+        times.append(plan.time[k] + step * np.arange(1, count + 1))
+        knots.append(np.full(count, k))
+    stretch = Stretch(
+        plan.position[lift_off, :7], plan.velocity[lift_off, :6], np.concatenate(angles),
+        np.concatenate(speeds), np.zeros(plan.contact_force.shape[1:]), np.concatenate(steps),
+    )  # fmt: skip
+    return _Flight(stretch, np.concatenate(times), np.concatenate(knots))
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
@@ -151,89 +184,73 @@ def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
     return np.asarray(still)
 
 
-def _follow_interval(
-    plan: PlannedJump, dynamics: ExactDynamics, k: int
-) -> tuple[Array, Row | None]:
-    """How far exact dynamics from knot ``k`` misses the next knot, see ``Replay``, and the middle of
-    the interval where it lasts."""
-    q, v, planned_q, planned_v = (
-        plan.position[k], plan.velocity[k], plan.position[k + 1], plan.velocity[k + 1],
-    )  # fmt: skip
-    force, middle = plan.contact_force[k], None
-    if plan.time[k + 1] > plan.time[k]:
-        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        steps = dynamics.integrate(q, v, joints, force, 0.5 * joints.duration)
-        t, there, moving = steps[0]
-        middle = (float(plan.time[k]) + t, k, there, moving)
-        _, q, v = steps[-1]
-    else:
-        v, _ = dynamics.velocity_after_impact(q, v, force, held_joints(plan, k))
-    missed = np.array(
+def _defects(
+    plan: PlannedJump, dynamics: ExactDynamics, lasting: NDArray[np.int64], places: Array, rates: Array
+) -> Array:  # fmt: skip
+    """How far exact dynamics from each knot misses the next, see ``Replay``; ``places`` and ``rates`` are
+    the ends of the lasting intervals."""
+    reached, moving = plan.position[:-1, :7].copy(), plan.velocity[:-1, :6].copy()
+    reached[lasting], moving[lasting] = places[:, :7], rates[:, :6]
+    for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist():
+        moving[k] = dynamics.velocity_after_impact(
+            plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
+        )[0][:6]
+    missed, slip = reached - plan.position[1:, :7], moving - plan.velocity[1:, :6]
+    return np.column_stack(
         [
-            np.linalg.norm(q[:3] - planned_q[:3]),
-            rotation_between(q[3:7], planned_q[3:7]),
-            np.linalg.norm(v[:3] - planned_v[:3]),
-            np.linalg.norm(v[3:6] - planned_v[3:6]),
+            np.linalg.norm(missed[:, :3], axis=1),
+            rotation_between(reached[:, 3:7], plan.position[1:, 3:7]),
+            np.linalg.norm(slip[:, :3], axis=1),
+            np.linalg.norm(slip[:, 3:], axis=1),
         ]
     )
-    return missed, middle
 
 
-def _sample(plan: PlannedJump, dynamics: ExactDynamics, between: list[Row]) -> ReplaySamples:
-    """All knots, the middles of stance intervals and the steps of the flights, in time's order."""
-    inside: dict[int, list[Row]] = {}
-    for row in between:
-        inside.setdefault(row[1], []).append(row)
-    rows = list[Row]()
-    for k in range(len(plan.time)):
-        interval = min(k, len(plan.time) - 2)
-        rows.append((float(plan.time[k]), interval, plan.position[k], plan.velocity[k]))
-        rows += inside.get(k, [])
-    torque, points, velocities = [], [], []
-    for time, k, q, v in rows:
-        places, jacobian = dynamics.contact_jacobians(q)
-        points.append(places)
-        velocities.append((jacobian @ v).reshape(-1, 3))
-        if plan.time[k + 1] > plan.time[k]:
-            joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-            acceleration = joints.at(time - float(plan.time[k]))[2]
-            force = plan.contact_force[k]
-            torque.append(dynamics.joint_torque(q, v, acceleration, force, jacobian))
-        else:
-            torque.append(np.zeros(plan.joint_torque.shape[1]))
-    return ReplaySamples(
-        np.array([row[0] for row in rows]),
-        np.array([row[1] for row in rows]),
-        np.array([row[2] for row in rows]),
-        np.array([row[3] for row in rows]),
-        np.array(torque),
-        np.array(points),
-        np.array(velocities),
-    )
+def _sample(
+    plan: PlannedJump, dynamics: ExactDynamics,
+    time: Array, knot: NDArray[np.int64], places: Array, rates: Array,
+) -> tuple[ReplaySamples, MotionTerms, NDArray[np.int64]]:  # fmt: skip
+    """All knots and the given states between them, in time's order; what follows from them; and which
+    samples are the knots."""
+    count = len(plan.time)
+    own = np.arange(count)
+    # A knot comes before what lies in the interval behind it.
+    order = np.lexsort((np.concatenate([plan.time, time]), np.concatenate([own, knot])))
+    interval = np.concatenate([np.minimum(own, count - 2), knot])[order]
+    instant = np.concatenate([plan.time, time])[order]
+    position = np.concatenate([plan.position, places])[order]
+    velocity = np.concatenate([plan.velocity, rates])[order]
+    joints = joint_motions(plan.position, plan.velocity, plan.time, interval)
+    lasts = np.asarray(joints.duration > 0.0)
+    joints = joints._replace(duration=np.where(lasts, joints.duration, 1.0))
+    bend = joints.at((instant - plan.time[interval])[:, None])[2]
+    force = np.where(lasts[:, :, None], plan.contact_force[interval], 0.0)
+    terms = dynamics.motion(position, velocity, bend, force)
+    contacts = force.shape[1]
+    samples = ReplaySamples(
+        instant, interval, position, velocity, np.where(lasts, terms.torque, 0.0),
+        terms.points[:, :contacts], terms.point_velocity[:, :contacts],
+    )  # fmt: skip
+    return samples, terms, np.flatnonzero(order < count)
 
 
 def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
     """What is left over of the planner's own equations in every interval, zero at impacts.
 
     The ``full`` formulation holds accelerations of its coordinates constant over an interval and
-    fulfils the equations of motion in its middle. Pinocchio evaluates these anew.
+    fulfils the equations of motion in its middle. Exact dynamics evaluates these anew.
 
     Returns the gap, how far the coordinates miss those of a constant acceleration [m or rad],
     (N-1,), and the base's six equations of motion in the middle [N or N m], (N-1,).
     """
     places, rates = coordinates_of(plan.position, plan.velocity)
-    count = len(plan.time) - 1
-    gap, wrench = np.zeros(count), np.zeros(count)
-    for k in range(count):
-        h = float(plan.time[k + 1] - plan.time[k])
-        if h <= 0.0:
-            continue
-        bend = (rates[k + 1] - rates[k]) / h
-        gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max()
-        middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend
-        velocity, acceleration = twist_of(middle, rates[k] + 0.5 * h * bend, bend)
-        left = dynamics.base_residual(
-            pose_of(middle), velocity, acceleration, plan.contact_force[k]
-        )
-        wrench[k] = np.abs(left).max()
+    gap, wrench = np.zeros(len(plan.time) - 1), np.zeros(len(plan.time) - 1)
+    k = np.flatnonzero(np.diff(plan.time) > 0.0)
+    h = np.diff(plan.time)[k][:, None]
+    bend = (rates[k + 1] - rates[k]) / h
+    gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max(axis=1)
+    middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend
+    velocity, acceleration = twist_of(middle, rates[k] + 0.5 * h * bend, bend)
+    left = dynamics.base_residual(pose_of(middle), velocity, acceleration, plan.contact_force[k])
+    wrench[k] = np.abs(left).max(axis=1)
     return gap, wrench

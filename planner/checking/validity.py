@@ -1,6 +1,6 @@
 """Decides whether a robot may follow a plan: named tests against exact dynamics and the task.
 
-The check is independent of the solver. It uses Pinocchio and NumPy and nothing of the planner's own model. A
+The check is independent of the solver. It uses exact dynamics (``models/exact_dynamics.py``) and nothing of the planner's own model. A
 plan is valid if every test passes. The report keeps the measured value of every test, passed or not.
 """
 

@@ -12,8 +12,8 @@ nevertheless receives these variables, which agree with the planned forces.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +21,26 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
-from ..models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
-from ..models.exact_dynamics import AFTER, BEFORE, ExactDynamics, JointMotion, joint_motion
+from ..models.euler_angles import (
+    angular_motion,
+    euler_angles,
+    euler_rates,
+    rotation,
+    times,
+    times_transposed,
+)
+from ..models.exact_dynamics import (
+    AFTER,
+    BEFORE,
+    ExactDynamics,
+    JointMotion,
+    dynamics_of,
+    joint_motions,
+)
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
-
-State = tuple[float, int, Array, Array, Array]
-"""Time, interval, q, v and the accelerations of base (angular, in the body) and joints."""
 
 CENTROIDAL = ("com", "com_velocity", "angular_momentum")
 
@@ -50,28 +60,24 @@ def reference_table(
 
     Two rows are at most ``STEP`` apart, or what ``steps`` says for a phase [s].
     """
-    dynamics = ExactDynamics(plan.task.equipped(robot))
-    forces = _MiddleValues(plan, plan.contact_force)
-    torques = _MiddleValues(plan, plan.joint_torque)
-    rows: dict[str, list[Array]] = {}
-    times: list[float] = []
-    intervals: list[int] = []
-    for time, k, q, v, bend in _states(plan, dynamics, steps or {}):
-        times.append(time)
-        intervals.append(k)
-        row = _row(dynamics, q, v, forces.at(time, k))
-        row["joint_torque"] = torques.at(time, k)
-        row["angular_acceleration"], row["joint_acceleration"] = bend[:3], bend[3:]
-        for name, value in row.items():
-            rows.setdefault(name, []).append(value)
-    columns = {name: np.array(values) for name, values in rows.items()}
+    dynamics = dynamics_of(plan.task.equipped(robot))
+    states = _states(plan, dynamics, steps or {})
+    instants, intervals = states.time, states.knot
+    force = _middle_values(plan, plan.contact_force, instants, intervals)
+    columns = _rows(dynamics, states.position, states.velocity, force)
+    columns["joint_torque"] = _middle_values(plan, plan.joint_torque, instants, intervals)
+    columns["angular_acceleration"], columns["joint_acceleration"] = (
+        states.bend[:, :3], states.bend[:, 3:],
+    )  # fmt: skip
     for foot in range(len(robot.feet)):
         columns["foot_yaw"][:, foot] = np.unwrap(columns["foot_yaw"][:, foot])
     _follow_one_sign(columns["orientation"])
     if plan.task.formulation != "full":
         for name in CENTROIDAL:
             own = getattr(plan, name)
-            columns[name] = np.stack([np.interp(times, plan.time, own[:, i]) for i in range(3)], 1)
+            columns[name] = np.stack(
+                [np.interp(instants, plan.time, own[:, i]) for i in range(3)], 1
+            )
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
     standing = {name: values[:1] for name, values in columns.items()}
@@ -89,7 +95,7 @@ def reference_table(
     }
     end = stand_time + float(plan.time[-1])
     return JumpTable(
-        np.concatenate([[0.0, stand_time], stand_time + np.array(times)]),
+        np.concatenate([[0.0, stand_time], stand_time + instants]),
         {n: np.concatenate([standing[n], standing[n], c]) for n, c in columns.items()},
         stand_time,
         start.get(Phase.THRUST, start.get(Phase.SQUAT, stand_time)),
@@ -112,108 +118,118 @@ def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, 
         yield stand_time + begin, stand_time + lift_off, stand_time + touchdown
 
 
-def _contacts(plan: PlannedJump, intervals: list[int]) -> NDArray[np.bool_] | None:
+def _contacts(plan: PlannedJump, intervals: NDArray[np.int64]) -> NDArray[np.bool_] | None:
     """By row which points carry load, where it is not always all of them or none."""
     if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
         return None
     return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
 
 
-def _states(
-    plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]
-) -> Iterator[State]:
+class _States(NamedTuple):
+    """The motion row by row: time and interval (n,), q and v of Pinocchio, and the accelerations of base (angular, in
+    the body) and joints, (n, 3 + n_joints)."""
+
+    time: Array
+    knot: NDArray[np.int64]
+    position: Array
+    velocity: Array
+    bend: Array
+
+
+def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
     """The motion, knots and what lies between them; two rows at an impact."""
-    angles = euler_angles(plan.position[:, 3:7])
     last = len(plan.time) - 1
-    for k in range(last):
-        start, h = float(plan.time[k]), float(plan.time[k + 1] - plan.time[k])
-        yield start, k, plan.position[k], plan.velocity[k], plan.acceleration[k, 3:]
-        if h <= 0.0:
-            continue
-        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        base = _base_motion(plan, dynamics, angles, k, h)
-        step = steps.get(Phase(int(plan.phase[k])), STEP)
-        count = math.ceil(h / step - 1e-9)
-        for i in range(1, count):
-            yield start + i * h / count, k, *_between(base, joints, i * h / count, dynamics)
-    still = np.zeros(plan.velocity.shape[1] - 3)
-    yield float(plan.time[last]), last - 1, plan.position[last], plan.velocity[last], still
-
-
-def _base_motion(
-    plan: PlannedJump, dynamics: ExactDynamics, angles: Array, k: int, h: float
-) -> JointMotion:
-    """The cubic of base position and Euler angles between two knots."""
-    ends = []
-    for knot in (k, k + 1):
-        turn = dynamics.pin.Quaternion(plan.position[knot, 3:7]).toRotationMatrix()
-        v = plan.velocity[knot]
-        ends.append(np.concatenate([product(turn, v[:3]), euler_rates(angles[knot], v[3:6])]))
-    places = [np.concatenate([plan.position[i, :3], angles[i]]) for i in (k, k + 1)]
-    return JointMotion(places[0], places[1], ends[0], ends[1], h)
-
-
-def _between(
-    base: JointMotion, joints: JointMotion, time: float, dynamics: ExactDynamics
-) -> tuple[Array, Array, Array]:
-    """Pinocchio's q and v between two knots, and the accelerations of a ``State``."""
-    place, rate, bend = base.at(time)
-    position, velocity, acceleration = joints.at(time)
-    turn = rotation(place[3:])
-    spin, bent = angular_motion(place[3:], rate[3:], bend[3:])
-    quaternion = dynamics.pin.Quaternion(turn).coeffs()
-    return (
-        np.concatenate([place[:3], quaternion, position]),
-        np.concatenate([product(turn.T, rate[:3]), spin, velocity]),
-        np.concatenate([bent, acceleration]),
+    lengths = np.diff(plan.time)
+    longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
+    counts = np.maximum(np.ceil(lengths / longest - 1e-9), 1.0).astype(np.int64)
+    knot = np.repeat(np.arange(last), counts)
+    number = np.arange(len(knot)) - (np.cumsum(counts) - counts)[knot]
+    between = number > 0
+    passed = number * lengths[knot] / counts[knot]
+    position, velocity = plan.position[knot], plan.velocity[knot]
+    bend = plan.acceleration[knot, 3:]
+    position[between], velocity[between], bend[between] = _between(
+        plan, dynamics, knot[between], passed[between, None]
+    )
+    still = np.zeros((1, plan.velocity.shape[1] - 3))
+    return _States(
+        np.append(plan.time[knot] + passed, plan.time[last]),
+        np.append(knot, last - 1),
+        np.concatenate([position, plan.position[last:]]),
+        np.concatenate([velocity, plan.velocity[last:]]),
+        np.concatenate([bend, still]),
     )
 
 
-class _MiddleValues:
-    """What holds in the middle of the intervals, at any time: linear from one middle to the next,
-    never across lift-off or touchdown."""
+def _between(
+    plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
+) -> tuple[Array, Array, Array]:
+    """Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    base position, Euler angles and joints between two knots."""
+    angles = euler_angles(plan.position[:, 3:7])
+    turns = np.array(
+        [dynamics.pin.Quaternion(row).toRotationMatrix() for row in plan.position[:, 3:7]]
+    )
+    places = np.hstack([plan.position[:, :3], angles])
+    rates = np.hstack(
+        [times(turns, plan.velocity[:, :3]), euler_rates(angles, plan.velocity[:, 3:6])]
+    )
+    length = (plan.time[knot + 1] - plan.time[knot])[:, None]
+    base = JointMotion(places[knot], places[knot + 1], rates[knot], rates[knot + 1], length)
+    place, rate, bend = base.at(passed)
+    joints = joint_motions(plan.position, plan.velocity, plan.time, knot).at(passed)
+    turn = rotation(place[:, 3:])
+    spin, bent = angular_motion(place[:, 3:], rate[:, 3:], bend[:, 3:])
+    quaternions = np.array([dynamics.pin.Quaternion(each).coeffs() for each in turn]).reshape(-1, 4)
+    return (
+        np.hstack([place[:, :3], quaternions, joints[0]]),
+        np.hstack([times_transposed(turn, rate[:, :3]), spin, joints[1]]),
+        np.hstack([bent, joints[2]]),
+    )
 
-    def __init__(self, plan: PlannedJump, values: Array) -> None:
-        self._time, self._values = plan.time, values
-        lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-        ends = [knot for flight in flight_knots(plan) for knot in flight]
-        self._groups = np.split(lasting, np.searchsorted(lasting, ends))
-        self._ends = np.array(ends)
 
-    def at(self, time: float, interval: int) -> Array:
-        """The values at an instant of that interval."""
-        group = self._groups[int(np.searchsorted(self._ends, interval, side="right"))]
-        middles = 0.5 * (self._time[group] + self._time[group + 1])
-        after = int(np.searchsorted(middles, time))
-        if after in (0, len(middles)):
-            return np.asarray(self._values[group[min(after, len(middles) - 1)]])
-        before = after - 1
-        share = (time - middles[before]) / (middles[after] - middles[before])
-        first, second = self._values[group[before]], self._values[group[after]]
-        return np.asarray(first + share * (second - first))
+def _middle_values(
+    plan: PlannedJump, values: Array, instants: Array, intervals: NDArray[np.int64]
+) -> Array:
+    """What holds in the middle of the intervals, at instants in those intervals: linear from one middle
+    to the next, never across lift-off or touchdown."""
+    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
+    found = np.empty((len(instants), *values.shape[1:]))
+    number = np.searchsorted(ends, intervals, side="right")
+    for k, group in enumerate(np.split(lasting, np.searchsorted(lasting, ends))):
+        here = np.flatnonzero(number == k)
+        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
+        after = np.searchsorted(middles, instants[here])
+        outside = (after == 0) | (after == len(middles))
+        found[here] = values[group[np.minimum(after, len(middles) - 1)]]
+        here, after = here[~outside], after[~outside]
+        share = (instants[here] - middles[after - 1]) / (middles[after] - middles[after - 1])
+        first, second = values[group[after - 1]], values[group[after]]
+        share = share.reshape(-1, *(1,) * (values.ndim - 1))
+        found[here] = first + share * (second - first)
+    return found
 
 
-def _row(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
-    """The reference's fields in one state under those forces."""
-    com, com_velocity, momentum = dynamics.centroidal(q, v)
-    points = dynamics.evaluated_points(q)
-    yaw, pitch = dynamics.foot_angles()
-    arms = points - com
-    moments = arms[:, AFTER] * force[:, BEFORE] - arms[:, BEFORE] * force[:, AFTER]
+def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
+    """The reference's fields in n states under those forces (n, n_contacts, 3)."""
+    feet = dynamics.feet(q, v)
+    arms = feet.points - feet.com[:, None]
+    moments = arms[:, :, AFTER] * force[:, :, BEFORE] - arms[:, :, BEFORE] * force[:, :, AFTER]
     return {
-        "com": com,
-        "com_velocity": com_velocity,
-        "com_acceleration": force.sum(axis=0) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
-        "orientation": q[3:7].copy(),
-        "angular_velocity": v[3:6].copy(),
-        "angular_momentum": momentum,
-        "angular_momentum_rate": moments.sum(axis=0),
-        "foot_position": dynamics.sole_places(),
-        "foot_velocity": dynamics.sole_velocities(v),
-        "foot_yaw": yaw,
-        "foot_pitch": pitch,
-        "joint_position": q[7:].copy(),
-        "joint_velocity": v[6:].copy(),
+        "com": feet.com,
+        "com_velocity": feet.com_velocity,
+        "com_acceleration": force.sum(axis=1) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
+        "orientation": q[:, 3:7].copy(),
+        "angular_velocity": v[:, 3:6].copy(),
+        "angular_momentum": feet.momentum,
+        "angular_momentum_rate": moments.sum(axis=1),
+        "foot_position": feet.soles,
+        "foot_velocity": feet.sole_velocity,
+        "foot_yaw": feet.yaw,
+        "foot_pitch": feet.pitch,
+        "joint_position": q[:, 7:].copy(),
+        "joint_velocity": v[:, 6:].copy(),
     }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
-from ...mathematics.rotations import matrices_of_quaternions, multiply
+from ...mathematics.rotations import matrices_of_quaternions
 
 ORDER = [1, 0, 2]
 """The planner's pitch, roll, yaw from angles about x, y, z, and back."""
@@ -32,69 +32,85 @@ def euler_angles(quaternions: Array) -> Array:
 
 
 def euler_rates(angles: Array, angular_velocity: Array) -> Array:
-    """The rates [rad/s] of the angles (3,) at a body-frame angular velocity (3,)."""
-    x, _, z = angles
+    """The rates [rad/s] of the angles (..., 3) at a body-frame angular velocity (..., 3)."""
+    (x, _, z), (p, q, r) = _parts(angles), _parts(angular_velocity)
     # Undone: angular velocity = Rz' (x rate, y rate cos x, -y rate sin x) + (0, 0, z rate).
-    first = np.cos(z) * angular_velocity[0] - np.sin(z) * angular_velocity[1]
-    second = np.sin(z) * angular_velocity[0] + np.cos(z) * angular_velocity[1]
-    about_y = second / np.cos(x)
-    return np.array([first, about_y, angular_velocity[2] + about_y * np.sin(x)])
+    about_y = (np.sin(z) * p + np.cos(z) * q) / np.cos(x)
+    return np.stack([np.cos(z) * p - np.sin(z) * q, about_y, r + about_y * np.sin(x)], axis=-1)
 
 
 def rotation(angles: Array) -> Array:
-    """Ry Rx Rz, from body to world."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    return product(product(about_y, about_x), about_z)
+    """Ry Rx Rz, from body to world, (..., 3, 3)."""
+    (cx, cy, cz), (sx, sy, sz) = _parts(np.cos(angles)), _parts(np.sin(angles))
+    turns = np.zeros((3, *angles.shape, 3))
+    turns[0, ..., 0, 0] = turns[1, ..., 1, 1] = turns[2, ..., 2, 2] = 1.0
+    for turn, one, other, cosine, sine in ((0, 1, 2, cx, sx), (1, 2, 0, cy, sy), (2, 0, 1, cz, sz)):
+        turns[turn, ..., one, one] = turns[turn, ..., other, other] = cosine
+        turns[turn, ..., one, other], turns[turn, ..., other, one] = -sine, sine
+    return product(product(turns[1], turns[0]), turns[2])
 
 
 def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
-    """Angular velocity [rad/s] and acceleration [rad/s^2] in the body frame."""
-    x, _, z = angles
-    back = np.array([[np.cos(z), np.sin(z), 0.0], [-np.sin(z), np.cos(z), 0.0], [0.0, 0.0, 1.0]])
+    """Angular velocity [rad/s] and acceleration [rad/s^2] in the body frame, all (..., 3)."""
+    x, _, z = _parts(angles)
+    (p, q, r), (a, b, c) = _parts(rates), _parts(accelerations)
     sine, cosine = np.sin(x), np.cos(x)
-    turning = product(back, np.array([rates[0], rates[1] * cosine, -rates[1] * sine]))
-    bend = np.array(
-        [
-            accelerations[0],
-            accelerations[1] * cosine - rates[0] * rates[1] * sine,
-            -accelerations[1] * sine - rates[0] * rates[1] * cosine,
-        ]
-    )
-    about_z = np.array([0.0, 0.0, rates[2]])
-    change = product(back, bend) - cross(about_z, turning) + np.array([0.0, 0.0, accelerations[2]])
-    return turning + about_z, change
+
+    def back(u: Array, v: Array, w: Array) -> Array:
+        """Rz' of a vector."""
+        return np.stack([np.cos(z) * u + np.sin(z) * v, -np.sin(z) * u + np.cos(z) * v, w], axis=-1)
+
+    turning = back(p, q * cosine, -q * sine)
+    bend = back(a, b * cosine - p * q * sine, -b * sine - p * q * cosine)
+    about_z, more = np.zeros_like(turning), np.zeros_like(turning)
+    about_z[..., 2], more[..., 2] = r, c
+    return turning + about_z, bend - cross(about_z, turning) + more
+
+
+def _parts(vectors: Array) -> tuple[Array, Array, Array]:
+    """The three components of vectors (..., 3)."""
+    return vectors[..., 0], vectors[..., 1], vectors[..., 2]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The cross product of two vectors (3,); NumPy's own takes ten times as long."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    """The cross product of vectors (..., 3); NumPy's own takes several times as long."""
+    (ax, ay, az), (bx, by, bz) = _parts(a), _parts(b)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def times(matrices: Array, vectors: Array) -> Array:
+    """Matrices (..., 3, 3) times vectors (..., 3)."""
+    return np.asarray(np.add.reduce(matrices * vectors[..., None, :], axis=-1))
+
+
+def times_transposed(matrices: Array, vectors: Array) -> Array:
+    """The transposed matrices (..., 3, 3) times vectors (..., 3)."""
+    return np.asarray(np.add.reduce(matrices * vectors[..., :, None], axis=-2))
 
 
 def pose_of(q: Array) -> Array:
-    """The robot's position, with a quaternion x, y, z, w, of the planner's coordinates.
+    """The robot's positions, with a quaternion x, y, z, w, of the planner's coordinates (..., n_velocities).
 
     The quaternion is a product of half angles: it changes sign only where a full turn does.
     """
-    half, quaternion = np.zeros((3, 4)), np.empty(4)
-    half[[0, 1, 2], [1, 0, 2]], half[:, 3] = np.sin(q[3:6] / 2), np.cos(q[3:6] / 2)
-    multiply(half[0], half[1], quaternion)
-    multiply(quaternion, half[2], quaternion)
-    return np.concatenate([q[:3], quaternion, q[6:]])
+    (sy, sx, sz), (cy, cx, cz) = _parts(np.sin(q[..., 3:6] / 2)), _parts(np.cos(q[..., 3:6] / 2))
+    x, y, z, w = cy * sx, sy * cx, -(sy * sx), cy * cx
+    turned = [x * cz + y * sz, y * cz - x * sz, w * sz + z * cz, w * cz - z * sz]
+    return np.concatenate([q[..., :3], np.stack(turned, axis=-1), q[..., 6:]], axis=-1)
 
 
 def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
-    """The robot's velocity and acceleration, with the base's part in the body frame, of the
-    planner's coordinates, their rates and accelerations."""
-    angles = q[3:6][ORDER]
-    spin, turn = angular_motion(angles, v[3:6][ORDER], bend[3:6][ORDER])
-    back = rotation(angles).T
-    speed = back @ v[:3]
-    pull = back @ bend[:3] - cross(spin, speed)
-    return np.concatenate([speed, spin, v[6:]]), np.concatenate([pull, turn, bend[6:]])
+    """The robot's velocities and accelerations, with the base's part in the body frame, of the
+    planner's coordinates, their rates and accelerations, all (..., n_velocities)."""
+    angles = q[..., 3:6][..., ORDER]
+    spin, turn = angular_motion(angles, v[..., 3:6][..., ORDER], bend[..., 3:6][..., ORDER])
+    to_world = rotation(angles)
+    speed = times_transposed(to_world, v[..., :3])
+    pull = times_transposed(to_world, bend[..., :3]) - cross(spin, speed)
+    return (
+        np.concatenate([speed, spin, v[..., 6:]], axis=-1),
+        np.concatenate([pull, turn, bend[..., 6:]], axis=-1),
+    )
 
 
 def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
@@ -102,9 +118,6 @@ def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
     (n, n_positions) and ``velocity`` (n, n_velocities) as ``pose_of`` and ``twist_of`` give them."""
     angles = euler_angles(position[:, 3:7])
     places = np.hstack([position[:, :3], angles[:, ORDER], position[:, 7:]])
-    rates = np.zeros_like(places)
-    for k, row in enumerate(velocity):
-        rates[k, :3] = rotation(angles[k]) @ row[:3]
-        rates[k, 3:6] = euler_rates(angles[k], row[3:6])[ORDER]
-        rates[k, 6:] = row[6:]
-    return places, rates
+    moved = times(rotation(angles), velocity[:, :3])
+    turned = euler_rates(angles, velocity[:, 3:6])[:, ORDER]
+    return places, np.hstack([moved, turned, velocity[:, 6:]])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import HeldLoad, welded
 from ..task.files import PlanError
+from ..task.scaling import per_robot
 from ..task.sequence import LEVEL, Slope, StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .euler_angles import ORDER, angles_of, pose_of, rotation
@@ -32,7 +32,7 @@ def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
     Raises:
         PlanError: held joints share motors with others.
     """
-    return _model(robot.model_dump_json(), False)
+    return _model(robot, False)
 
 
 def symmetric_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
@@ -42,13 +42,13 @@ def symmetric_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFi
     Raises:
         PlanError: held joints share motors with others.
     """
-    return _model(robot.model_dump_json(), True)
+    return _model(robot, True)
 
 
-@lru_cache(maxsize=8)
-def _model(text: str, symmetric: bool) -> tuple[SymbolicModel, StanceFinder]:
+@per_robot
+def _model(robot: RobotDescription, symmetric: bool) -> tuple[SymbolicModel, StanceFinder]:
     try:
-        part = welded(RobotDescription.model_validate_json(text))
+        part = welded(robot)
     except ValueError as error:
         raise PlanError(str(error), family="stance") from error
     robot, loads = part.robot, [load for load in part.loads if _matters(load)]
@@ -87,6 +87,8 @@ LEAN_ROUNDS, LEG_STEPS = 12, 20
 """Of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
 REACHED, BALANCED = 1e-12, 1e-10
 """m; what feet miss of such ground at most, and the centre of mass of where it stands on level ground."""
+MOST_PLACED = 64
+"""Stances that are kept."""
 UPRIGHT_REACH = 1e-7
 """m; by more than this the legs do not reach ground that leans."""
 
@@ -98,6 +100,7 @@ class StanceFinder:
         """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
         self.robot, self.pairs = robot, tuple(pairs)
         self._body = ExactDynamics(robot)
+        self._placed: dict[tuple[bytes, StanceLocation], Stance] = {}
 
     def on_ground(self, joints: Array, place: StanceLocation) -> Stance:
         """The stance at a place. On ground that leans the base is as upright as on level ground, and
@@ -107,6 +110,15 @@ class StanceFinder:
         Raises:
             PlanError: there is none on level ground, or the legs do not reach ground that leans.
         """
+        # Jumps begin in the same stance again and again.
+        key = joints.tobytes(), place
+        if key not in self._placed:
+            if len(self._placed) > MOST_PLACED:
+                self._placed.clear()
+            self._placed[key] = self._on_ground(joints, place)
+        return self._placed[key]
+
+    def _on_ground(self, joints: Array, place: StanceLocation) -> Stance:
         at = (place.x, place.y, place.z)
         level = self.place(joints, heading=place.heading, at=at)
         if place.slope == LEVEL:

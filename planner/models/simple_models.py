@@ -60,8 +60,7 @@ class RigidBody:
 def composite_inertia(robot: RobotDescription, start: Stance) -> RigidBody:
     """The body of a robot in its stance."""
     joints = start.coordinates[6:]
-    side = ExactDynamics(robot).joint_side(joints[None], np.zeros((1, len(joints))))
-    com, inertia = side.com[0], side.inertia[0]
+    com, inertia = ExactDynamics(robot).standing_inertia(joints)
     hips, straight, lengths, knees = [], [], [], []
     for leg in limbs_of(robot)[0]:
         origins = [np.array(robot.joints[index].origin) for index in leg]

@@ -51,9 +51,11 @@ class HopPlanner:
 
     def prepare(self) -> None:
         """Load compiled functions and make the correctors, so that no later plan has to wait for them."""
-        # Feet land in another way after a jump back; a step up has other bounds than one down.
+        # Feet land in another way after a jump back; a step up has other bounds than one down. Jumps
+        # straight ahead have fewer coordinates.
         for ahead, up in ((0.0, 0.0), (-0.05, 0.0), (0.2, 0.03), (0.2, -0.03)):
-            self.plan(HopRequest(ahead, 0.0, 0.0, up))
+            for aside in (0.0, 0.01):
+                self.plan(HopRequest(ahead, aside, 0.0, up))
 
     def samples(self, wanted: HopRequest) -> PlanSamples:
         """The stored plans of jumps of its kind."""
@@ -94,7 +96,9 @@ class HopPlanner:
         """A plan that has not been checked, the steps and the processor time [s]."""
         started = time.process_time()
         task = coarse(task_of(wanted, self.robot.name).resolved(self.robot))
-        problem = make_problem(task, self.robot, coordinates="full")
+        straight = not wanted.aside and not wanted.turn
+        coordinates = "sagittal" if straight else "full"
+        problem = make_problem(task, self.robot, coordinates=coordinates)
         plan, steps = None, 0
         for near in self._guesses(wanted):
             if not can_start(problem, near):
@@ -104,7 +108,7 @@ class HopPlanner:
             steps += found.steps
             if found.solved:
                 plan = PlannedJump(task=task, **unpack(problem, found.values))
-                plan = replace(plan, statistics={"coordinates": "full"})
+                plan = replace(plan, statistics={"coordinates": coordinates})
                 break
         return plan, steps, time.process_time() - started
 

@@ -124,6 +124,9 @@ class ProblemBuilder:
         )
         self.pieces, self.free_base = pieces, coordinates.free_base
         self._nominal: dict[int, Array] = {}
+        self._tables: dict[tuple[str, tuple[Rows, ...]], tuple[tuple[str, ...], Array, Array]] = {}
+        self._of_motors: dict[float, list[Rows]] = {}
+        self._body_points = body_points(model, coordinates)
 
     def build(self) -> FullProblem:
         """The problem with its bounds and parameters."""
@@ -212,16 +215,18 @@ class ProblemBuilder:
     def _rows(self, name: str, k: int, families: list[Rows]) -> None:
         """Bounds and families of a piece's rows, given for all rows after the gap in turn."""
         start, kept = self.assembly.rows_of(name, k)
-        table: list[tuple[str, float, float]] = []
-        for family, count, low, high in families:
-            table += [(family, low, high)] * count
-        table = [("integration", 0.0, 0.0)] * (self.pieces[name].rows - len(table)) + table
-        chosen = [table[row] for row in kept.tolist()]
-        rows = slice(start, start + len(chosen))
-        if chosen:
-            self.families[rows], self.row_lower[rows], self.row_upper[rows] = zip(
-                *chosen, strict=True
-            )
+        key = name, tuple(families)
+        if key not in self._tables:  # many knots have the same
+            table: list[tuple[str, float, float]] = []
+            for family, count, low, high in families:
+                table += [(family, low, high)] * count
+            before = [("integration", 0.0, 0.0)] * (self.pieces[name].rows - len(table))
+            names, lows, highs = zip(*before, *table, strict=True)
+            self._tables[key] = names, np.array(lows), np.array(highs)
+        names, lower, upper = self._tables[key]
+        rows = slice(start, start + len(kept))
+        self.families[rows] = [names[row] for row in kept.tolist()]
+        self.row_lower[rows], self.row_upper[rows] = lower[kept], upper[kept]
 
     def _set(self, name: str, k: int, **values: Any) -> None:
         start = self.assembly.parameter_start[name, k]
@@ -236,6 +241,12 @@ class ProblemBuilder:
         return self.task.landing_effort if landed else self.task.effort
 
     def _motor_rows(self, k: int) -> list[Rows]:
+        effort = self._effort(k)
+        if effort not in self._of_motors:
+            self._of_motors[effort] = self._bounds_of_motors(k)
+        return self._of_motors[effort]
+
+    def _bounds_of_motors(self, k: int) -> list[Rows]:
         peak, top = self._peak_torque(k), self._top_speed(k)
         line = self._slope() * top
         links = [
@@ -369,7 +380,7 @@ class ProblemBuilder:
         """Feet and calves are above the ground. At a step they are above the higher ground while
         it is under them, and at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the
         flight's time, also on the lower side of the edge."""
-        task, points = self.task, body_points(self.model, self.coordinates)
+        task, points = self.task, self._body_points
         n_feet, place = len(self.coordinates.contacts), self.of_knot[k].place
         here = self.structure.places[place]
         low = self._ground_of_air(k, here) if self.leans else here.z

@@ -12,7 +12,7 @@ import numpy as np
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ..models.exact_dynamics import ExactDynamics, joint_motion
+from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.files import PlanError
@@ -111,11 +111,11 @@ def joint_torques(
     """The torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints),
     by exact inverse dynamics under the planned contact forces (N, n_contacts, 3); zero at impacts."""
     torque = np.zeros((len(time), velocity.shape[1] - 6))
-    for k in map(int, np.flatnonzero(np.diff(time) > 0.0)):
-        motion = joint_motion(position, velocity, time, k)
-        half = 0.5 * motion.duration
-        _, q, v = dynamics.integrate(position[k], velocity[k], motion, force[k], half)[0]
-        torque[k] = dynamics.joint_torque(q, v, motion.at(half)[2], force[k])
+    lasting = np.flatnonzero(np.diff(time) > 0.0)
+    places, rates = dynamics.follow(half_steps(position, velocity, time, force, lasting))
+    half = 0.5 * np.diff(time)[lasting][:, None]
+    bend = joint_motions(position, velocity, time, lasting).at(half)[2]
+    torque[lasting] = dynamics.motion(places[::2], rates[::2], bend, force[lasting]).torque
     torque[-1] = torque[-2]
     return torque
 

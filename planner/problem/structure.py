@@ -14,6 +14,7 @@ if it adds to the rank.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,12 +64,11 @@ class ContactRows:
     """
 
     def __init__(self, robot: RobotDescription, coordinates: Coordinates, places: Array) -> None:
-        self._foot = [robot.contacts[c].foot for c in coordinates.contacts]
+        self._foot = tuple(robot.contacts[c].foot for c in coordinates.contacts)
         self._place = places[list(coordinates.contacts)]
-        self._axes = coordinates.axes
+        self._axes = tuple(coordinates.axes)
         self._each = len(coordinates.axes)
         self._errors = self._each * len(self._foot)
-        self._chosen: dict[tuple[frozenset[int], frozenset[int]], Indices] = {}
 
     def velocities(self, points: set[int]) -> Indices:
         """Rows of the velocities of points on the ground."""
@@ -85,39 +85,45 @@ class ContactRows:
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
-        """The rows of points that say what no row before them does, nor those of the others.
-        Few sets occur, but at every knot of a problem; each is worked out once."""
-        key = frozenset(points), frozenset(others)
-        if key not in self._chosen:
-            self._chosen[key] = self._independent(points, others)
-        return self._chosen[key].copy()
+        """The rows of points that say what no row before them does, nor those of the others."""
+        places = tuple(map(tuple, self._place.tolist()))
+        found = _independent(self._foot, places, self._axes, frozenset(points), frozenset(others))
+        return np.array(found, dtype=np.int64)
 
-    def _independent(self, points: set[int], others: set[int]) -> Indices:
-        rows = []
-        for foot in dict.fromkeys(self._foot):
-            here = [i for i in range(len(self._foot)) if self._foot[i] == foot]
-            centre = self._place[here].mean(axis=0)
-            known = [self._motion(i, axis, centre)
-                     for i in here if i in others for axis in self._axes]  # fmt: skip
-            rank = _rank(known)
-            for i in here:
-                if i not in points:
-                    continue
-                for number, axis in enumerate(self._axes):
-                    more = [*known, self._motion(i, axis, centre)]
-                    if _rank(more) > rank:
-                        known, rank = more, rank + 1
-                        rows.append(self._each * i + number)
-        return np.array(sorted(rows), dtype=np.int64)
 
-    def _motion(self, point: int, axis: int, centre: Array) -> Array:
-        """How a foot's own motion, three velocities and three turns, moves a point along an axis.
-        In the sagittal plane a foot turns about y only."""
-        direction = np.eye(3)[axis]
-        turns = np.cross((self._place[point] - centre) / LENGTH, direction)
-        if 1 not in self._axes:
-            turns[[0, 2]] = 0.0
-        return np.concatenate([direction, turns])
+@lru_cache(maxsize=256)
+def _independent(
+    of_foot: tuple[str, ...], places: tuple[tuple[float, ...], ...], axes: tuple[int, ...],
+    points: frozenset[int], others: frozenset[int],
+) -> tuple[int, ...]:  # fmt: skip
+    """Those rows. Few sets occur, but at every knot of a problem, and robots begin in few stances."""
+    rows = list[int]()
+    place = np.array(places)
+    for foot in dict.fromkeys(of_foot):
+        here = [i for i in range(len(of_foot)) if of_foot[i] == foot]
+        centre = place[here].mean(axis=0)
+        known = [_motion(place[i] - centre, axis, axes)
+                 for i in here if i in others for axis in axes]  # fmt: skip
+        rank = _rank(known)
+        for i in here:
+            if i not in points:
+                continue
+            for number, axis in enumerate(axes):
+                more = [*known, _motion(place[i] - centre, axis, axes)]
+                if _rank(more) > rank:
+                    known, rank = more, rank + 1
+                    rows.append(len(axes) * i + number)
+    return tuple(sorted(rows))
+
+
+def _motion(arm: Array, axis: int, axes: tuple[int, ...]) -> Array:
+    """How a foot's own motion, three velocities and three turns, moves a point along an axis; ``arm``
+    leads to the point. In the sagittal plane a foot turns about y only."""
+    direction = np.eye(3)[axis]
+    turns = np.cross(arm / LENGTH, direction)
+    if 1 not in axes:
+        turns[[0, 2]] = 0.0
+    return np.concatenate([direction, turns])
 
 
 def _rank(rows: list[Array]) -> int:
@@ -155,11 +161,13 @@ class Structure:
         self.coordinates, self.pieces, self.stances = coordinates, pieces, tuple(stances)
         self.n, self.forces = coordinates.size, coordinates.forces
         self.hops, self.places = task.hops(), task.places()
+        self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
         self.stretches = layout(task, model.robot)
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
         self.given: dict[int, list[tuple[int, float, str]]] = {}
+        self._kept: dict[ProblemPhase, NDArray[np.int64]] = {}
         self.knots = self._knots(bool(ball_feet(model.robot)))
 
     def _knots(self, knees_fold: bool) -> list[Knot]:
@@ -230,6 +238,12 @@ class Structure:
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
     def _interval_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
+        """As ``_kept_rows``; worked out once for a stretch."""
+        if stretch not in self._kept:
+            self._kept[stretch] = self._kept_rows(stretch)
+        return self._kept[stretch]
+
+    def _kept_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
         """The rows of an interval that are kept: no friction where there is no contact, and
         pressure only where a share is asked for and the whole foot is down."""
         total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
@@ -288,8 +302,7 @@ class Structure:
     def hop_at(self, k: int) -> tuple[Hop, StanceLocation, float | None]:
         """The jump under way at a knot, or the last one; where it began, and its step's edge."""
         number = min(self.phase_at(k).place, len(self.hops) - 1)
-        hop, place = self.hops[number], self.places[number]
-        return hop, place, edge_of(hop, place)
+        return self.hops[number], self.places[number], self._edges[number]
 
     def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
         hop, _, edge = self.hop_at(k)
@@ -324,7 +337,7 @@ class Structure:
         """The step's height and its edge under a flight."""
         place = self.of_knot[k].place
         hop = self.hops[place]
-        return step_of(hop, self.places[place]), edge_of(hop, self.places[place])
+        return step_of(hop, self.places[place]), self._edges[place]
 
     def over_step(self, k: int) -> tuple[bool, bool]:
         """Of a flight's knot whether feet are above the higher ground there, and whether they are

@@ -114,14 +114,12 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
     torque[impacts] = 0.0
-    generalised = [twist_of(*row) for row in zip(q, v, bend, strict=True)]
-    halfway = [twist_of(*row) for row in zip(middle, moving, bend, strict=True)]
     flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
     return {
         "time": times,
-        "position": np.array([pose_of(row) for row in q]),
-        "velocity": np.array([row[0] for row in generalised]),
-        "acceleration": np.array([row[1] for row in halfway]),
+        "position": pose_of(q),
+        "velocity": twist_of(q, v, bend)[0],
+        "acceleration": twist_of(middle, moving, bend)[1],
         "contact_force": force.reshape(count, -1, 3),
         "contact": grounded,
         "phase": np.array([*phases, phases[-1]], dtype=np.int64),

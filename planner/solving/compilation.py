@@ -27,6 +27,7 @@ from ..models.symbolic_model import SymbolicModel
 from ..problem.stage_functions import PIECES, StageFunction, make_piece
 from ..task.files import need_planner
 from ..task.plan import PlannedJump
+from ..task.scaling import per_robot
 from ..task.task import Knots
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
@@ -79,6 +80,7 @@ UNUSED = {"profiles", "profile", "sensors", "standing", "held", "points", "text"
 """Parts of a description that no function depends on; of the profiles only the rotors count."""
 
 
+@per_robot
 def content_hash(
     robot: RobotDescription, name: str, sources: tuple[str, ...] = SOURCES, more: object = None
 ) -> str:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -287,6 +288,10 @@ FORMULATIONS: Mapping[str, Formulation] = {
 """By the name a task gives."""
 
 
+_coordinates = lru_cache(maxsize=16)(make_coordinates)
+"""Those of a model, made once."""
+
+
 def make_problem(
     task: JumpTask,
     robot: RobotDescription,
@@ -317,7 +322,7 @@ def make_problem(
     if chosen is None:
         if coordinates not in ("", "full"):
             raise ValueError(f"{robot.name} does not do this jump in {coordinates} coordinates")
-        chosen = make_coordinates(exact, "full")
+        chosen = _coordinates(exact, "full")
     free = any(stretch.timed and not stretch.flies for stretch in stretches)
     if free and chosen.name == "full" and not coordinates:
         given = with_ground_times(task, robot, compiled=compiled, progress=progress)
@@ -346,7 +351,7 @@ def _choose(
     every = np.array([stance.coordinates for stance in stances])
     for name in names:
         try:
-            found = make_coordinates(model, name)
+            found = _coordinates(model, name)
         except ValueError:
             return None
         stands = all(is_mirrored(found, stretch.contacts) for stretch in stretches)

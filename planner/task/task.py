@@ -11,7 +11,8 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any, Literal, Self
 
 from pydantic import ValidationError, model_validator
 
@@ -253,8 +254,19 @@ class JumpTask(FreeTimes):
             raise ValueError(wrong)
         return self
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """As pydantic's, without what ``hops`` and ``places`` have kept."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in ("_every_hop", "_every_place"):
+            vars(copy).pop(name, None)
+        return copy
+
     def hops(self) -> tuple[Hop, ...]:
         """The jumps in a row, everything filled in; one of them if nothing else is asked for."""
+        return self._every_hop
+
+    @cached_property
+    def _every_hop(self) -> tuple[Hop, ...]:
         own = {name: getattr(self, name) for name in Hop.model_fields}
         found = []
         for hop in self.jumps or (Hop(),):
@@ -271,6 +283,10 @@ class JumpTask(FreeTimes):
 
     def places(self) -> tuple[StanceLocation, ...]:
         """Where the robot stands at the start, between its jumps, and at the end."""
+        return self._every_place
+
+    @cached_property
+    def _every_place(self) -> tuple[StanceLocation, ...]:
         return places_of(self.hops(), self.slope or LEVEL)
 
     @property

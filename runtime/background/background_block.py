@@ -356,7 +356,7 @@ class BackgroundBlock(Block):
         """Those of the block, when the run is over."""
         return self._warnings
 
-    def times(self) -> BlockTimes:
+    def worker_times(self) -> BlockTimes:
         """The times that the worker took; ``overruns`` counts the late results."""
         return times_of(
             self._times[: self._shown], self._shown, self._total, self._longest, self._late

@@ -40,7 +40,6 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.kernel_registry import (
     arguments_of,
     is_kernel,
-    kernels,
     written_code,
 )
 from ...mathematics.compiling.kinds import NUMBER, ArrayKind, Kind, RecordKind, kind_of_annotation
@@ -249,8 +248,7 @@ def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
 @cache
 def names_used(function: FunctionType) -> frozenset[str]:
     """All attributes that a kernel and those that it calls name."""
-    marked = {id(each) for each in kernels().values()}
-    return frozenset(n for each in closure(function, marked) for n in written_code(each).co_names)
+    return frozenset(n for each in closure(function) for n in written_code(each).co_names)
 
 
 def _python_argument(block: Block, name: str) -> Any:

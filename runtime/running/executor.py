@@ -321,7 +321,7 @@ class Executor:
     def _times_of(self, path: str) -> BlockTimes:
         block = self.bound.blocks[path]
         if isinstance(block, SupportsTimes):
-            return block.times()
+            return block.worker_times()
         return block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
 
     def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:

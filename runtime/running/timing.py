@@ -244,5 +244,5 @@ def _times(
 class SupportsTimes(Protocol):
     """The method of a block that computes elsewhere, and takes its times there."""
 
-    def times(self) -> BlockTimes:
+    def worker_times(self) -> BlockTimes:
         """The times of its runs."""

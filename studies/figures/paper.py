@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 JUMP, FORWARD, TURN, STEP = "in-situ jump", "forward jump", "turn", "step up"
 SOMERSAULT = "somersault in place"
-ARMS = ("heuristic off", "the paper's law", "deviation law")
+ARMS = ("heuristic off", "the paper's law", "the shipped law")
 PLANNED = "somersault_forward_35cm"
 """The task of the somersault that is shown as a plan."""
 FILES = {
@@ -172,13 +172,14 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
     middle = 0.5 * (motion.base[0] + motion.base[-1])
     view = View((float(middle[0]), 0.0, float(motion.base[:, 2].mean())), 1.7 + height)
     verdict = "passes" if plan.valid else "does NOT pass"
+    motors = task.profile or robot.motors.profile
     notes = [
         (
             "The PLAN, not a run: its knots posed by the simulator's model. "
-            f"It {verdict} the check with exact dynamics, motors '{task.profile}'."
+            f"It {verdict} the check with exact dynamics, motors '{motors}'."
         )
     ]
-    numbers = {"profile": task.profile, "valid": plan.valid, "flight_s": touchdown - lift_off}
+    numbers = {"profile": motors, "valid": plan.valid, "flight_s": touchdown - lift_off}
     title = "Somersault off the 35 cm platform"
     return draw_strip(title, notes, motion, moments, robot, scene, view), numbers
 
@@ -301,10 +302,10 @@ def _page_push(results: Results) -> str:
                 "Wanted and moved are from the push to touchdown, seen from the CoM along the push; "
                 "without the heuristic the feet follow the plan in the body's frame. *The paper's law* "
                 "feeds back all momentum and keeps the feet's targets in the planned body, with gains "
-                "found by hand, as the paper gives none; *the deviation law*, ours, feeds back what "
-                "the plan did not intend and keeps the targets in the world. In the paper a +y push "
-                "moves the left foot a lot and the right foot little, because the clearance term adds "
-                "for one and subtracts for the other."
+                "found by hand, as the paper gives none; *the shipped law* weighs the way to the capture "
+                "point against the predicted tilt (`blocks.LandingHeuristic`). In the paper a +y push "
+                "moves the left foot a lot and the right foot little, because the "
+                "clearance term adds for one and subtracts for the other."
             ),
         ]
     )

@@ -76,6 +76,9 @@ def test_go_to_a_block_its_class_and_an_included_file(graph: GraphText, tmp_path
     outer = GraphText(text, tmp_path / "outer.yaml")
     where = outer.definition(*at("mass.yaml", text))
     assert where is not None and Path(where.file) == tmp_path / "mass.yaml"
+    shipped = "include: [aloft:trials/robust]\n"
+    where = GraphText(shipped, tmp_path / "a.yaml").definition(*at("aloft:trials", shipped))
+    assert where is not None and where.file.endswith("graphs/trials/robust.yaml")
     where = outer.definition(*at("place.y", text))
     assert where is not None and Path(where.file).name == "mass.yaml"
     assert graph.definition(*at("duration")) is None

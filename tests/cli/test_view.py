@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aloft.cli import make_app
-from aloft.cli.shared.viewing import diagram_of
+from aloft.cli.shared.viewing import diagram_of, how_to_view
 from aloft.logs.file.reader import read
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.runtime.language.errors import AloftError
@@ -115,3 +115,18 @@ def test_without_a_screen_json_says_so_too(monkeypatch: pytest.MonkeyPatch, tmp_
     arguments = ["run", str(ROOT / "tests/cli/count.yaml"), "--rerun", "live", "--no-record"]
     result = CliRunner().invoke(make_app(), [*arguments, "--json"])
     assert any("there is no screen" in text for text in json.loads(result.stdout)["warnings"])
+
+
+def test_the_command_that_shows_a_recording_is_as_short_as_the_path_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "bin" / "aloft"
+    program.parent.mkdir()
+    program.touch(mode=0o755)
+    monkeypatch.setattr("sys.argv", [str(program)])
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert how_to_view(Path("a.rrd")) == f"{program} view a.rrd"
+    monkeypatch.chdir(tmp_path)
+    assert how_to_view(Path("a.rrd")) == "bin/aloft view a.rrd"
+    monkeypatch.setenv("PATH", str(program.parent))
+    assert how_to_view(Path("a.rrd")) == "aloft view a.rrd"

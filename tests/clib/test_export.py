@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.clib.check import check
+from aloft.clib.check import Checked, check
 from aloft.clib.library import Library
 from aloft.clib.module import Status
 from aloft.clib.targets import TARGETS
 from aloft.clib.write import write_library
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import AloftError
+from aloft.runtime.language.registry import find_block, known_names
 
 CONTROLLER = """\
 inputs: {wish: , measured: }
@@ -55,14 +56,9 @@ def written(folder: Path) -> Path:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_every_byte_of_a_recording_comes_out_of_the_library(folder: Path, target: str) -> None:
-    tools = TARGETS[target]
-    if not tools.linker() or not all(map(shutil.which, tools.runner[:1])):
-        pytest.skip(f"no tools for {target}: apt install {tools.packages}")
-    made = write_library(
-        str(folder / "mass.yaml"), folder / target / "pd", "controller", target=target
-    )
-    found = check(made.description, folder / "mass.rrd")
-    assert (found.difference, found.ticks, found.statuses) == ("", 500, {})
+    graph, recording = str(folder / "mass.yaml"), folder / "mass.rrd"
+    found = back_to_back(graph, recording, folder / "targets", target, "controller")
+    assert found.ticks == 500
     assert found.signal_bytes > 500 * 8 * 4
     assert found.state_bytes > 0
 
@@ -119,16 +115,30 @@ def test_the_rust_of_the_page_calls_the_library(written: Path, tmp_path: Path) -
     assert tick == 9 and library.outputs["force"].item() != 0.0
 
 
-@needs_compiler
-def test_a_library_needs_nothing_of_the_system_but_memory_and_mathematics(written: Path) -> None:
-    listed = subprocess.run(
-        ["nm", written.with_suffix(".o")], capture_output=True, text=True, check=True
-    )
+EXACT = {"floor", "ceil", "rint", "fmod"}
+"""Functions of C that have the same bits in every library."""
+OF_THE_SYSTEM = {"memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"}
+
+
+def symbols(file: Path) -> dict[str, list[str]]:
+    """The symbols of an object file by the letters that ``nm`` has for their kinds."""
+    listed = subprocess.run(["nm", file], capture_output=True, text=True, check=True)
     kinds: dict[str, list[str]] = {}
     for line in listed.stdout.splitlines():
         kind, name = line.split()[-2:]
         kinds.setdefault(kind, []).append(name)
-    assert set(kinds.pop("U", [])) <= {"memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"}
+    return kinds
+
+
+def needed(file: Path) -> set[str]:
+    """The functions that an object file takes from elsewhere."""
+    return set(symbols(file).get("U", []))
+
+
+@needs_compiler
+def test_a_library_needs_nothing_of_the_system_but_memory_and_mathematics(written: Path) -> None:
+    kinds = symbols(written.with_suffix(".o"))
+    assert needed(written.with_suffix(".o")) <= OF_THE_SYSTEM
     assert not set(kinds) & {"D", "d", "B", "b", "C"}, "there is data that can be written"
 
 
@@ -254,7 +264,8 @@ def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:
         "rate: 100 Hz\nblocks:\n"
         "  noise: {use: blocks.WhiteNoise, with: {std: 1}}\n"
         "  twice: {use: blocks.Gain, with: {gain: 2}, in: {u: noise.y}}\n"
-        "  sine: {use: blocks.Function, with: {function: sin}, in: {u: twice.y}}\n"
+        "  drift: {use: blocks.ColouredNoise}\n"
+        "  sum: {use: blocks.Sum, in: {a: twice.y, b: drift.y}}\n"
     )
     with pytest.raises(AloftError) as caught:
         write_library(str(tmp_path / "noisy.yaml"), tmp_path / "noisy")
@@ -262,7 +273,7 @@ def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:
     assert str(caught.value).splitlines() == [
         "2 blocks need Python, so there is no library:",
         f"  {file}:3:3: block 'noise' (WhiteNoise) has a step in plain Python",
-        f"  {file}:5:3: block 'sine' (Function) has a step in plain Python",
+        f"  {file}:5:3: block 'drift' (ColouredNoise) has a step in plain Python",
     ]
 
 
@@ -274,17 +285,74 @@ def test_names_and_targets_that_cannot_be(folder: Path) -> None:
         write_library(graph, folder / "pd", target="z80")
 
 
-@needs_compiler
+GENERAL = Path(__file__).with_name("general_blocks.yaml")
+IN_PYTHON = {
+    "blocks.ColouredNoise": "NumPy's random numbers", "blocks.WhiteNoise": "NumPy's random numbers",
+    "blocks.External": "what Python sets; in a library it is an input",
+    "blocks.Policy": "a network of ONNX", "blocks.Library": "another library",
+}  # fmt: skip
+"""The general blocks that no library has, and why."""
+
+
+def test_the_graph_of_general_blocks_has_all_that_a_library_can_have() -> None:
+    graph = aloft.load(GENERAL).checked
+    used = {spec.block_type.__name__ for spec in graph.blocks}
+    general = [each for each in known_names() if ".general." in find_block(each).__module__]
+    assert sorted(
+        set(general) - {f"blocks.{name}" for name in used} | {"blocks.External"}
+    ) == sorted(IN_PYTHON)
+
+
+def back_to_back(graph: str, recording: Path, folder: Path, target: str, part: str = "") -> Checked:
+    """Write a graph, or a part of it, as a library for a processor, and feed it a recording."""
+    tools = TARGETS[target]
+    if not tools.linker() or not all(map(shutil.which, tools.runner[:1])):
+        pytest.skip(f"no tools for {target}: apt install {tools.packages}")
+    found = check(write_library(graph, folder / target, part, target=target).description, recording)
+    assert found.difference == ""
+    assert found.statuses == {}
+    return found
+
+
+@pytest.fixture(scope="module")
+def general(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of all general blocks."""
+    recording = tmp_path_factory.mktemp("general") / "general.rrd"
+    aloft.load(GENERAL).run(sinks=[Recorder(recording)]).raise_if_failed()
+    return recording
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("graph", ["jump", "push", "somersault", "hops"])
-def test_the_controllers_of_jumps_give_all_recorded_bytes(graph: str, tmp_path: Path) -> None:
-    recording = tmp_path / f"{graph}.rrd"
-    aloft.load(f"aloft:{graph}.yaml").run(sinks=[Recorder(recording)]).raise_if_failed()
-    for target in TARGETS if graph == "jump" else ("x86_64",):
-        if not TARGETS[target].linker() or not all(map(shutil.which, TARGETS[target].runner[:1])):
-            continue
-        made = write_library(f"aloft:{graph}.yaml", tmp_path / graph / target, target=target)
-        found = check(made.description, recording)
-        assert found.difference == "", target
-        assert found.ticks > 1000
-        assert found.signal_bytes > 1000 * found.ticks
+@pytest.mark.parametrize("target", TARGETS)
+def test_general_blocks_give_all_recorded_bytes(general: Path, tmp_path: Path, target: str) -> None:
+    found = back_to_back(str(GENERAL), general, tmp_path, target)
+    if target == "x86_64":
+        assert needed(tmp_path / target / f"{target}.o") <= {*OF_THE_SYSTEM, *EXACT}
+    assert found.ticks == 1200
+    assert found.signal_bytes > 500 * found.ticks
+    assert found.state_bytes > 100
+
+
+CONTROLLERS = ("jump", "push", "somersault", "hops", "robots/go2_jump", "robots/g1_jump")
+
+
+@pytest.fixture(scope="module", params=CONTROLLERS)
+def controller(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Path]:
+    """A shipped graph, and a recording of it."""
+    graph = f"aloft:{request.param}.yaml"
+    recording = tmp_path_factory.mktemp("controller") / "run.rrd"
+    aloft.load(graph).run(sinks=[Recorder(recording)]).raise_if_failed()
+    return graph, recording
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_controllers_of_jumps_give_all_recorded_bytes(
+    controller: tuple[str, Path], tmp_path: Path, target: str
+) -> None:
+    found = back_to_back(*controller, tmp_path, target)
+    assert found.ticks > 1000
+    assert found.signal_bytes > 1000 * found.ticks
+    assert found.state_bytes > 10_000

@@ -17,18 +17,32 @@ def chain(rng: np.random.Generator) -> np.ndarray:
     return matrix
 
 
-def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT):
+def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT, then=None):
     rows, columns = np.nonzero(matrix.T)[::-1]
     starts = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
     place = np.where(chosen, np.cumsum(chosen) - 1, -1)
     count, height = np.array([chosen.sum()]), len(matrix)
     vector, out, found = np.zeros(height), np.zeros(matrix.shape[1]), np.zeros(1, dtype=np.bool_)
-    vector[: count[0]] = wanted[chosen]
-    smallest_correction(
-        starts, rows, matrix.T[columns, rows], 1.0 / weights, place, count, 0.0,
-        np.zeros((height, band)), np.zeros(height, dtype=np.int64), vector, out, found,
-    )  # fmt: skip
+    values, factorised = matrix.T[columns, rows], np.zeros(1, dtype=np.bool_)
+    memory = np.zeros((height, band)), np.zeros(height, dtype=np.int64)
+    for one in [wanted] if then is None else [wanted, then]:
+        vector[: count[0]] = one[chosen]
+        smallest_correction(
+            starts, rows, values, 1.0 / weights, place, count, 0.0, *memory, vector, out,
+            factorised, found,
+        )  # fmt: skip
+        factorised[0] = True
     return out, bool(found[0])
+
+
+def test_a_second_correction_takes_the_same_factors() -> None:
+    rng = np.random.default_rng(8)
+    matrix, weights = chain(rng), rng.uniform(0.5, 20.0, (BLOCKS + 1) * WIDTH)
+    first, second = rng.standard_normal((2, len(matrix)))
+    every = np.ones(len(matrix), dtype=bool)
+    out, found = correct(matrix, first, weights, every, then=second)
+    assert found
+    np.testing.assert_array_equal(out, correct(matrix, second, weights, every)[0])
 
 
 @pytest.mark.parametrize("left_out", [[], [0, 4, 5, 17]])

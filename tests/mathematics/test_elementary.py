@@ -18,7 +18,7 @@ from aloft.mathematics.arrays import Array1D
 from aloft.mathematics.compiling.arguments import pack, type_of
 from aloft.mathematics.compiling.machine_code import MachineCode
 from aloft.mathematics.compiling.translate import Translator
-from aloft.mathematics.elementary import acos, atan2, cos, exp, expm1, hypot, sin, tanh
+from aloft.mathematics.elementary import acos, atan2, cos, exp, expm1, hypot, log, sin, tanh
 from aloft.mathematics.kernel import kernel
 
 DIGITS = 60
@@ -62,18 +62,23 @@ def exponentials_less_one(x: Array1D, y: Array1D, out: Array1D) -> None:
 
 
 @kernel
+def logarithms(x: Array1D, y: Array1D, out: Array1D) -> None:
+    out[:] = log(x)
+
+
+@kernel
 def tangents(x: Array1D, y: Array1D, out: Array1D) -> None:
     out[:] = tanh(x)
 
 
 COMPILED = {
     "sin": sines, "cos": cosines, "atan2": angles, "acos": arc_cosines, "hypot": hypotenuses,
-    "exp": exponentials, "expm1": exponentials_less_one, "tanh": tangents,
+    "exp": exponentials, "expm1": exponentials_less_one, "log": logarithms, "tanh": tangents,
 }  # fmt: skip
 TWO = ("atan2", "hypot")
 PRECISE = {
     "sin": np.sin, "cos": np.cos, "atan2": np.arctan2, "acos": np.arccos, "hypot": np.hypot,
-    "exp": np.exp, "expm1": np.expm1, "tanh": np.tanh,
+    "exp": np.exp, "expm1": np.expm1, "log": np.log, "tanh": np.tanh,
 }  # fmt: skip
 
 
@@ -105,6 +110,10 @@ DRAWS = {
     "acos": (up_to(1.0), logarithmic(-300, 0), lambda r, n: np.sign(up_to(1)(r, n)) * (1.0 - abs(logarithmic(-16, 0)(r, n)))),
     "exp": (up_to(0.4), up_to(20.0), up_to(709.0), lambda r, n: r.uniform(-745.0, -700.0, n)),
     "expm1": (up_to(0.8), up_to(20.0), up_to(709.0), logarithmic(-300, 1)),
+    "log": (
+        lambda r, n: r.uniform(0.6, 1.6, n), lambda r, n: 1.0 + logarithmic(-16, -0.5)(r, n),
+        lambda r, n: abs(logarithmic(-307, 308)(r, n)), lambda r, n: abs(up_to(1e-310)(r, n)),
+    ),
     "tanh": (up_to(1.0), up_to(22.0), logarithmic(-300, 1)),
 }  # fmt: skip
 CASES = [(name, k) for name, draws in DRAWS.items() for k in range(len(draws))]
@@ -158,7 +167,7 @@ def test_special_values_are_those_of_c(name: str) -> None:
             try:
                 expected = getattr(math, name)(*arguments)
             except ValueError:
-                expected = math.nan
+                expected = -math.inf if name == "log" and x == 0.0 else math.nan
             except OverflowError:
                 expected = math.inf
             if name in ("sin", "cos") and abs(x) > 2.0**53:

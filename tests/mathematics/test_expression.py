@@ -5,14 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from aloft.mathematics.expression import FUNCTIONS, parse_expression
+from aloft.mathematics.elementwise import OF_TWO
+from aloft.mathematics.expression import CALLABLE, parse_expression
 
 VARIABLES = {"a": np.array([0.3, -0.6]), "b": np.array([2.0, 0.5])}
 
 
 def evaluate(text: str) -> list[float]:
     out = np.zeros(2)
-    parse_expression(text, VARIABLES).compile(VARIABLES, 2)(out)
+    for call in parse_expression(text, VARIABLES).calls(VARIABLES, out):
+        call.run()
     return list(out)
 
 
@@ -20,7 +22,7 @@ def evaluate(text: str) -> list[float]:
     "text",
     [
         "a + 2 * b - 1", "-(a ** 2) / b", "a % b", "abs(a) if a > 0 else b", "min(a, b) + max(a, 1)",
-        "atan2(a, b)", "(a < b) * 3", "sin(pi * a) + cos(b)", "+a", "hypot(3, 4) + 0 * a",
+        "atan2(a, b)", "(a < b) * 3 + (a >= b) * 5 + (a > b) - (a <= b) + (a == b) + (a != b)", "a", "pi", "sin(pi * a) + cos(b)", "+a", "hypot(3, 4) + 0 * a",
     ],
 )  # fmt: skip
 def test_values_are_pythons(text: str) -> None:
@@ -32,12 +34,10 @@ def test_values_are_pythons(text: str) -> None:
     assert evaluate(text) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("name", list(FUNCTIONS))
+@pytest.mark.parametrize("name", CALLABLE)
 def test_every_function_can_be_called(name: str) -> None:
-    out, u = np.zeros(1), {"u": np.array([0.5])}
-    arguments = ", ".join(["u"] * FUNCTIONS[name][1])
-    parse_expression(f"{name}({arguments})", u).compile(u, 1)(out)
-    assert math.isfinite(out[0])
+    arguments = "0.5, a" if name in OF_TWO else "0.5"
+    assert all(map(math.isfinite, evaluate(f"{name}({arguments})")))
 
 
 @pytest.mark.parametrize(

@@ -129,3 +129,21 @@ def test_goals_may_name_values_in_other_units(folder: Path) -> None:
     assert found.seeds == (4, 2)
     assert [goal.rate for goal in found.goals] == [0.9, 0.5]
     assert found.goals[1].cells.labels == {"d": ("5 cm",)}
+
+
+def test_a_graph_is_no_study(folder: Path) -> None:
+    text = report(folder, "rate: 10 Hz\nblocks: {wave: {use: blocks.SineWave}}\n")
+    assert "wrong.yaml is a graph, not a study" in text
+    assert "with graph: wrong.yaml and seeds: 2000:2020" in text and "1 problem" in text
+
+
+def test_a_study_names_shipped_graphs_by_their_address(folder: Path) -> None:
+    (folder / "study.yaml").write_text(
+        "graph: aloft:push\nseeds: 1:3\ninclude: aloft:trials/robust\n"
+    )
+    study = read_study(Path("study.yaml"))
+    assert [file.name for file in (study.tasks[0].path, *study.include)] == [
+        "push.yaml",
+        "robust.yaml",
+    ]
+    assert "fix        aloft:push" in report(folder, "graph: push.yaml\nseeds: 1:3\n")

@@ -328,7 +328,10 @@ def _compare_units(
             f"blocks.Gain with {{gain: {factor:.9g}, unit: {over(wanted.unit, given)}}}",
         )
     else:
-        fix = ""
+        fix = (
+            f"convert it in a block between, such as blocks.Gain with {{gain: 1, unit: {over(wanted.unit, given)}}}, "
+            f"or declare the field as {given}, if that is what it holds"
+        )
         if may_say:
             fix = f"say what its numbers are: with: {{unit: {over(wanted.unit, given)}}}"
         yield Mismatch(

@@ -1,7 +1,8 @@
 """Reads the files of a graph, each once, finds its includes and reports rings of includes.
 
-A shipped graph has an address in place of a path: ``aloft:jump``. A file that is no graph, such as a
-task or a study, is recognised, and the report names the command that it is for.
+A shipped file has an address in place of a path, which works from any folder: ``aloft:jump``,
+``aloft:trials/robust``. A file that is no graph, such as a task or a study, is recognised, and the report names the
+command that it is for.
 """
 
 from __future__ import annotations
@@ -32,19 +33,35 @@ def shipped_graphs() -> dict[str, Path]:
     return {f"{PREFIX}{name}": by_name[name] for name in sorted(by_name)}
 
 
-def graph_path(path: str | Path) -> Path:
-    """The file that a path or an address stands for; what is no known address stays as it is."""
+def graph_path(path: str | Path, folder: Path = Path()) -> Path:
+    """The file that a path, seen from ``folder``, or an address stands for; an unknown address is no file."""
     text = str(path)
     if not text.startswith(PREFIX):
-        return Path(path)
-    return shipped_graphs().get(text.removesuffix(".yaml"), Path(path))
+        return folder / path
+    file = FOLDER / f"{text.removeprefix(PREFIX).removesuffix('.yaml')}.yaml"
+    return file if file.is_file() and ".." not in file.parts else Path(path)
 
 
 def addresses_like(path: Path) -> tuple[str, ...]:
-    """The addresses of shipped graphs that may be meant by a path where there is no file."""
-    known = shipped_graphs()
+    """The addresses of shipped files that may be meant by a path where there is no file."""
+    known = {
+        f"{PREFIX}{file.relative_to(FOLDER).with_suffix('').as_posix()}"
+        for file in FOLDER.rglob("*.yaml")
+    }
     wanted = f"{PREFIX}{str(path.with_suffix('')).removeprefix(PREFIX).removeprefix('graphs/')}"
-    return (wanted,) if wanted in known else nearest(wanted, known)
+    return (wanted,) if wanted in known else nearest(wanted, sorted(known))
+
+
+def files_like(name: str, folder: Path) -> tuple[str, ...]:
+    """Names of files that may be meant by a name where there is none, the likeliest first."""
+    try:
+        present = sorted(other.name for other in folder.glob("*.y*ml"))
+    except OSError:
+        present = []
+    near = nearest(Path(name).name, present)
+    similar = tuple((Path(name).parent / other).as_posix() for other in near)
+    shipped = addresses_like(Path(name))
+    return (*shipped, *similar) if len(shipped) == 1 or not similar else similar
 
 
 def summary(path: Path) -> str:
@@ -79,9 +96,9 @@ class FileTree:
     def locate(self, node: ScalarNode, file: WrittenGraph, stack: Stack) -> tuple[Path, str] | None:
         """The file that ``node`` names, seen from ``file``; ``None`` after a problem."""
         name = str(node.value)
-        shown = os.path.normpath(Path(file.file).parent / name)
+        shown = os.path.normpath(graph_path(name, Path(file.file).parent))
         try:
-            path = (file.folder / name).resolve()
+            path = graph_path(name, file.folder).resolve()
             present = path.is_file()
         except (OSError, ValueError):  # the name is one that no file can have
             path, present = Path(), False
@@ -102,18 +119,14 @@ class FileTree:
         return path, shown
 
     def _missing(self, node: ScalarNode, path: Path, shown: str) -> None:
-        name = Path(str(node.value))
-        try:
-            present = sorted(other.name for other in path.parent.glob("*.y*ml"))
-        except OSError:
-            present = []
-        similar = tuple((name.parent / n).as_posix() for n in nearest(name.name, present))
+        name = str(node.value)
+        similar = files_like(name, path.parent)
         self.problems.add(
             Code.FILE,
             f"there is no file {shown}",
             node.where,
-            expected="a file, relative to the one that names it",
-            found=str(name),
+            expected="a file, relative to the one that names it, or a shipped one such as aloft:jump",
+            found=name,
             nearest=similar,
             fix=similar[0] if similar else "",
         )

@@ -68,7 +68,7 @@ Seconds = Annotated[
     BeforeValidator(_seconds),
     Schema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]}),
 ]
-YamlFile = Annotated[str, Field(pattern=r"\.ya?ml$")]
+YamlFile = Annotated[str, Field(pattern=r"\.ya?ml$|^aloft:")]
 Reference = Annotated[str, Field(pattern=r"^\$", description="a parameter's value")]
 RateText = Annotated[str, Field(pattern=r"^[0-9.]+([eE][-+]?[0-9]+)?( */ *[0-9.]+)? *k?Hz$")]
 Rate = Annotated[float, Field(gt=0)] | RateText | Reference

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import aloft
 from aloft.blocks.general.tables import LookupGrid, LookupTable, TablePlayback
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -127,3 +128,12 @@ def test_a_table_must_be_whole_table_playback(
 def test_there_is_one_source(tmp_path: Path) -> None:
     with pytest.raises(BlockError, match="give either a file or rows"):
         run(tmp_path)
+
+
+def test_a_graph_with_a_table_runs_to_its_end() -> None:
+    rows = [[0.0, 1.0], [1.0, 3.0]]
+    blocks = {"played": {"use": "blocks.TablePlayback", "with": {"columns": ["x"], "rows": rows}}}
+    result = aloft.load({"rate": "10 Hz", "blocks": blocks}).run(0.5)
+    assert result.signal("played.y.value")[:, 0].tolist() == pytest.approx(
+        [1.0, 1.2, 1.4, 1.6, 1.8]
+    )

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from aloft.blocks.general.user_code import TIME, UFUNCS, Expression, External, Function, unit_of
+from aloft.blocks.general.user_code import TIME, Expression, External, Function, unit_of
+from aloft.mathematics.elementwise import FUNCTIONS
 from aloft.mathematics.expression import parse_expression
 from aloft.runtime.language.errors import BlockError, UnitError
 from aloft.runtime.language.units import parse_unit
@@ -20,7 +21,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("name", list(UFUNCS))
+@pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_function(name: str) -> None:
     bench = BlockBench(Function, {"n": 2, "function": name})
     bench.set("u", value=[0.6, 0.25])

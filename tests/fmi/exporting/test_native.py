@@ -281,19 +281,20 @@ def test_the_same_graph_is_the_same_file(folder: Path, tmp_path: Path) -> None:
 
 def test_what_needs_python_is_named_and_runs_in_python(tmp_path: Path) -> None:
     pytest.importorskip("pythonfmu3")
-    (tmp_path / "sine.yaml").write_text(
+    (tmp_path / "noisy.yaml").write_text(
         "rate: 100 Hz\nblocks:\n  given: {use: blocks.External}\n"
-        "  sine: {use: blocks.Function, with: {function: sin}, in: {u: given.y}}\n"
+        "  noise: {use: blocks.WhiteNoise}\n"
+        "  sum: {use: blocks.Sum, in: {a: given.y, b: noise.y}}\n"
     )
-    made = export(str(tmp_path / "sine.yaml"), tmp_path / "sine.fmu")
-    reason = f"{tmp_path / 'sine.yaml'}:4:3: block 'sine' (Function) has a step in plain Python"
+    made = export(str(tmp_path / "noisy.yaml"), tmp_path / "noisy.fmu")
+    reason = f"{tmp_path / 'noisy.yaml'}:4:3: block 'noise' (WhiteNoise) has a step in plain Python"
     assert made.python == (reason,)
     with zipfile.ZipFile(made.file) as file:
         assert "resources/graph/graph.yaml" in file.namelist()
     with pytest.raises(AloftError) as caught:
-        export(str(tmp_path / "sine.yaml"), tmp_path / "sine.fmu", version="2.0")
+        export(str(tmp_path / "noisy.yaml"), tmp_path / "noisy.fmu", version="2.0")
     assert str(caught.value).splitlines() == [
         "the FMU needs Python, and such are of FMI 3.0:", f"  {reason}",
     ]  # fmt: skip
     with pytest.raises(AloftError, match=r"there is no FMI '1.0' here; there is 3.0, 2.0"):
-        export(str(tmp_path / "sine.yaml"), tmp_path / "sine.fmu", version="1.0")
+        export(str(tmp_path / "noisy.yaml"), tmp_path / "noisy.fmu", version="1.0")

@@ -6,7 +6,7 @@ import numpy as np
 
 from aloft.mathematics.compiling.arguments import type_of
 from aloft.mathematics.compiling.fingerprint import fingerprint
-from aloft.mathematics.compiling.kernel_registry import _kernels
+from aloft.mathematics.compiling.kernel_registry import register
 
 SOURCE = """
 SCALE = {scale}
@@ -21,26 +21,26 @@ def outer(values, n):
 TYPES = (type_of(np.zeros(3)), type_of(1))
 
 
-def name(monkeypatch, signature=TYPES, tools="tools", **parts):
+def name(signature=TYPES, tools="tools", **parts):
     values = {"scale": 2.0, "inner": "x + 1.0", "comment": "", "doc": '"""One."""', **parts}
     module = types.ModuleType("some_kernels")
     exec(SOURCE.format(**values), vars(module))  # noqa: S102  # the source is the text above
     for function in ("inner", "outer"):
-        monkeypatch.setitem(_kernels, f"some_kernels.{function}", vars(module)[function])
+        register(vars(module)[function])
     return fingerprint(module.outer, signature, tools)
 
 
-def test_what_counts(monkeypatch):
-    first = name(monkeypatch)
-    assert first == name(monkeypatch)
-    assert first == name(monkeypatch, comment="# a comment\n    ", doc='"""Two."""')
+def test_what_counts():
+    first = name()
+    assert first == name()
+    assert first == name(comment="# a comment\n    ", doc='"""Two."""')
     others = [
-        name(monkeypatch, inner="x + 2.0"),
-        name(monkeypatch, inner="x - 1.0"),
-        name(monkeypatch, scale=3.0),
-        name(monkeypatch, tools="other tools"),
-        name(monkeypatch, signature=(type_of(np.zeros((3, 3))), type_of(1))),
-        name(monkeypatch, signature=(type_of(np.zeros(6)[::2]), type_of(1))),
-        name(monkeypatch, signature=(type_of(np.zeros(3)), type_of(1.0))),
+        name(inner="x + 2.0"),
+        name(inner="x - 1.0"),
+        name(scale=3.0),
+        name(tools="other tools"),
+        name(signature=(type_of(np.zeros((3, 3))), type_of(1))),
+        name(signature=(type_of(np.zeros(6)[::2]), type_of(1))),
+        name(signature=(type_of(np.zeros(3)), type_of(1.0))),
     ]
     assert len({first, *others}) == 1 + len(others)

@@ -37,8 +37,7 @@ def test_few_kernels_are_not_worth_another_process():
 
 
 def _size(job):
-    marked = {id(function) for function in module.kernels().values()}
-    return sum(sharing._code_below(job.kernel, marked).values())
+    return sum(sharing._code_below(job.kernel).values())
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 9])

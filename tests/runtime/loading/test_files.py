@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from aloft.robots.description import path_of
 from aloft.runtime.loading import check
-from aloft.runtime.loading.reading.files import addresses_like
+from aloft.runtime.loading.reading.files import addresses_like, graph_path
 
 ROOT = Path(__file__).parents[3]
 PART = "inputs: {u: a signal}\noutputs: {y: gain.y}\nblocks:\n  gain: {use: blocks.Gain}\n"
@@ -89,3 +90,36 @@ def test_addresses_like_a_missing_file_are_its_own_or_the_nearest() -> None:
         assert addresses_like(Path(name)) == ("aloft:jump",)
     assert "aloft:jump" in addresses_like(Path("jmup.yaml"))
     assert addresses_like(Path("nothing_of_the_kind_at_all.yaml")) == ()
+
+
+def test_shipped_files_are_included_by_their_address_from_any_folder(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text("include: [aloft:jump, aloft:trials/robust]\nset: {robot.seed: 3}\n")
+    report = check(path)
+    assert report.ok, report.text()
+    for wrong, near in (
+        ("jump.yaml", "aloft:jump"),
+        ("aloft:trials/robost", "aloft:trials/robust"),
+    ):
+        path.write_text(f"include: {wrong}\n")
+        (problem,) = check(path).problems
+        assert problem.fix == near
+
+
+def test_an_address_leads_to_no_file_outside_of_the_shipped_graphs() -> None:
+    assert graph_path("aloft:jump.yaml") == graph_path("aloft:jump")
+    assert not graph_path("aloft:../tests/cli/count").is_file()
+    assert graph_path("a.yaml", Path("b")) == Path("b/a.yaml")
+
+
+def test_a_task_beside_the_loaded_graph_may_name_the_robot_by_its_file(tmp_path: Path) -> None:
+    """As a user's own robot is: the graph includes a shipped one, which lies in another folder."""
+    text = path_of("bruce").read_text().replace("name: bruce\n", "name: mine\n", 1)
+    (tmp_path / "mine.yaml").write_text(text)
+    (tmp_path / "hop.yaml").write_text("robot: mine.yaml\nrise: 10 cm\n")
+    path = tmp_path / "graph.yaml"
+    path.write_text("include: aloft:robots/jump\nrobot: mine.yaml\nset: {plan.task: hop.yaml}\n")
+    assert not [p for p in check(path).problems if p.at == "plan.task"]
+    (tmp_path / "hop.yaml").write_text("robot: go2\nrise: 10 cm\n")
+    (problem,) = [p for p in check(path).problems if p.at == "plan.task"]
+    assert "is for go2, but the graph's robot is mine" in problem.message

@@ -1,0 +1,370 @@
+"""What a motion of a whole robot needs, at many instants: momentum, contact points, base acceleration and joint torques.
+
+The base and the joints of a tree of bodies are given with the joints' accelerations and the contact forces. With p and n
+the force and moment that the bodies need while the base does not accelerate (``composite_inertias``), c its centre of
+mass, m its mass and I its inertia about c, the base accelerates by
+
+    I alpha = sum (r - c) x F - (n - c x p),    m (a + alpha x c) = sum F + m g - p,
+
+and the torque of a joint is what its subtree needs then, along the joint, less the contact forces on it.
+
+How the base turns under constant contact forces F follows from the momentum: the centre of mass flies a parabola, and
+with the angular momentum k about it, the inertia I and the angular momentum h of the joints' motion in the base's axes,
+
+    w = I^-1 (R' k - h),    dk/dt = sum (r - c) x F.
+
+I, h and r - c depend on the joints only, and are known for every instant beforehand. Runge and Kutta's method of order
+four integrates the orientation R and k.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Array1D, Array2D, Array3D, Indices1D, Rows3, Vector3
+from .body_dynamics import (
+    BodyMotion,
+    BodyTree,
+    Inertias,
+    body_motion,
+    composite_inertias,
+    inertias,
+    inner,
+    momentum_of,
+    move_bodies,
+    place_bodies,
+    place_of,
+    velocity_at,
+)
+from .constants import GRAVITY
+from .kernel import kernel
+from .rotations import rotate, rotate_back, to_matrix
+
+
+class FixedPoints(NamedTuple):
+    """Points of bodies: their ``body`` (n_points,), the ``place`` (n_points, 3) [m] in its frame, and how far
+    ``below`` (n_points,) it in the world they are [m]: the radius of a ball, of which the place is the centre."""
+
+    body: Indices1D
+    place: Rows3
+    below: Array1D
+
+
+class GivenMotion(NamedTuple):
+    """The motion at n instants: ``position`` (n, 7 + n_joints) with the base's place and quaternion, ``velocity``
+    (n, 6 + n_joints) with the base's in its own axes, ``bend`` (n, n_joints), the joints' accelerations, and
+    ``force`` (n, n_contacts, 3) [N, world] on the first of the points."""
+
+    position: Array2D
+    velocity: Array2D
+    bend: Array2D
+    force: Array3D
+
+
+class MotionTerms(NamedTuple):
+    """What follows at n instants.
+
+    ``com``, ``com_velocity`` and ``momentum``, the angular momentum about the centre of mass, (n, 3); ``inertia``
+    (n, 6) about it: xx, yy, zz, xy, xz, yz; all in the world's axes. ``points`` and ``point_velocity``
+    (n, n_points, 3) are of the material there, ``ahead`` the first axis of its body. ``base`` (n, 6) is the spatial
+    acceleration of the base in its axes, ``torque`` (n, n_joints) that of the joints without rotors.
+    """
+
+    com: Rows3
+    com_velocity: Rows3
+    momentum: Rows3
+    inertia: Array2D
+    points: Array3D
+    point_velocity: Array3D
+    ahead: Array3D
+    base: Array2D
+    torque: Array2D
+
+
+class MotionMemory(NamedTuple):
+    """Scratch of one instant; ``gained`` (n_bodies, 6) are accelerations by the joints', the rest is (6,)."""
+
+    motion: BodyMotion
+    composite: Inertias
+    gained: Array2D
+    spatial: Array1D
+    momentum: Array1D
+    wrench: Array1D
+
+
+def motion_memory(n_joints: int) -> MotionMemory:
+    """The memory of a tree."""
+    return MotionMemory(
+        body_motion(n_joints), inertias(n_joints), np.zeros((n_joints + 1, 6)), *np.zeros((3, 6))
+    )
+
+
+@kernel
+def evaluate_motion(
+    tree: BodyTree, fixed: FixedPoints, given: GivenMotion, memory: MotionMemory, out: MotionTerms
+) -> None:
+    """All terms at all instants."""
+    for i in range(given.position.shape[0]):
+        place_and_move(tree, given.position[i], given.velocity[i], given.bend[i], memory)
+        composite_inertias(tree, memory.motion, memory.composite)
+        momentum_terms(given.velocity[i], i, memory, out)
+        point_terms(fixed, given.position[i], i, memory.motion, out)
+        base_acceleration(given, i, memory, out)
+        joint_torques(tree, fixed, given, i, memory, out)
+
+
+@kernel
+def place_and_move(
+    tree: BodyTree, position: Array1D, velocity: Array1D, bend: Array1D, memory: MotionMemory
+) -> None:
+    """Places, velocities and accelerations of all bodies, while the base does not accelerate."""
+    motion, gained = memory.motion, memory.gained
+    to_matrix(position[3:7], motion.rotation[0])
+    rotate(position[3:7], velocity[0:3], motion.velocity[0, 0:3])
+    rotate(position[3:7], velocity[3:6], motion.velocity[0, 3:6])
+    place_bodies(tree, position[7:], motion)
+    move_bodies(tree, velocity[6:], motion)
+    for k in range(bend.shape[0]):
+        carrier = tree.parent[k]
+        for axis in range(6):
+            gained[k + 1, axis] = gained[carrier, axis] + motion.joint[k, axis] * bend[k]
+            motion.acceleration[k + 1, axis] = (
+                motion.acceleration[k + 1, axis] + gained[k + 1, axis]
+            )
+
+
+@kernel
+def momentum_terms(velocity: Array1D, i: int, memory: MotionMemory, out: MotionTerms) -> None:
+    """Centre of mass, momentum and inertia about it at instant ``i``, seen from the base."""
+    motion, composite = memory.motion, memory.composite
+    spatial, total = memory.spatial, memory.momentum
+    momentum_of(composite, 0, motion.velocity[0], total)
+    for k in range(motion.joint.shape[0]):
+        momentum_of(composite, k + 1, motion.joint[k], spatial)
+        for axis in range(6):
+            total[axis] = total[axis] + spatial[axis] * velocity[6 + k]
+    mass, com, inertia = composite.mass[0], out.com[i], out.inertia[i]
+    for axis in range(3):
+        com[axis] = composite.moment[0, axis] / mass
+        out.com_velocity[i, axis] = total[axis] / mass
+    x, y, z = com[0], com[1], com[2]
+    u, v, w = total[0], total[1], total[2]
+    out.momentum[i, 0] = total[3] - (y * w - z * v)
+    out.momentum[i, 1] = total[4] - (z * u - x * w)
+    out.momentum[i, 2] = total[5] - (x * v - y * u)
+    for axis in range(6):
+        inertia[axis] = composite.inertia[0, axis]
+    inertia[0] = inertia[0] - mass * (y * y + z * z)
+    inertia[1] = inertia[1] - mass * (x * x + z * z)
+    inertia[2] = inertia[2] - mass * (x * x + y * y)
+    inertia[3] = inertia[3] + mass * x * y
+    inertia[4] = inertia[4] + mass * x * z
+    inertia[5] = inertia[5] + mass * y * z
+
+
+@kernel
+def point_terms(
+    fixed: FixedPoints, position: Array1D, i: int, motion: BodyMotion, out: MotionTerms
+) -> None:
+    """Places and velocities of the points in the world at instant ``i``."""
+    for k in range(fixed.body.shape[0]):
+        body, point = fixed.body[k], out.points[i, k]
+        place_of(motion, body, fixed.place[k], point)
+        point[2] = point[2] - fixed.below[k]
+        velocity_at(motion, body, point, out.point_velocity[i, k])
+        for axis in range(3):
+            out.ahead[i, k, axis] = motion.rotation[body, axis, 0]
+            point[axis] = point[axis] + position[axis]
+
+
+@kernel
+def solve_inertia(inertia: Array1D, vector: Vector3, out: Vector3) -> None:
+    """The (3,) for which the inertia (6,) times it is the vector (3,)."""
+    xx, yy, zz = inertia[0], inertia[1], inertia[2]
+    xy, xz, yz = inertia[3], inertia[4], inertia[5]
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    scale = 1.0 / (xx * a + xy * b + xz * c)
+    x, y, z = vector[0] * scale, vector[1] * scale, vector[2] * scale
+    out[0] = a * x + b * y + c * z
+    out[1] = b * x + (xx * zz - xz * xz) * y + (xy * xz - xx * yz) * z
+    out[2] = c * x + (xy * xz - xx * yz) * y + (xx * yy - xy * xy) * z
+
+
+@kernel
+def base_acceleration(given: GivenMotion, i: int, memory: MotionMemory, out: MotionTerms) -> None:
+    """How the base accelerates at instant ``i``; ``memory.spatial`` is the same in the world's axes, less
+    gravity. The centre of mass becomes a place in the world."""
+    spatial, wrench, com = memory.spatial, memory.wrench, out.com[i]
+    need, mass = memory.composite.force[0], memory.composite.mass[0]
+    x, y, z = com[0], com[1], com[2]
+    for axis in range(3):
+        com[axis] = com[axis] + given.position[i, axis]
+        wrench[axis] = -need[axis]
+    u, v, w = need[0], need[1], need[2]
+    wrench[3] = (y * w - z * v) - need[3]
+    wrench[4] = (z * u - x * w) - need[4]
+    wrench[5] = (x * v - y * u) - need[5]
+    for k in range(given.force.shape[1]):
+        force = given.force[i, k]
+        p, q, r = (
+            out.points[i, k, 0] - com[0],
+            out.points[i, k, 1] - com[1],
+            out.points[i, k, 2] - com[2],
+        )
+        u, v, w = force[0], force[1], force[2]
+        wrench[0], wrench[1], wrench[2] = wrench[0] + u, wrench[1] + v, wrench[2] + w
+        wrench[3] = wrench[3] + (q * w - r * v)
+        wrench[4] = wrench[4] + (r * u - p * w)
+        wrench[5] = wrench[5] + (p * v - q * u)
+    solve_inertia(out.inertia[i], wrench[3:6], spatial[3:6])
+    u, v, w = spatial[3], spatial[4], spatial[5]
+    spatial[0] = wrench[0] / mass - (v * z - w * y)
+    spatial[1] = wrench[1] / mass - (w * x - u * z)
+    spatial[2] = wrench[2] / mass - (u * y - v * x)
+    turn = given.position[i, 3:7]
+    spatial[2] = spatial[2] - GRAVITY
+    rotate_back(turn, spatial[0:3], out.base[i, 0:3])
+    rotate_back(turn, spatial[3:6], out.base[i, 3:6])
+    spatial[2] = spatial[2] + GRAVITY
+
+
+@kernel
+def joint_torques(
+    tree: BodyTree, fixed: FixedPoints, given: GivenMotion, i: int, memory: MotionMemory, out: MotionTerms
+) -> None:  # fmt: skip
+    """The torques of the joints at instant ``i``, with the base accelerating as ``memory.spatial`` says."""
+    motion, composite, wrench, torque = (
+        memory.motion,
+        memory.composite,
+        memory.wrench,
+        out.torque[i],
+    )
+    for k in range(torque.shape[0]):
+        momentum_of(composite, k + 1, memory.spatial, memory.momentum)
+        torque[k] = inner(motion.joint[k], composite.force[k + 1]) + inner(
+            motion.joint[k], memory.momentum
+        )
+    for k in range(given.force.shape[1]):
+        force, point = given.force[i, k], out.points[i, k]
+        x, y, z = (
+            point[0] - given.position[i, 0],
+            point[1] - given.position[i, 1],
+            point[2] - given.position[i, 2],
+        )
+        u, v, w = force[0], force[1], force[2]
+        wrench[0], wrench[1], wrench[2] = u, v, w
+        wrench[3], wrench[4], wrench[5] = y * w - z * v, z * u - x * w, x * v - y * u
+        body = int(fixed.body[k])
+        while body > 0:
+            torque[body - 1] = torque[body - 1] - inner(motion.joint[body - 1], wrench)
+            body = int(tree.parent[body - 1])
+
+
+class PushedTurns(NamedTuple):
+    """Stretches of motion under constant forces, each of some steps.
+
+    A step has three instants, at its beginning, middle and end: instant 2 s + j of stretch j begins its step s.
+    ``inverse`` (n, 3, 3) of the inertia, ``own`` (n, 3), what the joints' motion takes off the turn [rad/s],
+    ``lever`` (n, 3, 3), the sum over the contacts of (r - c) F', with r - c in the base's axes [m] and F in the
+    world [N]. ``step`` (n_steps,) [s]; ``first`` (n_stretches + 1,) are the stretches' first steps, ``orientation``
+    (n_stretches, 4) and ``momentum`` (n_stretches, 3) their starts, and ``moment`` (n_stretches, 3) [N m, world]
+    what ``lever`` does not know.
+    """
+
+    inverse: Array3D
+    own: Rows3
+    lever: Array3D
+    step: Array1D
+    first: Indices1D
+    orientation: Array2D
+    momentum: Rows3
+    moment: Rows3
+
+
+class TurnMemory(NamedTuple):
+    """Scratch: ``turn`` (3, 3), ``body`` (3,), ``now`` and ``there`` (7,), quaternion and momentum, and the four
+    ``rates`` (4, 7) of a step."""
+
+    turn: Array2D
+    body: Vector3
+    now: Array1D
+    there: Array1D
+    rates: Array2D
+
+
+def turn_memory() -> TurnMemory:
+    """The memory of one step."""
+    return TurnMemory(np.zeros((3, 3)), np.zeros(3), np.zeros(7), np.zeros(7), np.zeros((4, 7)))
+
+
+@kernel
+def turn_rate(
+    pushed: PushedTurns, i: int, j: int, state: Array1D, memory: TurnMemory, out: Array1D
+) -> None:
+    """The derivative (7,) of quaternion and momentum at an instant ``i`` of stretch ``j``."""
+    turn, body, inverse, lever = memory.turn, memory.body, pushed.inverse[i], pushed.lever[i]
+    x, y, z, w = state[0], state[1], state[2], state[3]
+    size = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
+    x, y, z, w = x * size, y * size, z * size, w * size
+    out[0], out[1], out[2], out[3] = x, y, z, w
+    to_matrix(out[0:4], turn)
+    for axis in range(3):
+        body[axis] = (turn[0, axis] * state[4] + turn[1, axis] * state[5]) + turn[2, axis] * state[
+            6
+        ]
+    p = (
+        (inverse[0, 0] * body[0] + inverse[0, 1] * body[1]) + inverse[0, 2] * body[2]
+    ) - pushed.own[i, 0]
+    q = (
+        (inverse[1, 0] * body[0] + inverse[1, 1] * body[1]) + inverse[1, 2] * body[2]
+    ) - pushed.own[i, 1]
+    r = (
+        (inverse[2, 0] * body[0] + inverse[2, 1] * body[1]) + inverse[2, 2] * body[2]
+    ) - pushed.own[i, 2]
+    # Of turn times lever the sum over the contacts of R (r - c) x F is the antisymmetric part.
+    for axis in range(3):
+        after, before = (axis + 1) % 3, (axis + 2) % 3
+        change = pushed.moment[j, axis]
+        for k in range(3):
+            change += turn[after, k] * lever[k, before] - turn[before, k] * lever[k, after]
+        out[4 + axis] = change
+    out[0] = 0.5 * (w * p + y * r - z * q)
+    out[1] = 0.5 * (w * q + z * p - x * r)
+    out[2] = 0.5 * (w * r + x * q - y * p)
+    out[3] = -0.5 * (x * p + y * q + z * r)
+
+
+@kernel
+def follow_turns(
+    pushed: PushedTurns, memory: TurnMemory, orientation: Array2D, momentum: Rows3
+) -> None:
+    """Orientation (n_steps, 4) and angular momentum about the centre of mass (n_steps, 3) after every step."""
+    now, there, rates = memory.now, memory.there, memory.rates
+    for j in range(pushed.first.shape[0] - 1):
+        now[0:4] = pushed.orientation[j]
+        now[4:7] = pushed.momentum[j]
+        for s in range(pushed.first[j], pushed.first[j + 1]):
+            i, step = 2 * s + j, pushed.step[s]
+            turn_rate(pushed, i, j, now, memory, rates[0])
+            for k in range(7):
+                there[k] = now[k] + 0.5 * step * rates[0, k]
+            turn_rate(pushed, i + 1, j, there, memory, rates[1])
+            for k in range(7):
+                there[k] = now[k] + 0.5 * step * rates[1, k]
+            turn_rate(pushed, i + 1, j, there, memory, rates[2])
+            for k in range(7):
+                there[k] = now[k] + step * rates[2, k]
+            turn_rate(pushed, i + 2, j, there, memory, rates[3])
+            for k in range(7):
+                now[k] = now[k] + step / 6.0 * (
+                    (rates[0, k] + 2.0 * (rates[1, k] + rates[2, k])) + rates[3, k]
+                )
+            size = np.sqrt(
+                (now[0] * now[0] + now[1] * now[1]) + (now[2] * now[2] + now[3] * now[3])
+            )
+            for k in range(4):
+                now[k] = now[k] / size
+                orientation[s, k] = now[k]
+            momentum[s, :] = now[4:7]
