@@ -4,9 +4,6 @@ Hard jumps are solved by way of easier ones, with stronger motors first and then
 limits that are higher by 40 % or more it does. That motion is then a good initial guess for limits a little lower, and so on
 down to the real ones. All other constraints hold at every step.
 
-Jumps aside and with a twist for which no motion is found are solved by way of ones that go less far aside and turn
-less, each the guess for the next.
-
 A plan that failed the validity check because its intervals are too long is solved again on finer ones. The planner's equations on the ground are of second order: errors of limits between knots and of torques at an
 interval's ends fall to a fourth where intervals are halved. A plan that failed for a reason that a finer grid
 cannot remove (a body in the way of a step, a task that is missed) is not solved again.
@@ -50,8 +47,6 @@ EASES = (1.4, 2.0)
 """Times the real motor limits that a first motion is looked for with."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02
 """By how much the limits come down at a time; halved where the solver does not follow."""
-FIRST_SHARE, LAST_SHARE = 0.2, 0.05
-"""By which share of its way aside and of its twist a jump grows at a time; halved where the solver does not follow."""
 COLD_LIMIT, WARM_LIMIT = 250, 100
 """Iterations."""
 
@@ -264,8 +259,6 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
             problem, guess, barrier=_barrier(problem), solver=solver, last=_last(problem),
             other_guess=lambda: _displaced(problem, robot),
         )  # fmt: skip
-    if not solution.solved and not solver and options.warm_start is None:
-        solution = _from_smaller(problem, robot) or solution
     if not solution.solved:
         raise failure(task, solution)
     statistics = {
@@ -395,29 +388,20 @@ def with_times(task: JumpTask, times: list[float]) -> JumpTask:
     return task.model_copy(update={"phases": phases})
 
 
-def partly_aside(task: JumpTask, share: float) -> JumpTask:
-    """The same jumps with that share of their sideways displacements and twists, and of how the ground
-    leans sideways."""
-
-    def changed(jump: JumpTask | Hop) -> dict[str, object]:
-        slopes = {
-            name: (slope[0], share * slope[1])
-            for name in ("slope", "landing_slope")
-            if (slope := getattr(jump, name, None)) is not None
-        }
-        return {
-            "distance_y": share * (jump.distance_y or 0.0), "twist": share * (jump.twist or 0.0),
-            **slopes,
-        }  # fmt: skip
-
-    jumps = task.jumps and tuple(hop.model_copy(update=changed(hop)) for hop in task.jumps)
-    return task.model_copy(update={**changed(task), "jumps": jumps})
-
-
 def straight_ahead(task: JumpTask) -> JumpTask:
     """The same jumps without their sideways displacements and twists, on ground that does not lean
     sideways."""
-    return partly_aside(task, 0.0)
+
+    def changed(jump: JumpTask | Hop) -> dict[str, object]:
+        slopes = {
+            name: (slope[0], 0.0)
+            for name in ("slope", "landing_slope")
+            if (slope := getattr(jump, name, None)) is not None
+        }
+        return {"distance_y": 0.0, "twist": 0.0, **slopes}
+
+    jumps = task.jumps and tuple(hop.model_copy(update=changed(hop)) for hop in task.jumps)
+    return task.model_copy(update={**changed(task), "jumps": jumps})
 
 
 def in_place(task: JumpTask) -> JumpTask:
@@ -462,34 +446,6 @@ def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
         if simpler.coordinates.name != "full":
             break
     return None
-
-
-def _from_smaller(problem: FullProblem, robot: RobotDescription) -> Solution | None:
-    """A solution of jumps aside or with a twist by way of ones that go less far aside or turn less; ``None`` if
-    none is reached."""
-    task, compiled = problem.task, not problem.assembly.interpreted
-    if problem.coordinates.name != "full" or task == straight_ahead(task):
-        return None
-    reached, step, values = 0.0, FIRST_SHARE, None
-    iterations, cpu = 0, 0.0
-    while True:
-        share = min(1.0, reached + step)
-        part = make_problem(partly_aside(task, share), robot, compiled=compiled)
-        start = _displaced(part, robot) if values is None else values
-        if start is None:
-            return None
-        trial = solve(
-            part, start, warm=True, barrier=_barrier(part), solver="fatrop", limit=WARM_LIMIT
-        )
-        iterations, cpu = iterations + trial.iterations, cpu + trial.cpu
-        if not trial.solved:
-            step /= 2.0
-            if step < LAST_SHARE:
-                return None
-            continue
-        if share == 1.0:
-            return replace(trial, iterations=iterations, cpu=cpu)
-        reached, values = share, trial.values
 
 
 def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Solution | None:

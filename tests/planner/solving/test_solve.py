@@ -26,7 +26,6 @@ from aloft.planner.solving.solve import (
     eased,
     finer_knots,
     make_problem,
-    partly_aside,
     solve_jump,
     tighten,
     with_impacts,
@@ -38,7 +37,6 @@ from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 
-from ...robots.example_robots import needs_robots
 from ..independence import smallest_singular_value
 
 ROBOT = find_robot("bruce")
@@ -113,16 +111,6 @@ def test_a_start_from_a_neighbour_takes_fewer_iterations_to_a_plan_as_good(
     assert warm.statistics["iterations"] <= 0.9 * cold.statistics["iterations"]
     assert warm.statistics["cost"] == pytest.approx(cold.statistics["cost"], rel=0.01)
     assert check_plan(warm, ROBOT).explain() == ""
-
-
-@needs_robots
-@pytest.mark.long
-def test_a_turn_that_is_not_found_at_once_is_reached_by_smaller_ones() -> None:
-    robot = find_robot("anymal_c")
-    task = make_task({"name": "turn", "robot": "anymal_c", "rise": 0.1, "twist": math.radians(20)})
-    half = partly_aside(task, 0.5)
-    assert (half.twist, half.distance_y, half.rise) == (pytest.approx(math.radians(10)), 0.0, 0.1)
-    assert check_plan(solve_jump(task, robot), robot).explain() == ""
 
 
 def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
