@@ -37,6 +37,12 @@ SHADES = {
     "recover": "#f3f3f3", "push": "#f6c89f",
 }  # fmt: skip
 """Background colours of stretches of time, by what happens in them."""
+DARK = {
+    "#ffffff": "#14191f", INK: "#e6eaee", FAINT: "#9aa7b3", PALE: "#38424c",
+    "#f4f1e6": "#2a2820", "#fdeadb": "#35261b", "#e3edf7": "#1c2b3b", "#e7f4e8": "#1b2d20",
+    "#f3f3f3": "#252a30", "#f6c89f": "#5c4028", "#0072b2": "#4ea8dd", "#6d4c41": "#b08b7d",
+}  # fmt: skip
+"""What light colours, and lines that are too dark, become in an SVG file on a dark screen."""
 DPI = 150
 """Pixels per inch of pictures that are not vector graphics."""
 LABEL_SIZE = 7.5
@@ -86,7 +92,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, title: str = "") -> Figure:
-    """An empty figure of that size [inch], with its title at the top left.
+    """An empty figure of this size [inch], with its title at the top left.
 
     The figure belongs to no window, so no display is needed.
     """
@@ -99,25 +105,21 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 
 
 def svg_text(figure: Figure) -> str:
-    """The figure as the text of an SVG file. The same figure always gives the same text."""
+    """The figure as the text of an SVG file, light in print and dark where its reader's screen is.
+
+    The same figure always gives the same text.
+    """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "aloft"})
-    return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
-
-
-_DARK = {"#ffffff": "#14191f", INK: "#e6eaee", FAINT: "#9aa7b3", PALE: "#38424c"}
-"""What the colours of backgrounds, text and lines become on a dark screen."""
-
-
-def light_and_dark(text: str) -> str:
-    """An SVG file of ``svg_text`` that is dark where its reader's screen is."""
+    text = "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
     rules = [
         f'[style*="{what}: {light}"]{{{what}:{dark}!important}}'
-        for light, dark in _DARK.items()
+        for light, dark in DARK.items()
         for what in ("fill", "stroke")
+        if f"{what}: {light}" in text
     ]
-    rules.append(f"text:not([style*=fill]){{fill:{_DARK[INK]}}}")
-    sheet = f"<style>@media (prefers-color-scheme:dark){{{''.join(rules)}}}</style>"
+    rules.append(f"text:not([style*=fill]){{fill:{DARK[INK]}}}")
+    sheet = f"<style>@media screen and (prefers-color-scheme:dark){{{''.join(rules)}}}</style>"
     head, end, rest = text.partition("<defs>")
     return f"{head}{sheet}\n {end}{rest}"
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 DEADBEAT = 1e-4
 """Poles with a smaller |z| are those of delays; they have no place in the plane of s."""
-ON_CIRCLE = 1e-6
-"""A pole that is no farther outside of the unit circle than this is taken to lie on it: drift."""
+DRIFT = 0.02
+"""A mode that grows or fades by less than this [1/s] drifts: what an estimator learns, and a place that nothing measures."""
 _RANGE = re.compile(
     r"\s*(?P<key>[^=\s]+)\s*=\s*(?P<low>[^:\s]+)\s*(?P<unit>[^:]*?)\s*:\s*(?P<high>\S+)\s*(?P<same>.*?)\s*$"
 )
@@ -42,8 +42,7 @@ class RootLocus:
         poles: z at each value, (n, poles), complex; a column is one pole that moves. Where models have
             fewer states than others the rest is zero.
         period: between two states of the models [s].
-        limits: the values at which the largest pole crosses the unit circle, between neighbours
-            interpolated.
+        limits: the values at which a mode begins to grow faster than ``DRIFT``, between neighbours interpolated.
     """
 
     parameter: str
@@ -52,6 +51,14 @@ class RootLocus:
     poles: Any
     period: float
     limits: tuple[float, ...]
+
+    @property
+    def leading(self) -> Any:
+        """The largest pole at each value that is no drift, (n,); the largest of all where all are."""
+        size = np.maximum(np.abs(self.poles), 1e-300)
+        moves = np.abs(np.log(size)) / self.period > DRIFT
+        chosen = np.where(moves | ~moves.any(axis=1, keepdims=True), size, 0.0).argmax(axis=1)
+        return self.poles[np.arange(len(chosen)), chosen]
 
     @property
     def continuous(self) -> Any:
@@ -121,9 +128,9 @@ def root_locus(
     poles = np.array([np.pad(model.poles, (0, most - len(model.a))) for model in models]).astype(
         complex
     )
-    return RootLocus(
-        key, unit, values, _traced(poles), models[0].period, tuple(_limits(values, poles))
-    )
+    period = models[0].period
+    limits = tuple(_limits(values, poles, period))
+    return RootLocus(key, unit, values, _traced(poles), period, limits)
 
 
 def _traced(poles: Any) -> Any:
@@ -137,8 +144,8 @@ def _traced(poles: Any) -> Any:
     return found
 
 
-def _limits(values: Array, poles: Any) -> list[float]:
-    size = np.abs(poles).max(axis=1) - 1.0 - ON_CIRCLE
+def _limits(values: Array, poles: Any, period: float) -> list[float]:
+    size = np.log(np.maximum(np.abs(poles).max(axis=1), 1e-300)) / period - DRIFT
     found = []
     for k in np.flatnonzero((size[1:] > 0.0) != (size[:-1] > 0.0)).tolist():
         share = size[k] / (size[k] - size[k + 1])

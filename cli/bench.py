@@ -64,9 +64,7 @@ def bench(
             min=1,
         ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="The seed by which they are drawn.", min=0)
-    ] = None,
+    seed: Annotated[int | None, typer.Option(help="The seed of the draws.", min=0)] = None,
     seeds: Annotated[
         str,
         typer.Option(
@@ -74,7 +72,7 @@ def bench(
         ),
     ] = "",
     jitter: Annotated[
-        str, typer.Option(help="How much longer messages of 'link_delays' take at most: '1 ms'.")
+        str, typer.Option(help="Largest extra delay of messages of 'link_delays': '1 ms'.")
     ] = "",
     loss: Annotated[
         str, typer.Option(help="The share of messages that 'link_delays' loses: '5 %'.")
@@ -87,12 +85,12 @@ def bench(
     ] = "",
     arms: Annotated[
         str,
-        typer.Option(help="What robots of 'real_robot' are told, with semicolons: 'calibrated'."),
+        typer.Option(help="Arms of 'real_robot', separated by semicolons: 'calibrated'."),
     ] = "",
     asked: Annotated[
         str,
         typer.Option(
-            help="Their jumps, with semicolons: 'in place 12 cm;ten in a row'; the effects of 'known_effects'."
+            help="Jumps of 'real_robot', separated by semicolons: 'in place 12 cm;ten in a row'; or effects of 'known_effects'."
         ),
     ] = "",
     robot: Annotated[
@@ -100,7 +98,7 @@ def bench(
     ] = "",
     harder: Annotated[
         bool,
-        typer.Option("--harder", help="Draw the tasks of 'jumps' as far as jumps land at all."),
+        typer.Option("--harder", help="Draw the tasks of 'jumps' up to the limits of what lands."),
     ] = False,
     trial: Annotated[
         str, typer.Option(help="The trial of 'jumps': 'uneven'; by default robust.")

@@ -22,7 +22,7 @@ def blocks(
     ] = "",
     as_json: AsJson = False,
     markdown: Annotated[
-        bool, typer.Option(help="Print the reference of ours as Markdown.")
+        bool, typer.Option(help="Print the reference of the shipped blocks as Markdown.")
     ] = False,
 ) -> None:
     """List all blocks, or print the contract of one: equations, ports, units, parameters."""
@@ -116,7 +116,7 @@ def reference_page(blocks: Sequence[BlockReference]) -> str:
 
 
 def anchor(name: str) -> str:
-    """The anchor that a heading of that name gets."""
+    """The anchor of a heading."""
     return name.lower().replace(".", "")
 
 

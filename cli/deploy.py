@@ -15,15 +15,15 @@ def deploy(
     graph: Annotated[Path, typer.Argument(help="The graph file.")],
     to: Annotated[Path, typer.Option("--to", help="The folder to write.")],
     machine: Annotated[
-        str, typer.Option(help="The machine; a graph that names none is deployed as a whole.")
+        str, typer.Option(help="The machine; a graph without machines is deployed as a whole.")
     ] = "",
     keys: Annotated[
         Path | None,
-        typer.Option(help="The folder of `aloft keys`; the machine's own goes along."),
+        typer.Option(help="The folder of `aloft keys`; the machine's own part is copied."),
     ] = None,
     wheels: Annotated[
         Path | None,
-        typer.Option(help="A folder of wheels to bring along, with aloft's own, such as dist."),
+        typer.Option(help="A folder of wheels to include, aloft's own among them, such as dist."),
     ] = None,
     overrides: Overrides = None,
     as_json: AsJson = False,

@@ -49,7 +49,7 @@ class LiveOptions:
 
     live: Annotated[
         bool,
-        typer.Option("--live", help="As --web, of a graph that is running: its values and times."),
+        typer.Option("--live", help="Like --web, for a running graph, with its values and times."),
     ] = False
     running: Annotated[
         str, typer.Option("--run", help="With --live: the name of the run, if there are several.")
@@ -63,7 +63,9 @@ class LiveOptions:
 def graph(
     graph: Annotated[
         Path | None,
-        typer.Argument(help="The graph file, or a recording: its graph. With --live not needed."),
+        typer.Argument(
+            help="The graph file, or a recording, for its graph. Not needed with --live."
+        ),
     ] = None,
     overrides: CompletedOverrides = None,
     *,
@@ -71,7 +73,7 @@ def graph(
     showing: LiveOptions,
     closed: Annotated[
         list[str] | None,
-        typer.Option("--closed", help="A sub-graph whose box the diagram keeps closed, or 'all'."),
+        typer.Option("--closed", help="A sub-graph to draw as a closed box, or 'all'."),
     ] = None,
 ) -> None:
     """Print the order of execution, rates, offsets, delays, and every wire with its type.

@@ -201,17 +201,16 @@ def show_locus(traced: RootLocus, graph: str, as_json: bool) -> None:
         print_json({"success": True, "graph": graph, **traced.as_data()})
         return
     rows = [
-        (number(value), f"{poles[k].real:.6f}", f"{poles[k].imag:.6f}", f"{abs(poles[k]):.6f}")
-        for value, poles in zip(traced.values, traced.poles, strict=True)
-        for k in [abs(poles).argmax()]
+        (number(value), f"{pole.real:.6f}", f"{pole.imag:.6f}", f"{abs(pole):.6f}")
+        for value, pole in zip(traced.values, traced.leading, strict=True)
     ]
     value = f">{traced.parameter} [{traced.unit}]" if traced.unit else f">{traced.parameter}"
     out = console()
-    out.print(table("slowest pole", (value, ">real", ">imaginary", ">size"), rows))
+    out.print(table("slowest pole but for drift", (value, ">real", ">imaginary", ">size"), rows))
     limits = ", ".join(f"{number(each)} {traced.unit}".strip() for each in traced.limits)
     say(
         out,
-        f"the limit of stability is at {limits}" if limits else "no pole crosses the unit circle",
+        f"the limit of stability is at {limits}" if limits else "no mode begins to grow",
     )
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 log = typer.Typer(
     name="log",
-    help="Look into recordings, export them, mend them.",
+    help="Inspect, export and repair recordings.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -71,7 +71,7 @@ def export(
     bag: Annotated[
         bool,
         typer.Option(
-            "--bag", help="A bag of ROS 2, a folder; needs pip install 'aloft-robotics[mcap]'."
+            "--bag", help="A ROS 2 bag, a folder; needs pip install 'aloft-robotics[mcap]'."
         ),
     ] = False,
     signal: Annotated[
@@ -118,7 +118,9 @@ def compare(
     second: Annotated[Path, typer.Argument(help="The recording to compare it with.")],
     align: Annotated[
         Literal["lift-off", "start"] | None,
-        typer.Option(help="What the runs have in common; by default lift-off, if both have one."),
+        typer.Option(
+            help="The event at which the runs are aligned; by default lift-off, if both have one."
+        ),
     ] = None,
     most: Annotated[int, typer.Option("--most", min=1, help="How many signals to show.")] = 20,
     as_json: AsJson = False,

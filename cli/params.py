@@ -28,7 +28,8 @@ Run = Annotated[
 def list_parameters(
     run: Run = "",
     everything: Annotated[
-        bool, typer.Option("--all", help="Also those that cannot be changed while it runs.")
+        bool,
+        typer.Option("--all", help="Also parameters that cannot be changed while the graph runs."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:

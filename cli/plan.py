@@ -45,13 +45,13 @@ class LibraryOptions:
         bool,
         typer.Option(
             "--anew",
-            help="Solve also what is kept, from nothing; in a grid: try again what failed before.",
+            help="Ignore stored plans and solve from nothing; in a grid: retry what failed before.",
         ),
     ] = False
-    listed: Annotated[bool, typer.Option("--list", help="List the plans that are kept.")] = False
+    listed: Annotated[bool, typer.Option("--list", help="List the stored plans.")] = False
     prune: Annotated[
         bool,
-        typer.Option("--prune", help="Remove from --keep the plans of all tasks but these."),
+        typer.Option("--prune", help="Remove the plans of all other tasks from --keep."),
     ] = False
 
 
@@ -59,7 +59,9 @@ class LibraryOptions:
 class PoolOptions:
     """Where a grid is planned."""
 
-    workers: Annotated[int, typer.Option(help="Processes for a grid; 0: one a core.", min=0)] = 0
+    workers: Annotated[
+        int, typer.Option(help="Worker processes for a grid; 0: one per core.", min=0)
+    ] = 0
     cluster: Annotated[
         str, typer.Option(help="Plan a grid on the Dask scheduler at this address.")
     ] = ""
@@ -72,7 +74,7 @@ class SearchOptions:
     nearest: Annotated[
         bool,
         typer.Option(
-            help="Where a task has no plan, search the nearest one that has; up to 6 s of CPU."
+            help="Where a task has no plan, search for the nearest one that has; up to 6 s of CPU."
         ),
     ] = True
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False

@@ -26,20 +26,31 @@ def render(
     at: Annotated[
         float | None, typer.Option(help="For a .png: the time that is shown [s].")
     ] = None,
-    speed: Annotated[float, typer.Option(min=0.001, help="0.25 is slow motion.")] = 0.5,
-    rate: Annotated[float, typer.Option(min=1, max=120, help="Pictures a second.")] = 20.0,
-    width: Annotated[int, typer.Option(min=64, max=3840, help="Of one run's picture.")] = 480,
-    height: Annotated[int, typer.Option(min=64, max=2160, help="Of one run's picture.")] = 400,
-    azimuth: Annotated[float, typer.Option(help="Where the camera looks to [deg].")] = 135.0,
-    elevation: Annotated[float, typer.Option(help="Its angle to the ground [deg].")] = -9.0,
+    speed: Annotated[
+        float, typer.Option(min=0.001, help="Playback speed; 0.25 is slow motion.")
+    ] = 0.5,
+    rate: Annotated[float, typer.Option(min=1, max=120, help="Frames per second.")] = 20.0,
+    width: Annotated[
+        int, typer.Option(min=64, max=3840, help="Width of one run's picture [pixels].")
+    ] = 480,
+    height: Annotated[
+        int, typer.Option(min=64, max=2160, help="Height of one run's picture [pixels].")
+    ] = 400,
+    azimuth: Annotated[
+        float, typer.Option(help="Direction of view [deg]; 90 is along the world's y axis.")
+    ] = 135.0,
+    elevation: Annotated[
+        float, typer.Option(help="Elevation of the view [deg]; negative looks down.")
+    ] = -9.0,
     distance: Annotated[
-        float, typer.Option(min=0, help="Its distance [m]; 0: all of the motion is seen.")
+        float,
+        typer.Option(min=0, help="Distance of the camera [m]; 0: the whole motion is in view."),
     ] = 0.0,
-    follow: Annotated[bool, typer.Option("--follow", help="The camera goes along.")] = False,
+    follow: Annotated[bool, typer.Option("--follow", help="The camera follows the robot.")] = False,
     no_forces: Annotated[bool, typer.Option("--no-forces", help="Draw no forces.")] = False,
     caption: Annotated[
         list[str] | None,
-        typer.Option(help="Below each run, in their order; by default the recording's name."),
+        typer.Option(help="Caption of each run, in order; by default the recording's name."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

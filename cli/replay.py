@@ -43,7 +43,7 @@ def replay(
         ),
     ] = "auto",
     first: Annotated[
-        int | None, typer.Option("--from", help="Begin at the last keyframe up to this tick.")
+        int | None, typer.Option("--from", help="Begin at the last keyframe before this tick.")
     ] = None,
     until: Annotated[int | None, typer.Option(help="End before this tick.")] = None,
     swap: Annotated[

@@ -38,7 +38,7 @@ robot.command("calibrate")(calibrate)
 robot.command("bring-up")(bring_up)
 robot.command("reach")(reach)
 
-Name = Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")]
+Name = Annotated[str, typer.Argument(help="A shipped robot, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
 
 
@@ -47,10 +47,13 @@ def show(
     name: Name,
     as_json: AsJson = False,
     picture: Annotated[
-        Path | None, typer.Option(help="Draw it as it stands to this .png or .svg file.")
+        Path | None, typer.Option(help="Draw the standing robot into this .png or .svg file.")
     ] = None,
     effects: Annotated[
-        bool, typer.Option("--effects", help="What of a real robot can be simulated, instead.")
+        bool,
+        typer.Option(
+            "--effects", help="List the real-robot effects that can be simulated instead."
+        ),
     ] = False,
 ) -> None:
     """Print the tree, masses, limits, motors, feet and sensors of a robot, and what is missing."""
@@ -118,9 +121,10 @@ def _show_effects(name: str, as_json: bool) -> None:
 def import_(
     file: ModelFile,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The YAML to write; the file's stem.")
+        Path | None,
+        typer.Option("--out", "-o", help="The YAML to write; by default named like the file."),
     ] = None,
-    force: Annotated[bool, typer.Option(help="Write over a YAML that is there.")] = False,
+    force: Annotated[bool, typer.Option(help="Overwrite an existing YAML.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Write the short YAML beside a URDF or MJCF file, filled with what can be found or guessed."""
@@ -143,7 +147,8 @@ def import_(
 def export(
     name: Name,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The file to write; standard output.")
+        Path | None,
+        typer.Option("--out", "-o", help="The file to write; by default standard output."),
     ] = None,
     urdf: Annotated[bool, typer.Option("--urdf", help="As a URDF, which is the default.")] = True,
 ) -> None:

@@ -47,10 +47,10 @@ class GraphOptions:
 
     overrides: CompletedOverrides = None
     seeds: Annotated[
-        str, typer.Option(help="Run once a seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")
+        str, typer.Option(help="Run once per seed: 0:20 or 1,5,7. Sets every parameter 'seed'.")
     ] = ""
     duration: Annotated[
-        str, typer.Option(help="How long [s of the graph's time]; the same as --set duration=.")
+        str, typer.Option(help="Duration [s of the graph's time]; the same as --set duration=.")
     ] = ""
 
 
@@ -66,7 +66,7 @@ class ObservationOptions:
         Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
     ] = Live.NONE
     keep: Annotated[
-        int, typer.Option(min=0, help="How many earlier recordings of that name are kept.")
+        int, typer.Option(min=0, help="How many earlier recordings of the same name to keep.")
     ] = 0
     split: Annotated[
         str,
@@ -124,9 +124,7 @@ class CompilingOptions:
             help="Check every index of a kernel: compile nothing, so that one beyond its array fails.",
         ),
     ] = False
-    fuse: Annotated[
-        bool, typer.Option(help="Run blocks of kernels that follow each other as one call.")
-    ] = True
+    fuse: Annotated[bool, typer.Option(help="Run consecutive compiled blocks as one call.")] = True
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ class ThreadOptions:
         typer.Option(help="Run the control thread with SCHED_FIFO at this priority, 1 to 99."),
     ] = None
     lock_memory: Annotated[
-        bool, typer.Option("--lock-memory", help="Keep all memory in the machine's (mlockall).")
+        bool, typer.Option("--lock-memory", help="Lock all memory (mlockall).")
     ] = False
 
 

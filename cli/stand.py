@@ -26,12 +26,15 @@ class StandOptions:
     """What it does while it stands."""
 
     squat: Annotated[
-        str, typer.Option(help="Go down by so much and up again: 6cm; by default it stands still.")
+        str,
+        typer.Option(
+            help="Depth of a squat, down and up again: 6cm; by default the robot stands still."
+        ),
     ] = ""
     push: Annotated[
         str,
         typer.Option(
-            help="Push its torso forwards for 0.1 s, as would change its speed by so much: 0.1m/s."
+            help="Push the torso forwards for 0.1 s with the impulse that changes the robot's speed by this: 0.1m/s."
         ),
     ] = ""
 

@@ -36,7 +36,7 @@ def study(
         Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
     ],
     seeds: Annotated[
-        str, typer.Option(help="Other seeds than the study's: 0:4 for a quick look.")
+        str, typer.Option(help="Seeds in place of the study's: 0:4 for a quick look.")
     ] = "",
     where: Annotated[
         list[str] | None,
@@ -61,7 +61,7 @@ def study(
     detect: Annotated[
         list[str] | None,
         typer.Option(
-            help="For which difference the seeds needed are said: 5%, or peak_tilt_deg=2. "
+            help="Difference for which the number of seeds needed is reported: 5%, or peak_tilt_deg=2. "
             "By default the measured one. Repeatable."
         ),
     ] = None,

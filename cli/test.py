@@ -39,7 +39,7 @@ def test(
     ] = None,
     block: Annotated[str, typer.Option(help="With --from: the block's path in the graph.")] = "",
     ticks: Annotated[
-        str, typer.Option(help="With --from: which ticks, e.g. 1200:1400 (1400 not among them).")
+        str, typer.Option(help="With --from: the ticks, e.g. 1200:1400 (1400 excluded).")
     ] = "",
     output: Annotated[
         Path | None,

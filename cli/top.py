@@ -25,7 +25,7 @@ PERIOD = 0.5
 
 def top(
     graph: Annotated[Path, typer.Argument(help="The graph file that the machines run.")],
-    once: Annotated[bool, typer.Option("--once", help="Print it once, and end.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="Print once and exit.")] = False,
     wait: Annotated[float, typer.Option(min=0.1, help="With --once: seconds to wait.")] = 5.0,
     keys: Keys = None,
     name: As = "viewer",

@@ -17,23 +17,28 @@ from .shared.output import console, errors_reported, print_json, say
 def twin(
     robot: Annotated[str, typer.Argument(help="The robot.")] = "bruce",
     hardware: Annotated[
-        Path | None, typer.Option(help="Its hardware's file; the ports are the twin's own.")
+        Path | None, typer.Option(help="Its hardware file; the ports are the twin's own.")
     ] = None,
     write: Annotated[
-        Path, typer.Option(help="Where to write the hardware's file with the twin's ports.")
+        Path, typer.Option(help="Where to write the hardware file with the twin's ports.")
     ] = Path("twin.yaml"),
     virtual: Annotated[
-        bool, typer.Option("--virtual", help="Time goes on with the exchanges on the bus.")
+        bool,
+        typer.Option(
+            "--virtual", help="Virtual time, which advances with the exchanges on the bus."
+        ),
     ] = False,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", help="Of the simulator: seed=3, gyro_noise=0.02, friction=0.5 ..."),
+        typer.Option(
+            "--set", help="A parameter of the simulator: seed=3, gyro_noise=0.02, friction=0.5 ..."
+        ),
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="What goes wrong: 'dead 0.5 left_knee_motor', 'lost 1 * share=0.1'."),
+        typer.Option(help="A fault to inject: 'dead 0.5 left_knee_motor', 'lost 1 * share=0.1'."),
     ] = None,
-    seconds: Annotated[float, typer.Option(help="End after so long; 0: with Ctrl-C.")] = 0.0,
+    seconds: Annotated[float, typer.Option(help="End after this time [s]; 0: at Ctrl-C.")] = 0.0,
     as_json: AsJson = False,
 ) -> None:
     """Serve the drives and the sensor board of a robot on pseudo-terminals, with physics behind.

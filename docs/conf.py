@@ -24,6 +24,9 @@ exclude_patterns = ["**/__pycache__", "**/.*"]
 html_theme = "furo"
 html_title = f"aloft {release}"
 html_copy_source = False
+html_show_copyright = False
+html_static_path = ["site.css"]
+html_css_files = ["site.css"]
 html_theme_options = {
     "light_css_variables": {"font-stack--monospace": "'DejaVu Sans Mono', monospace"},
 }

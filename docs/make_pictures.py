@@ -2,7 +2,7 @@
 
 That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card; that of
 the page of a running graph needs Chromium. ``python docs/make_pictures.py live`` makes that alone, ``gallery``
-those of docs/gallery.md.
+those of docs/gallery.md, ``pages`` those of other pages.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -59,6 +60,17 @@ GALLERY = (
     ("jump", "../graphs/jump.yaml", "render", "RECORDING", "--at", "1.1"),
 )  # fmt: skip
 """Pictures of the gallery: name, graph, and the verb that draws it with what it is given."""
+PAGES = (
+    ("gantry", "../graphs/from_gantry.yaml", "render", "RECORDING", "--at", "0.6", "--width", "640",
+     "--caption", "in the gantry"),
+    ("robots", "../graphs/robots/go2_jump.yaml ../graphs/robots/g1_jump.yaml ../graphs/robots/solo12_jump.yaml",
+     "render", "RECORDING", "--at", "1.1", "--width", "320", "--caption", "Go2", "--caption", "G1", "--caption",
+     "Solo12"),
+    ("uneven", "../graphs/forward_20cm.yaml ../graphs/trials/uneven.yaml", "render", "RECORDING", "--at", "1.45",
+     "--width", "640", "--elevation", "-20", "--caption", "ahead 20 cm, uneven"),
+    ("machines", "../graphs/machines/jump_two.yaml", "graph", "GRAPH"),
+)  # fmt: skip
+"""The same for other pages; of several graphs, which stand side by side, and trials, which change them."""
 THRUST = 0.98
 """An instant [s] late in the thrust, when the forces are large."""
 PATIENCE = 300.0
@@ -115,15 +127,20 @@ def save_film(path: Path) -> None:
         write_film(path, pictures(takes, times, camera), 20.0)
 
 
-def save_gallery(folder: Path) -> None:
-    """The pictures of docs/gallery.md, each by the program: what it runs, then how it shows that."""
+def save_drawn(drawn: Sequence[Sequence[str]], folder: Path) -> None:
+    """The pictures of a table such as ``GALLERY``, each by the program: what it runs, then how it shows that."""
     with tempfile.TemporaryDirectory() as made:
-        for name, graph, *shown in GALLERY:
-            file, recording = FOLDER / graph, Path(made) / f"{name}.rrd"
-            if "RECORDING" in shown:
-                load(file).run(sinks=[Recorder(recording)])
-            words = [str(file) if word == "GRAPH" else word for word in shown]
-            words = [str(recording) if word == "RECORDING" else word for word in words]
+        for name, graphs, *shown in drawn:
+            files = [str(FOLDER / graph) for graph in graphs.split()]
+            trials = [file for file in files if "trials" in file]
+            recordings = []
+            for file in files if "RECORDING" in shown else ():
+                if file not in trials:
+                    recordings.append(str(Path(made) / f"{name}_{Path(file).stem}.rrd"))
+                    text = f"include: [{', '.join([file, *trials])}]\n"
+                    load(text).run(sinks=[Recorder(recordings[-1])])
+            words = [text for word in shown for text in
+                     {"GRAPH": files, "RECORDING": recordings}.get(word, [word])]  # fmt: skip
             suffix = {"render": ("-o", "png")}.get(shown[0], ("--svg", "svg"))
             target = folder / f"{name}.{suffix[1]}"
             command = [sys.executable, "-m", "aloft", *words, suffix[0], str(target)]
@@ -132,7 +149,8 @@ def save_gallery(folder: Path) -> None:
 
 def main() -> None:
     """Make all pictures."""
-    save_gallery(FOLDER / "gallery")
+    save_drawn(GALLERY, FOLDER / "gallery")
+    save_drawn(PAGES, FOLDER)
     save_film(FOLDER / "jumps.gif")
     graph = load(JUMP)
     with tempfile.TemporaryDirectory() as folder:
@@ -204,7 +222,9 @@ def _live(name: str) -> LiveRun:
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["gallery"]:
-        save_gallery(FOLDER / "gallery")
+        save_drawn(GALLERY, FOLDER / "gallery")
+    elif sys.argv[1:] == ["pages"]:
+        save_drawn(PAGES, FOLDER)
     elif sys.argv[1:] == ["live"]:
         save_live_page(FOLDER / "live.png")
     else:

@@ -50,7 +50,7 @@ class MapNode:
         return iter(self.entries)
 
     def get(self, key: str) -> Entry | None:
-        """The entry of that key."""
+        """The entry of a key."""
         for entry in self.entries:
             if entry.key == key:
                 return entry

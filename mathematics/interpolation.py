@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array1D, Indices1D
+from .arrays import Array1D, Indices1D, Vector3
 from .kernel import kernel
 
 
@@ -135,3 +136,42 @@ def minimum_jerk(share: float) -> tuple[float, float, float]:
         30.0 * u * u * (1.0 - u) * (1.0 - u),
         60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
     )
+
+
+@kernel
+def lengthen(
+    off_place: Vector3,
+    gain: float,
+    limit: float,
+    flight: float,
+    duration: float,
+    share: float,
+    place: Vector3,
+    velocity: Vector3,
+    acceleration: Vector3,
+) -> None:
+    """Let a jump land elsewhere: v_d s(u) is added to the velocity of the centre of mass, its integral to the
+    place and its derivative to the acceleration, with s the motion of ``minimum_jerk``, until lift-off, and
+
+        v_d = d / (T_f + T_p / 2),    d = -gain off_place, of a length of at most ``limit``,
+
+    so that at touchdown they have moved it by d.
+
+    Args:
+        off_place: the horizontal position error of the feet, (3,) [m].
+        gain: the share of the error that is corrected.
+        limit: the largest change of the jump's length [m].
+        flight: the duration T_f of the planned flight [s].
+        duration, share: how long before lift-off it begins, T_p [s], and the share u of that
+            time which is over, 0 to 1.
+        place, velocity, acceleration: of the centre of mass, (3,) each; they are changed.
+    """
+    u = min(max(share, 0.0), 1.0)
+    grown, rate, _ = minimum_jerk(u)
+    size = gain * math.sqrt(off_place[0] ** 2 + off_place[1] ** 2)
+    limited = 1.0 if size <= limit else limit / size
+    for k in range(2):
+        speed = -limited * gain * off_place[k] / (flight + 0.5 * duration)
+        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
+        velocity[k] += speed * grown
+        acceleration[k] += speed * rate / duration

@@ -69,7 +69,7 @@ class Cones(NamedTuple):
 
 
 def cone_memory(n_contacts: int) -> Cones:
-    """Zero memory for so many cones."""
+    """Zeroed memory for this number of cones."""
     return Cones(
         np.zeros((n_contacts, PLANES, 2)), np.zeros(n_contacts, np.int64),
         np.zeros((n_contacts, 2)), np.zeros(n_contacts),

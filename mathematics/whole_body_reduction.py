@@ -81,7 +81,7 @@ class Reduction(NamedTuple):
 
 
 def reduction_memory(n: int, n_contacts: int) -> Reduction:
-    """Zero memory for n velocities and so many contact points."""
+    """Zeroed memory for n velocities and this number of contact points."""
     m = 3 * n_contacts
     shapes = (
         (n, n), (6, n), n, (6, 6), (6, m), 6, (6, n), n, 6, (n - 6, n), (6, n), (n - 6, m + n), n - 6,
@@ -101,7 +101,7 @@ class EqualityProgram(NamedTuple):
 
 
 def equality_program(n: int, n_contacts: int) -> EqualityProgram:
-    """Zero memory for n velocities and so many contact points."""
+    """Zeroed memory for n velocities and this number of contact points."""
     size, rows = 3 * n_contacts + n, PYRAMID_ROWS * n_contacts + 2 * (n - 6)
     limits = QuadraticProgram(
         np.zeros((size, size)), np.zeros(size), np.zeros((rows, size)), np.zeros(rows)

@@ -44,7 +44,7 @@ class ActiveSetProgram(NamedTuple):
 
 
 def active_set_program(n_velocities: int, n_contacts: int, planes: int = 0) -> ActiveSetProgram:
-    """Zero memory for a robot of that size, and for so many further rows for each contact."""
+    """Zeroed memory for a robot of this size, with this number of further rows per contact."""
     joints = n_velocities - 6
     n, m = 3 * n_contacts + joints, (PYRAMID_ROWS + planes) * n_contacts + 2 * joints
     return ActiveSetProgram(

@@ -499,7 +499,7 @@ class RobotDescription(Part):
         return self.total_mass * GRAVITY
 
     def link(self, name: str) -> Link:
-        """The link of that name."""
+        """The link called ``name``."""
         return next(link for link in self.links if link.name == name)
 
     def foot_of_contact(self) -> tuple[int, ...]:

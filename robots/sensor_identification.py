@@ -128,7 +128,7 @@ def slope(values: Array, period: float) -> Array:
 
 
 def shifted(values: Array, ticks: float) -> Array:
-    """Columns as they are so many ticks later, between the ticks linearly."""
+    """Columns shifted by a number of ticks, interpolated linearly between ticks."""
     n = np.arange(len(values), dtype=np.float64)
     return np.array([np.interp(n + ticks, n, column) for column in values.T]).T
 

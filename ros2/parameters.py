@@ -101,7 +101,7 @@ class Ros2Block(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A twist, to nobody."""
+        """A twist."""
         return {
             "topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist", "router": "tcp/127.0.0.1:1"
         }  # fmt: skip

@@ -263,7 +263,7 @@ SCALED = ("peak_torque", "continuous_torque", "corner_speed", "no_load_speed")
 
 
 def with_stronger_motors(robot: RobotDescription, factor: float) -> RobotDescription:
-    """The robot with motors of so many times the torque and speed, in every profile."""
+    """The robot with torque and speed of its motors scaled, in every profile."""
     profiles = {}
     for name, profile in robot.profiles.items():
         motors = {

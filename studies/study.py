@@ -183,5 +183,5 @@ class Study:
         return tuple(c.label for a in self.axes if a.name == axis for c in a.cases)
 
     def axis(self, name: str) -> Axis | None:
-        """The axis of the grid of that name."""
+        """The axis of the grid called ``name``."""
         return next((axis for axis in self.axes if axis.name == name), None)

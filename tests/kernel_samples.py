@@ -308,8 +308,9 @@ UNUSED = {
         np.array([0.1, -0.08, 0.0]), 0.3, 1.0, 0.2, 0.09, 0.27, np.array([-0.3, 0.02, 0.0]),
     ),
     "aloft.blocks.scoring.estimator_score.record_landing": (as_record(EstimatorRecord.allocate()),),
-    "aloft.blocks.scoring.footing.unroll": (
-        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 2)),
+    "aloft.blocks.scoring.footing.add_roll": (
+        Footing(quadruped()).ball_feet(), 0.2 * DRAW(12), np.array([0.1, 0.2, 0.0, 0.97]), DRAW((4, 3, 3)),
+        DRAW((4, 2)),
     ),
     "aloft.blocks.scoring.jump_score.record_row": (
         BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
@@ -388,7 +389,7 @@ UNUSED = {
     "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.mathematics.rotations.pitch_angle": (np.array([0.1, 0.2, 0.3, 0.9]),),
-    "aloft.blocks.control.balance_target.lengthen": (
+    "aloft.mathematics.interpolation.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),
     "aloft.blocks.control.dynamics.lowest_point": (

@@ -1,13 +1,17 @@
 """What all pictures share: lines where their numbers say, labels apart, the same bytes each time."""
 
+import io
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from aloft.plotting import (
     COLOURS,
+    DARK,
     SHADES,
     Curve,
     Panel,
@@ -19,6 +23,8 @@ from aloft.plotting import (
     style,
     svg_text,
 )
+
+from .logs.viewing.browser import PROGRAM, Browser
 
 SVG = "{http://www.w3.org/2000/svg}"
 X = np.linspace(0.0, 1.0, 101)
@@ -103,3 +109,39 @@ def test_labels_are_apart_in_their_order_and_inside() -> None:
     assert found == pytest.approx([0.8, 0.5, 1.0, 0.9, 0.6])
     crowded = spread([0.0] * 20, 0.1)
     assert np.diff(sorted(crowded)) == pytest.approx([0.1] * 19) and max(crowded) == 1.0
+
+
+@pytest.mark.long
+@pytest.mark.skipif(
+    PROGRAM is None, reason="looks through a real browser; install Debian's chromium"
+)
+def test_an_svg_is_light_in_print_and_dark_on_a_dark_screen(tmp_path: Path) -> None:
+    file = tmp_path / "a.svg"
+    file.write_text(drawn(Panel("", [Curve("one", X, X)], shades=[Shade(0.0, 0.5)])))
+    shown = {}
+    with Browser(tmp_path / "profile", (400, 300)) as browser:
+        browser.open(file.as_uri())
+        for medium in ("screen", "print"):
+            for theme in ("light", "dark"):
+                preferred = [{"name": "prefers-color-scheme", "value": theme}]
+                browser.ask("Emulation.setEmulatedMedia", media=medium, features=preferred)
+                picture = Image.open(io.BytesIO(browser.picture())).convert("RGB")
+                shown[medium, theme] = np.asarray(picture)[:250, :350]
+
+    def has(which: tuple[str, str], colour: str) -> bool:
+        wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
+        return bool((shown[which] == wanted).all(axis=2).sum() > 50)
+
+    for light, dark in (("#ffffff", DARK["#ffffff"]), (COLOURS[0], DARK[COLOURS[0]]),
+                        (SHADES["flight"], DARK[SHADES["flight"]])):  # fmt: skip
+        assert has(("screen", "dark"), dark) and not has(("screen", "dark"), light)
+        for which in (("screen", "light"), ("print", "light"), ("print", "dark")):
+            assert has(which, light) and not has(which, dark), (which, light)
+
+
+def test_a_png_is_light() -> None:
+    with style():
+        figure = new_figure(4.0, 3.0, "a")
+        draw_panels([(figure.add_subplot(), Panel("", [Curve("one", X, X)]))])
+        pixels = np.asarray(image(figure))
+    assert np.median(pixels) == 255 and (pixels[0] == 255).all()

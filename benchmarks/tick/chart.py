@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...plotting import COLOURS, FAINT, INK, PALE, light_and_dark, new_figure, style, svg_text
+from ...plotting import COLOURS, FAINT, INK, PALE, new_figure, style, svg_text
 
 BARS = (
     ("fused block ", "fused"),
@@ -55,7 +55,7 @@ def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
         axes.margins(x=0.1)
         axes.set_xlabel("medians of the blocks [us]")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=7, fontsize=8)
-        return light_and_dark(svg_text(figure))
+        return svg_text(figure)
 
 
 def _pieces(rows: Sequence[Mapping[str, Any]], prefix: str) -> dict[str, float]:

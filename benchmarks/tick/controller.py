@@ -40,7 +40,7 @@ class RecordedJump:
 
 
 def record_jump(ticks: int | None = None) -> RecordedJump:
-    """Run the jump of ``graphs/jump.yaml``, to its end or for so many ticks.
+    """Run the jump of ``graphs/jump.yaml``, to its end or for a number of ticks.
 
     Raises:
         RunError: the run failed.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Rows3, Vector3
 from ...mathematics.elementary import atan2, sincos
-from ...mathematics.interpolation import minimum_jerk
+from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import (
     conjugate,
@@ -395,40 +394,6 @@ def pattern_turn(
         sine += ax * by - ay * bx
         cosine += ax * bx + ay * by
     return atan2(sine, cosine)
-
-
-@kernel
-def lengthen(
-    off_place: Vector3,
-    gain: float,
-    limit: float,
-    flight: float,
-    duration: float,
-    share: float,
-    place: Vector3,
-    velocity: Vector3,
-    acceleration: Vector3,
-) -> None:
-    """Add the correction of the feet's position error to a jump's motion; see ``BalanceTarget``.
-
-    Args:
-        off_place: the horizontal position error of the feet, (3,) [m].
-        gain: the share of the error that is corrected.
-        limit: the largest change of the jump's length [m].
-        flight: the duration of the planned flight [s].
-        duration, share: how long before lift-off the correction begins [s], and the share of that
-            time which is over, 0 to 1.
-        place, velocity, acceleration: of the centre of mass, (3,) each; they are changed.
-    """
-    u = min(max(share, 0.0), 1.0)
-    grown, rate, _ = minimum_jerk(u)
-    size = gain * math.sqrt(off_place[0] ** 2 + off_place[1] ** 2)
-    limited = 1.0 if size <= limit else limit / size
-    for k in range(2):
-        speed = -limited * gain * off_place[k] / (flight + 0.5 * duration)
-        place[k] += speed * duration * u * u * u * u * (2.5 + u * (u - 3.0))
-        velocity[k] += speed * grown
-        acceleration[k] += speed * rate / duration
 
 
 @kernel

@@ -17,8 +17,6 @@ class SafetyFault(IntEnum):
     """A joint went beyond its limits."""
     JOINT_SPEED = 3
     """A joint turned too fast for too long."""
-    STALE_SENSORS = 4
-    """Joint readings stopped changing."""
     ABSURD_STATE = 5
     """A state is not finite or beyond anything the robot can do."""
     ABSURD_COMMAND = 6
@@ -47,13 +45,18 @@ class SafetyFault(IntEnum):
     """The robot's time stamp stopped changing."""
     SWITCH = 18
     """A foot switch is stuck or bounces."""
+    STUCK_JOINT = 19
+    """The readings of a joint stopped changing."""
+    STUCK_IMU = 20
+    """The readings of an axis of the IMU stopped changing."""
+    TORQUE = 21
+    """The torque of a joint does not follow its command."""
 
 
 TEXTS = {
     SafetyFault.TILT: "the base leant more than `tilt_limit`",
     SafetyFault.JOINT_LIMIT: "a joint went beyond its limits",
     SafetyFault.JOINT_SPEED: "a joint turned faster than `speed_limit`",
-    SafetyFault.STALE_SENSORS: "the joint readings stopped changing",
     SafetyFault.ABSURD_STATE: "the state is not finite, or beyond anything the robot can do",
     SafetyFault.ABSURD_COMMAND: "the command is not finite, or beyond anything the drives can do",
     SafetyFault.SOLVER: "the whole-body controller failed too often in a row",

@@ -12,13 +12,11 @@ from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import inverse, multiply_vector, product
 from ...mathematics.rotations import tilt
 from ...runtime.language.block import Block, Clock, Input, Metric, Output, State
-from ...runtime.language.parameters import Parameters, live_parameter, parameter
-from ...runtime.language.per_joint import PerJoint
-from ...runtime.language.signals import Field, Signal
 from ..signals import (
     BaseState,
     CommandMode,
     DrivePhase,
+    ImuReading,
     JointCommand,
     JointState,
     RobotHealth,
@@ -28,122 +26,20 @@ from ..signals import (
 )
 from ..signals.robot import HEALTHY, describe_conditions
 from .safety_faults import SWITCH_TEXTS, TEXTS, SafetyFault, is_of_hardware
+from .safety_state import SafetyConstants, SafetyParams, SafetyState
 
 _DAMPED_SPEED = 20.0
 """Joint speed [rad/s] at which the default damping asks for the motors' peak torque."""
+_SMOOTHING = 0.05
+"""Time constant [s] with which commanded and measured torques are compared."""
+_SLIGHT = 0.03
+"""The share of a joint's peak torque that its torque may always be off."""
 _CRITICAL = 0x7C
 """The bits of a drive's condition with which it has switched its torque off."""
 _ANSWERED = 0x80
 """The bit that every condition has."""
 UNSTAMPED = -1.0
 """The time stamp of a robot that does not report when it measured."""
-
-
-class SafetyParams(Parameters):
-    """The parameters of ``SafetyMonitor``."""
-
-    tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
-    tilt_hold: float = parameter(0.02, unit="s", ge=0.0, text="how long the base may lean further")
-    limit_margin: float = parameter(
-        0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
-    )
-    speed_limit: PerJoint | None = parameter(
-        None, unit="rad/s", gt=0.0, text="largest joint speed; none: twice what its motors reach"
-    )
-    joint_hold: float = parameter(
-        0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
-    )
-    torque_limit: PerJoint | None = parameter(
-        None, unit="N m", gt=0.0,
-        text="a joint torque beyond this is a mistake; none: ten times the motors' peak",
-    )  # fmt: skip
-    stale_ticks: int = parameter(0, ge=0, text="equal joint readings in a row; zero: any")
-    unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
-    damping: PerJoint | None = live_parameter(
-        None, unit="N m s/rad", ge=0.0,
-        text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
-    )  # fmt: skip
-    lowest_voltage: float | None = parameter(
-        None, unit="V", gt=0.0, text="lowest voltage of the pack without load; none: not judged"
-    )
-    brown_out_voltage: float = parameter(
-        0.0, unit="V", ge=0.0, text="lowest voltage of a drive under any load"
-    )
-    pack_resistance: float = parameter(
-        0.0,
-        unit="ohm",
-        ge=0.0,
-        text="of the pack and its leads: under load the voltage may be lower",
-    )
-    winding_resistance: float = parameter(0.2, unit="ohm", ge=0.0, text="of a motor, for its load")
-    torque_constant: float = parameter(0.35, unit="N m/A", gt=0.0, text="of a motor, for its load")
-    highest_temperature: float = parameter(
-        80.0, gt=0.0, le=200.0, text="highest temperature of a winding [deg C]"
-    )
-    largest_current: float | None = parameter(
-        None, unit="A", gt=0.0, text="largest measured current of a drive; none: not judged"
-    )
-    health_hold: float = parameter(
-        0.02, unit="s", ge=0.0, text="how long voltage, temperature or current may be beyond"
-    )
-    answer_age: float = parameter(
-        0.02, unit="s", gt=0.0, text="oldest answer of a drive that may be used"
-    )
-    imu_age: float = parameter(
-        0.02, unit="s", gt=0.0, text="oldest packet of the sensor board that may be used"
-    )
-    invalid_hold: float = parameter(
-        0.1, unit="s", ge=0.0,
-        text="how long joints, IMU or switches may be marked as not valid",
-    )  # fmt: skip
-    stamp_age: float = parameter(
-        0.05, unit="s", gt=0.0, text="how long the robot's time stamp may stay the same"
-    )
-
-
-class SafetyState(Signal):
-    """The state of ``SafetyMonitor``."""
-
-    fault = Field(
-        dtype="int64", values=SafetyFault, text="why the robot is damped; the first reason stays"
-    )
-    fault_tick = Field(dtype="int64", text="when")
-    tilted = Field(dtype="int64", text="ticks in a row the base has leant too far")
-    beyond = Field("n_joints", dtype="int64", text="ticks in a row each joint was out of limits")
-    fast = Field("n_joints", dtype="int64", text="ticks in a row each joint was too fast")
-    stale = Field(dtype="int64", text="ticks in a row without a changed joint reading")
-    unsolved = Field(dtype="int64", text="ticks in a row without a solution")
-    last_position = Field("n_joints", unit="rad", text="joint angles of the last tick")
-    last_velocity = Field("n_joints", unit="rad/s", text="joint velocities of the last tick")
-    started = Field(dtype="bool", text="whether there was a last tick")
-    low = Field("n_joints", dtype="int64", text="ticks in a row each voltage was too low")
-    hot = Field("n_joints", dtype="int64", text="ticks in a row each winding was too hot")
-    strong = Field("n_joints", dtype="int64", text="ticks in a row each current was too large")
-    invalid = Field(3, dtype="int64", text="ticks in a row joints, IMU, switches were not valid")
-    stamps = Field(2, text="the last time stamp [s], and the ticks since it changed")
-    motor_torque = Field("n_joints", unit="N m", text="measured torques of the motors")
-    heat = Field("n_joints", unit="J", text="the windings' heat so far")
-    fault_place = Field(dtype="int64", text="index of the motor or switch that was at fault")
-    fault_value = Field(text="what it measured, in the unit of its signal")
-
-
-class SafetyConstants(Signal):
-    """Limits and durations that follow from the parameters and the robot."""
-
-    lower = Field("n_joints", unit="rad", text="least joint positions")
-    upper = Field("n_joints", unit="rad", text="greatest joint positions")
-    speed = Field("n_joints", unit="rad/s", text="greatest joint speeds")
-    torque = Field("n_joints", unit="N m", text="greatest torques of a command")
-    damping = Field("n_joints", unit="N m s/rad", text="joint damping after a fault")
-    lowest_voltage = Field(unit="V", text="zero: not judged")
-    torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of the motors")
-    largest_current = Field(unit="A", text="infinite: not judged")
-    heating = Field(text="heat of a winding in a tick for its squared torque [J/(N m)^2]")
-    tilt_ticks = Field(dtype="int64", text="how many ticks the base may lean too far")
-    joint_ticks = Field(dtype="int64", text="how many a joint may be beyond its limits")
-    health_ticks = Field(dtype="int64", text="how many a drive may be beyond a limit")
-    invalid_ticks = Field(dtype="int64", text="how many readings may be marked as not valid")
-    stamp_ticks = Field(dtype="int64", text="how many the time stamp may stay the same")
 
 
 class SafetyMonitor(Block):
@@ -155,8 +51,6 @@ class SafetyMonitor(Block):
     * the base leans more than ``tilt_limit`` for ``tilt_hold``;
     * a joint is more than ``limit_margin`` beyond its limits, or faster than its ``speed_limit``,
       for ``joint_hold``; a joint without limits is never beyond them;
-    * joint readings have not changed by a single bit for ``stale_ticks`` ticks (zero: never;
-      a simulator without noise may stand that still);
     * a state or a command is not finite, or beyond 10 m/s, 100 rad/s or its ``torque_limit``;
     * the whole-body controller has not solved for ``unsolved_ticks`` ticks in a row;
     * while the drives are on, the robot's own report (``health``) is bad: a drive reports an error,
@@ -164,6 +58,10 @@ class SafetyMonitor(Block):
       voltage, temperature or current is beyond its limit for ``health_hold`` (under load the voltage may
       be lower, by ``pack_resistance``, but not below ``brown_out_voltage``); joints, IMU or
       switches are marked as not valid for ``invalid_hold``; the time stamp stays for ``stamp_age``;
+    * while the drives are on, angle and speed of a joint, or an axis of the gyroscope or accelerometer where ``imu`` is wired,
+      have not changed by a single bit for ``stuck_time``: a sensor that works has noise;
+    * while the drives are on, the torque that a joint measures is off what its command asks for by more than ``torque_error`` of it
+      and 3 % of its peak, both smoothed over 50 ms, for ``health_hold``: a motor that spins freely, or does not obey;
     * a foot switch is at fault, and ``SwitchMonitor`` asks to stop.
 
     In damping the command is zero torque and stiffness, the measured angle, zero velocity and the
@@ -184,6 +82,7 @@ class SafetyMonitor(Block):
     base = Input(BaseState, text="the estimated base")
     joints = Input(JointState, text="the measured joints")
     wbc = Input(WholeBodyCommand, text="whether the controller has solved")
+    imu = Input(ImuReading, default={}, text="the IMU's readings; not judged where it is not wired")
     health = Input(
         RobotHealth,
         default={
@@ -207,6 +106,10 @@ class SafetyMonitor(Block):
         constants.speed[:] = 2.0 * fastest if given[0] is None else given[0].resolve(robot)
         constants.torque[:] = 10.0 * peak if given[1] is None else given[1].resolve(robot)
         constants.damping[:] = peak / _DAMPED_SPEED if given[2] is None else given[2].resolve(robot)
+        constants.peak[:] = peak
+        constants.fading = min(1.0, period / _SMOOTHING)
+        constants.imu_wired = "imu" in self.context.wired
+        constants.stuck_ticks = round(p.stuck_time / period)
         constants.lowest_voltage = p.lowest_voltage or 0.0
         constants.torque_to_motor[:] = robot.torque_to_motor
         constants.heating = p.winding_resistance / p.torque_constant**2 * period
@@ -224,6 +127,7 @@ class SafetyMonitor(Block):
         base: BaseState,
         joints: JointState,
         wbc: WholeBodyCommand,
+        imu: ImuReading,
         health: RobotHealth,
         switches: SwitchHealth,
         command: JointCommand,
@@ -234,11 +138,16 @@ class SafetyMonitor(Block):
     ) -> bool:
         fault = judge_motion(desired, base, joints, wbc, state, params, constants)
         heat_windings(joints, state, constants)
+        count_stuck(joints, imu, state)
+        compare_torques(joints, state, constants, params.torque_error)
         place, value = 0, 0.0
         if health.state > DrivePhase.OFF and health.state < DrivePhase.DAMPED:
             found, drive = judge_health(health, joints, state, params, constants)
             if fault == SafetyFault.NONE:
                 fault, place, value = found, drive, measured_value(health, found, drive)
+            if fault == SafetyFault.NONE:
+                fault, place = judge_readings(state, constants)
+                value = state.missing[place] if fault == SafetyFault.TORQUE else 0.0
         if fault == SafetyFault.NONE and switches.stop:
             fault, place = SafetyFault.SWITCH, first_bad_switch(switches)
             value = float(switches.fault[place])
@@ -252,6 +161,7 @@ class SafetyMonitor(Block):
             pass_on(desired, command)
         else:
             damp(joints.position, constants.damping, command)
+        expect_torques(command, joints, state, constants)
         return begins
 
     def on_event(self) -> None:
@@ -282,8 +192,24 @@ class SafetyMonitor(Block):
         if fault == SafetyFault.SWITCH:
             point = self.robot.contacts[int(self.state.fault_place)].name
             return f"foot switch {point} {SWITCH_TEXTS[SwitchFault(int(self.state.fault_value))]}"
+        if fault in (SafetyFault.STUCK_JOINT, SafetyFault.STUCK_IMU, SafetyFault.TORQUE):
+            return self._reading_reason(fault)
         motor = self.robot.transmission.motors[int(self.state.fault_place)]
         return health_text(fault, motor, float(self.state.fault_value), self.params)
+
+    def _reading_reason(self, fault: SafetyFault) -> str:
+        """A fault of readings in words, with its limit."""
+        place, limit = int(self.state.fault_place), self.params
+        if fault == SafetyFault.STUCK_IMU:
+            sensor = f"{('gyroscope', 'accelerometer')[place // 3]}, axis {'xyz'[place % 3]},"
+            return f"{sensor} has read the very same for {1e3 * limit.stuck_time:g} ms"
+        joint = self.robot.joints[place].name
+        if fault == SafetyFault.STUCK_JOINT:
+            return f"joint {joint} has read the very same for {1e3 * limit.stuck_time:g} ms"
+        return (
+            f"joint {joint}: its torque is {float(self.state.fault_value):+.1f} N m off its command; torque_error "
+            f"is {100.0 * limit.torque_error:g} %"
+        )
 
 
 # Motion and computation
@@ -307,15 +233,12 @@ def judge_motion(
     state.tilted = state.tilted + 1 if tilt(base.orientation) > params.tilt_limit else 0
     state.unsolved = 0 if wbc.solved else state.unsolved + 1
     beyond, fast = count_beyond(joints, state, constants)
-    count_unchanged(joints, state)
     if state.tilted > constants.tilt_ticks:
         return SafetyFault.TILT
     if beyond > constants.joint_ticks:
         return SafetyFault.JOINT_LIMIT
     if fast > constants.joint_ticks:
         return SafetyFault.JOINT_SPEED
-    if params.stale_ticks > 0 and state.stale >= params.stale_ticks:
-        return SafetyFault.STALE_SENSORS
     if params.unsolved_ticks > 0 and state.unsolved >= params.unsolved_ticks:
         return SafetyFault.SOLVER
     return SafetyFault.NONE
@@ -372,19 +295,69 @@ def count_beyond(
     return beyond, fast
 
 
+# What is measured, against itself and against the command
+
+
 @kernel
-def count_unchanged(joints: JointState, state: SafetyState) -> None:
-    """Count the ticks since a joint reading changed."""
-    changed = not state.started
-    for joint in range(joints.position.shape[0]):
-        if joints.position[joint] != state.last_position[joint]:
-            changed = True
-        if joints.velocity[joint] != state.last_velocity[joint]:
-            changed = True
+def count_stuck(joints: JointState, imu: ImuReading, state: SafetyState) -> None:
+    """Count the ticks since each joint, and each axis of the IMU, read something else."""
+    for k in range(joints.position.shape[0]):
+        same = (
+            joints.position[k] == state.last_position[k]
+            and joints.velocity[k] == state.last_velocity[k]
+        )
+        state.stuck_joints[k] = state.stuck_joints[k] + 1 if same else 0
+    for k in range(6):
+        reading = imu.angular_velocity[k] if k < 3 else imu.specific_force[k - 3]
+        state.stuck_imu[k] = state.stuck_imu[k] + 1 if reading == state.last_imu[k] else 0
+        state.last_imu[k] = reading
     state.last_position[:] = joints.position
     state.last_velocity[:] = joints.velocity
-    state.started = True
-    state.stale = 0 if changed else state.stale + 1
+
+
+@kernel
+def compare_torques(
+    joints: JointState, state: SafetyState, constants: SafetyConstants, error: float
+) -> None:
+    """Count the ticks in a row in which each measured torque was off what the last command asks for."""
+    for k in range(joints.torque.shape[0]):
+        state.measures = state.measures or joints.torque[k] != 0.0
+        off = joints.torque[k] - state.expected[k] - state.missing[k]
+        state.missing[k] += constants.fading * off
+        state.asked[k] += constants.fading * (abs(state.expected[k]) - state.asked[k])
+        most = error * (state.asked[k] + _SLIGHT * constants.peak[k])
+        beyond = error > 0.0 and state.measures and abs(state.missing[k]) > most
+        state.off[k] = state.off[k] + 1 if beyond else 0
+
+
+@kernel
+def expect_torques(
+    command: JointCommand, joints: JointState, state: SafetyState, constants: SafetyConstants
+) -> None:
+    """The torques that a command asks for, no more than the motors have."""
+    for k in range(joints.torque.shape[0]):
+        torque = command.torque[k]
+        torque += command.stiffness[k] * (command.position[k] - joints.position[k])
+        torque += command.damping[k] * (command.velocity[k] - joints.velocity[k])
+        finite = math.isfinite(torque)
+        most = constants.peak[k]
+        state.expected[k] = min(max(torque, -most), most) if finite else 0.0
+
+
+@kernel
+def judge_readings(state: SafetyState, constants: SafetyConstants) -> tuple[int, int]:
+    """The first reading that is stuck, or torque that is off, and its joint or axis."""
+    if constants.stuck_ticks > 0:
+        for k in range(state.stuck_joints.shape[0]):
+            if state.stuck_joints[k] >= constants.stuck_ticks:
+                return SafetyFault.STUCK_JOINT, k
+        for k in range(6):
+            if constants.imu_wired and state.stuck_imu[k] >= constants.stuck_ticks:
+                return SafetyFault.STUCK_IMU, k
+    for k in range(state.off.shape[0]):
+        if state.off[k] > constants.health_ticks:
+            return SafetyFault.TORQUE, k
+    return SafetyFault.NONE, 0
 
 
 # What the robot reports of its hardware

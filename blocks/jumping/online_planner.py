@@ -35,7 +35,7 @@ class PlanAnswer(PlanRows):
 class OnlinePlanner(Block):
     """Plans the jump that was asked for, and hands the plan over, a part in every run.
 
-    It belongs in the background (``background: {latency: 500 ms}``): a plan takes some tenths of a second on a busy machine.
+    It belongs in the background (``background: {latency: 250 ms}``): a plan takes a tenth of a second on a busy machine.
     A motion is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``), and corrected in a few steps
     until it fulfils all constraints of the whole-body problem of ``aloft plan``, on 44 knots with all coordinates
     (``planner/online/correction``). The plan must pass the check with exact dynamics that every plan passes. A jump out of

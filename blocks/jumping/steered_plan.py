@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
-from ...mathematics.elementary import sincos
+from ...mathematics.elementary import hypot, sincos
+from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, turn_about_vertical, wrap
 from ...planner.library.jump_table import (
@@ -18,6 +19,7 @@ from ...planner.library.jump_table import (
     row_dimensions,
 )
 from ...planner.online.hop_plans import missing_plans, standing_row
+from ...planner.online.hop_request import LEVEL, REACH
 from ...robots.description import RobotDescription
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
@@ -46,6 +48,11 @@ DIRECTED = 0.05
 """A jump is one ahead or back from that distance on [m]."""
 MOST_BIAS = 0.02
 """The largest error of place [m] that is taken for the robot's own, and not for a push."""
+FARTHEST, FARTHEST_BACK, FARTHEST_ASIDE = REACH["ahead"], REACH["back"], REACH["aside"]
+HARDEST = 1.875
+"""The largest rate of ``minimum_jerk``."""
+SAME_TURN = 0.02
+"""A difference of heading [rad] that is none."""
 BEHIND = 10.0
 """Rows behind the last one of a plan repeat it, so far apart [s]."""
 
@@ -90,6 +97,10 @@ class SteeringState(Signal):
     asked = Field(4, text="the last request: ahead, aside [m], turn [rad] and up [m]")
     jumps = Field(dtype="int64", text="plans begun so far")
     waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
+    shift = Field(3, unit="m", text="what the jump under way goes too short, in its frame")
+    shift_time = Field(
+        unit="s", text="how long before lift-off that begins to be changed; zero: nothing is"
+    )
 
 
 class SteeredPlan(Block):
@@ -103,6 +114,16 @@ class SteeredPlan(Block):
     background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
     ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
     that cannot be done goes to the nearest place that can; from then on the goal is there.
+
+    A command that ``replaces`` still moves the landing of the jump under way, until ``retarget_time`` before lift-off. Over the
+    last T_p of the thrust, at most ``retarget_window``, the plan's centre of mass gains the velocity that moves the
+    touchdown by d (``lengthen``), and feet follow it in flight. It accelerates by at most a = ``retarget_acceleration``,
+    or ``retarget_braking`` backwards, so
+
+        |d| <= a T_p (T_f + T_p / 2) / 1.875,
+
+    ahead and aside, and within ``retarget_limit``. What goes beyond that or beyond the reach, and changes of turn and height, are left out: the goal is the nearest place, and
+    ``goal.outcome`` is NEAREST. A jump is moved once; a command that comes later waits for the next jump.
 
     Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
     feet before the jump, with x ahead. It moves when a plan begins. The reference's time is that of the run. Until the first plan begins the robot
@@ -132,9 +153,31 @@ class SteeredPlan(Block):
             0.15, unit="s", ge=0.0, text="how long after touchdown a command is taken"
         )
         rest_time: float = parameter(
-            0.65, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
+            0.3, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
         )
 
+        retarget_time: float = parameter(
+            0.1, unit="s", ge=0.02, le=1.0,
+            text="how long before lift-off the landing of a jump may still be moved",
+        )  # fmt: skip
+        retarget_window: float = parameter(
+            0.3, unit="s", gt=0.0, le=1.0, text="how long before lift-off that begins, at most"
+        )
+        retarget_acceleration: float = parameter(
+            3.0, unit="m/s^2", ge=0.0, le=20.0,
+            text="of the centre of mass for it, ahead and aside at most",
+        )  # fmt: skip
+        retarget_braking: float = parameter(
+            1.0, unit="m/s^2", ge=0.0, le=20.0,
+            text="the same backwards; at the end of a thrust there are only the toes to brake with",
+        )  # fmt: skip
+        retarget_limit: float = parameter(
+            0.05,
+            unit="m",
+            ge=0.0,
+            le=0.3,
+            text="how far a landing is moved ahead and aside at most",
+        )
         learning: float = parameter(
             0.5, ge=0.0, le=1.0,
             text="share of the last landing's error of place that later jumps are aimed against",
@@ -267,6 +310,13 @@ class SteeredPlan(Block):
         follow_plan(
             now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
         )  # fmt: skip
+        thrusts = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
+        if thrusts and not memory.waits and command.replaces and command.number > memory.taken:
+            left = reference.lift_off_time - reference.time
+            if memory.shift_time == 0.0 and left >= params.retarget_time:
+                retarget(command, reference, left, params, followed, memory)
+        if memory.shift_time > 0.0:
+            shift_landing(reference, memory)
         if memory.jumps > 0:
             reference.time += followed.began
             reference.lift_off_time += followed.began
@@ -335,6 +385,74 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     memory.asked[1] = aside - memory.bias[memory.kind, 1]
     memory.asked[2] = wrap(turn)
     memory.asked[3] = memory.level - memory.before_level
+
+
+@kernel
+def retarget(
+    command: JumpCommand,
+    reference: JumpReference,
+    left: float,
+    params: SteeredPlan.Params,
+    followed: FollowedPlan,
+    memory: SteeringState,
+) -> None:
+    """Move the landing of the jump under way, ``left`` [s] before lift-off, as near to the command's place as that goes."""
+    x, y, heading, level = memory.goal[0], memory.goal[1], memory.goal_heading, memory.level
+    memory.goal[:] = memory.before
+    memory.goal_heading, memory.level = memory.before_heading, memory.before_level
+    if command.placed:
+        memory.goal[0], memory.goal[1] = command.ahead, command.aside
+        memory.goal_heading, memory.level = command.turn, command.up
+    else:
+        move(memory, command.ahead, command.aside, command.turn, command.up)
+    whole = abs(wrap(memory.goal_heading - heading)) < SAME_TURN
+    whole = whole and abs(memory.level - level) < LEVEL
+    sine, cosine = sincos(memory.heading)
+    u, v = memory.goal[0] - x, memory.goal[1] - y
+    wanted_ahead, wanted_aside = cosine * u + sine * v, cosine * v - sine * u
+    ahead = min(max(wanted_ahead, -FARTHEST_BACK - memory.asked[0]), FARTHEST - memory.asked[0])
+    aside = min(
+        max(wanted_aside, -FARTHEST_ASIDE - memory.asked[1]), FARTHEST_ASIDE - memory.asked[1]
+    )
+    memory.shift_time = min(left, params.retarget_window)
+    flight = reference.touchdown_time - reference.lift_off_time
+    gained = memory.shift_time / HARDEST * (flight + 0.5 * memory.shift_time)
+    most = min(params.retarget_acceleration * gained, params.retarget_limit)
+    ahead = min(max(ahead, -min(params.retarget_braking * gained, most)), most)
+    aside = min(max(aside, -most), most)
+    memory.shift[0], memory.shift[1], memory.shift[2] = -ahead, -aside, 0.0
+    memory.goal[0], memory.goal[1] = (
+        x + cosine * ahead - sine * aside,
+        y + sine * ahead + cosine * aside,
+    )
+    memory.goal_heading, memory.level = heading, level
+    memory.taken = command.number
+    if not whole or hypot(wanted_ahead - ahead, wanted_aside - aside) > LEVEL:
+        followed.outcome = PlanOutcome.NEAREST
+
+
+@kernel
+def shift_landing(reference: JumpReference, memory: SteeringState) -> None:
+    """Move the plan at this instant, so that it lands elsewhere: its centre of mass before and its feet behind lift-off."""
+    since = reference.time - reference.lift_off_time
+    flight = reference.touchdown_time - reference.lift_off_time
+    share = 1.0 + since / memory.shift_time
+    if share <= 0.0:
+        return
+    lengthen(
+        memory.shift, 1.0, 1.0, flight, memory.shift_time, share,
+        reference.com, reference.com_velocity, reference.com_acceleration,
+    )  # fmt: skip
+    flown = min(max(since, 0.0), flight)
+    grown, rate, _ = minimum_jerk(flown / flight)
+    for axis in range(2):
+        speed = -memory.shift[axis] / (flight + 0.5 * memory.shift_time)
+        reference.com[axis] += speed * flown
+        if since > flight:
+            reference.com_velocity[axis] -= speed
+        for foot in range(reference.foot_position.shape[0]):
+            reference.foot_position[foot, axis] -= memory.shift[axis] * grown
+            reference.foot_velocity[foot, axis] -= memory.shift[axis] * rate / flight
 
 
 @kernel
@@ -409,6 +527,7 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
     followed.outcome = received.outcome
     followed.done[:] = received.done
     memory.waits = False
+    memory.shift_time = 0.0
     memory.jumps += 1
 
 

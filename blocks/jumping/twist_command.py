@@ -29,7 +29,7 @@ class TwistCommand(Block):
 
     class Params(Parameters):
         jump_time: float = parameter(
-            1.9, unit="s", gt=0.0, le=10.0, text="from one jump to the next one"
+            1.6, unit="s", gt=0.0, le=10.0, text="from one jump to the next one"
         )
         least: float = parameter(0.02, unit="m", ge=0.0, le=0.2, text="shorter jumps are none")
         least_turn: float = parameter(

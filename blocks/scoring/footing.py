@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Array3D, Flags1D, Indices1D, Indices2D, Vector3
-from ...mathematics.elementary import atan2, sincos
+from ...mathematics.elementary import sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
 from ...robots.description import RobotDescription
@@ -31,7 +31,7 @@ class BallFeet(NamedTuple):
             it ends, (n,) each; a limb has at most m joints.
         joints, links, tip: of each limb as ``Limb`` has them, (n, m), (n, m, 7), (n, 7).
         angles, anchors, pose, axis: room for the joints of a limb (m,) and (m, 6), for the pose of the
-            foot (4, 3) and for its upward axis in the world (3,).
+            foot (4, 3) and for one of its axes in the world (3,).
     """
 
     foot: Indices1D
@@ -147,31 +147,34 @@ def measure_feet(
 
 
 @kernel
-def unroll(balls: BallFeet, joints: Array1D, orientation: Array1D, middle: Array2D) -> None:
-    """Subtract from the positions of ball feet how far they have rolled.
+def add_roll(
+    balls: BallFeet, joints: Array1D, orientation: Array1D, turned: Array3D, rolled: Array2D
+) -> None:
+    """Add to ``rolled`` how far ball feet have rolled since the last call.
 
-    A ball that rolls without sliding moves by its radius times the angle by which its foot
-    leans, in the direction of the lean. The remaining position changes only if the foot slides.
+    A ball of radius r that turns by the small rotation d rolls by r d x z. What turns it about the vertical
+    moves it nowhere, so the way follows from all of its rotation and not from how its foot leans in the end.
 
     Args:
         joints: positions of the joints [rad or m], (n_joints,).
         orientation: of the base, quaternion x, y, z, w.
-        middle: the middle of every foot's points (n_feet, 2), changed for these feet.
+        turned: the axes of every foot in the world at the last call, one a row, (n_feet, 3, 3); zero before
+            the first. They become those of now.
+        rolled: the way of every foot [m], (n_feet, 2).
     """
     for ball in range(balls.foot.shape[0]):
-        size = balls.size[ball]
+        size, foot = balls.size[ball], balls.foot[ball]
         for k in range(size):
             balls.angles[k] = joints[balls.joints[ball, k]]
         links, tip = balls.links[ball, :size], balls.tip[ball]
         place_limb(links, tip, balls.angles, balls.anchors, balls.pose)
-        rotate(orientation, balls.pose[1:, 2], balls.axis)
-        x, y, z = balls.axis[0], balls.axis[1], balls.axis[2]
-        leaning, foot = sqrt(x * x + y * y), balls.foot[ball]
-        arc = balls.radius[ball]
-        if leaning > 1e-12:
-            arc = balls.radius[ball] * atan2(leaning, z) / leaning
-        middle[foot, 0] -= arc * x
-        middle[foot, 1] -= arc * y
+        radius = 0.5 * balls.radius[ball]  # a rotation is half the sum of old x new axis
+        for k in range(3):
+            old, new = turned[foot, k], balls.axis
+            rotate(orientation, balls.pose[1:, k], new)
+            rolled[foot, 0] += radius * (old[2] * new[0] - old[0] * new[2])
+            rolled[foot, 1] += radius * (old[2] * new[1] - old[1] * new[2])
+            turned[foot, k, :] = new
 
 
 @kernel

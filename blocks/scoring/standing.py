@@ -17,11 +17,11 @@ from ..signals import RobotTruth, WholeBodyCommand
 from .footing import (
     BallFeet,
     Footing,
+    add_roll,
     least_load,
     magnitude,
     measure_feet,
     points_missing,
-    unroll,
 )
 
 NEVER = -1.0
@@ -41,7 +41,13 @@ class StandRecord(Signal):
     standing_height = Field(unit="m", text="height of the com at the start")
     foot = Field(("n_feet", 2), unit="m", text="middle of every foot now")
     direction = Field(("n_feet", 2), unit="m", text="where it points now")
-    landed_foot = Field(("n_feet", 2), unit="m", text="middle of every foot when it should stay")
+    turned = Field(("n_feet", 3, 3), text="axes of every ball foot in the world, one a row")
+    rolled = Field(("n_feet", 2), unit="m", text="how far every ball foot has rolled")
+    landed_foot = Field(
+        ("n_feet", 2),
+        unit="m",
+        text="where every foot was when it should stay, less what it rolled",
+    )
     foot_slip = Field(unit="m", text="farthest that a foot's middle has moved since then")
     lifted_time = Field("n_feet", unit="s", text="for how long each foot has carried no load")
     steps = Field(dtype="int64", text="steps that feet have taken while they should stand")
@@ -146,7 +152,7 @@ def record_robot(
     measure_feet(
         constants.foot_of_point, truth.contact_position, orientation, record.foot, record.direction
     )
-    unroll(balls, truth.joint_position, orientation, record.foot)
+    add_roll(balls, truth.joint_position, orientation, record.turned, record.rolled)
     record.now = now
     if record.ticks == 0:
         record.fall_time = NEVER
@@ -195,7 +201,7 @@ def record_feet(
     move until it has been on the ground for ``constants.settling``.
     """
     if not stay:
-        record.landed_foot[:] = record.foot
+        record.landed_foot[:] = record.foot - record.rolled
         return
     for foot in range(record.foot.shape[0]):
         record_foot(truth, record, params, constants, foot)
@@ -231,10 +237,10 @@ def record_foot(
             end = now
             record.step_end[foot] = end
     if end > 0.0 and now - end < constants.settling:
-        record.landed_foot[foot, :] = record.foot[foot]
+        record.landed_foot[foot, :] = record.foot[foot] - record.rolled[foot]
         return
-    x = record.foot[foot, 0] - record.landed_foot[foot, 0]
-    y = record.foot[foot, 1] - record.landed_foot[foot, 1]
+    x = record.foot[foot, 0] - record.rolled[foot, 0] - record.landed_foot[foot, 0]
+    y = record.foot[foot, 1] - record.rolled[foot, 1] - record.landed_foot[foot, 1]
     if loaded or params.steps == 0:
         record.foot_slip = max(record.foot_slip, sqrt(x * x + y * y))
     if lifted <= params.step_time or record.steps >= params.steps:

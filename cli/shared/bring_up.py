@@ -27,16 +27,16 @@ _PAUSE = 0.005
 
 
 def bring_up(
-    file: Annotated[Path, typer.Argument(help="The file of the hardware; steps write into it.")],
+    file: Annotated[Path, typer.Argument(help="The hardware file; steps write into it.")],
     first: Annotated[
         str | None,
-        typer.Option("--from", help="The step to begin with; else behind the last that passed."),
+        typer.Option(
+            "--from", help="The first step; by default the one after the last that passed."
+        ),
     ] = None,
-    last: Annotated[
-        str | None, typer.Option("--to", help="The step to end with; else the last of all.")
-    ] = None,
+    last: Annotated[str | None, typer.Option("--to", help="The last step; by default all.")] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Ask nobody: only where both ports are `twin`.")
+        bool, typer.Option("--yes", help="Ask no questions; only where both ports are `twin`.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

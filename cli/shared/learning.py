@@ -32,17 +32,16 @@ class LearningOptions:
 
     learn: Annotated[
         Path | None,
-        typer.Option(
-            help="Correct the jump by what this robot has learnt in this file, and add what it teaches."
-        ),
+        typer.Option(help="Correct the jump by the lessons in this file, and add this jump's."),
     ] = None
     times: Annotated[
-        int, typer.Option(min=1, max=100, help="With --learn: jump so often, with fresh noise.")
+        int,
+        typer.Option(min=1, max=100, help="With --learn: number of jumps, each with fresh noise."),
     ] = 1
     ladder: Annotated[
         bool,
         typer.Option(
-            "--ladder", help="With --learn: first smaller jumps, from 2 cm on, then half as far."
+            "--ladder", help="With --learn: begin with smaller jumps, from 2 cm, then half as far."
         ),
     ] = False
 

@@ -35,7 +35,7 @@ class RemoteRunAddress:
 
 
 def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedRun:
-    """The running graph of that name, or the only one there is; all parts of a graph on several
+    """The running graph called ``name``, or the only one; all parts of a graph on several
     machines.
 
     Args:

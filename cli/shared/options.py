@@ -71,9 +71,7 @@ JsonBesideTables = Annotated[
 ]
 GraphFolder = Annotated[
     Path | None,
-    typer.Option(
-        "--folder", help="Where the graph file's folder is now, if it is not where it was."
-    ),
+    typer.Option("--folder", help="The graph file's folder, if it has moved."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Write no recording.")]
@@ -81,7 +79,7 @@ Overrides = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
 CompletedOverrides = Annotated[
     list[str] | None, typer.Option("--set", help=SET_HELP, autocompletion=parameter_names)
 ]
-Workers = Annotated[int, typer.Option(help="Processes; 0: one a core.", min=0)]
+Workers = Annotated[int, typer.Option(help="Worker processes; 0: one per core.", min=0)]
 Cluster = Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")]
 
 

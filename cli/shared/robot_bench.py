@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ...robots.robot_description import RobotDescription
 
 
-HardwareFile = Annotated[Path, typer.Argument(help="The file of the hardware.")]
+HardwareFile = Annotated[Path, typer.Argument(help="The hardware file.")]
 
 _STATES = {0: "off", 1: "on", 2: "off after an error", 3: "damping"}
 
@@ -34,7 +34,7 @@ def add_bench_verbs(robot: typer.Typer) -> None:
 
 def scan(
     file: HardwareFile,
-    last: Annotated[int, typer.Option(help="The last address to ask.", min=0, max=252)] = 32,
+    last: Annotated[int, typer.Option(help="The last address to ping.", min=0, max=252)] = 32,
     as_json: AsJson = False,
 ) -> None:
     """List the drives that answer a ping. Nothing else is sent."""
@@ -139,7 +139,9 @@ def jog(
     file: HardwareFile,
     motor: Annotated[str, typer.Argument(help="The motor, by its name in the file.")],
     angle: Annotated[float, typer.Argument(help="How far, in rad; at most 0.5.")],
-    seconds: Annotated[float, typer.Option(help="There and back.", min=0.5, max=60.0)] = 3.0,
+    seconds: Annotated[
+        float, typer.Option(help="Duration of the move there and back [s].", min=0.5, max=60.0)
+    ] = 3.0,
     arm: Annotated[bool, typer.Option("--arm", help="Really switch the drive on.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -28,7 +28,7 @@ def calibrate(
     robot: Annotated[
         str,
         typer.Option(
-            help="In place of a graph: which robot sways, its name or a URDF, MJCF or YAML file."
+            help="Instead of a graph: the robot that sways, by name or URDF, MJCF or YAML file."
         ),
     ] = "",
     block: Annotated[str, typer.Option(help="The path of the robot's block.")] = "robot",
@@ -36,13 +36,11 @@ def calibrate(
         str, typer.Option(help="The port with the robot's commands.")
     ] = "safety.command",
     mass: Annotated[
-        float | None, typer.Option(help="The robot's mass by a balance [kg].", min=0.0)
+        float | None, typer.Option(help="The robot's weighed mass [kg].", min=0.0)
     ] = None,
     jump: Annotated[
         Path | None,
-        typer.Option(
-            help="A graph or a recording of a jump: list by its phases what is not explained."
-        ),
+        typer.Option(help="A graph or recording of a jump: also list the residuals by its phases."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Write the values for a graph here.")

@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 
 def reach(
-    name: Annotated[str, typer.Argument(help="A robot of ours, or a YAML, URDF or MJCF file.")],
+    name: Annotated[str, typer.Argument(help="A shipped robot, or a YAML, URDF or MJCF file.")],
     seeds: Annotated[
-        str, typer.Option(help="Seeds of the robust trial that each jump is run with: 9000:9004.")
+        str, typer.Option(help="Seeds of the robust trial for each jump: 9000:9004.")
     ] = "",
     out: Annotated[
-        Path | None, typer.Option(help="Folder for what is found; by default results/reach/NAME.")
+        Path | None, typer.Option(help="Folder for the results; by default results/reach/NAME.")
     ] = None,
     workers: Workers = 0,
     as_json: JsonBesideTables = False,

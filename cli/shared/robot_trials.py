@@ -21,7 +21,7 @@ class TrialOptions:
     """Which graph runs, in which trial."""
 
     robot: Annotated[
-        str, typer.Option(help="Which robot: its name, or a URDF, MJCF or YAML file.")
+        str, typer.Option(help="The robot: its name, or a URDF, MJCF or YAML file.")
     ] = "bruce"
     graph: Annotated[
         Path | None, typer.Option(help="The graph; by default the robot's shipped one.")
@@ -34,7 +34,7 @@ class TrialOptions:
     ] = ""
     seed: Annotated[int, typer.Option(min=0, help="The seed of the trial.")] = 0
     seeds: Annotated[
-        str, typer.Option(help="Run once a seed instead: 0:20 or 1,5,7; nothing is recorded.")
+        str, typer.Option(help="Run once per seed: 0:20 or 1,5,7; nothing is recorded.")
     ] = ""
     overrides: Overrides = None
 

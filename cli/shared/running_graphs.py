@@ -56,7 +56,7 @@ def path_of(name: str) -> Path:
 
 
 def open_endpoint(name: str) -> ParameterEndpoint:
-    """An endpoint for a run of that name. Raises ``AloftError``."""
+    """An endpoint for a run called ``name``. Raises ``AloftError``."""
     from ...runtime.live.parameter_endpoint import ParameterEndpoint
 
     return ParameterEndpoint(path_of(name))
@@ -177,10 +177,12 @@ Keys = Annotated[
 Local = Annotated[
     int,
     typer.Option(
-        min=0, help="The process of `aloft run --local`, where several run this graph here."
+        min=0, help="The process ID of `aloft run --local`, if several run this graph here."
     ),
 ]
-As = Annotated[str, typer.Option("--as", help="The observer's name, of `aloft keys --observer`.")]
+As = Annotated[
+    str, typer.Option("--as", help="The observer's name, as given to `aloft keys --observer`.")
+]
 
 
 def observer_of(

@@ -28,7 +28,7 @@ class SensitivityOptions:
     sensitivity: Annotated[
         str,
         typer.Option(
-            help="Rank the graph's numeric parameters by what they do to this metric, or to 'success'."
+            help="Rank the graph's numeric parameters by their effect on this metric, or on 'success'."
         ),
     ] = ""
     vary: Annotated[
@@ -36,7 +36,10 @@ class SensitivityOptions:
         typer.Option(help="With --sensitivity: only these, such as 'wbc.*'. Repeatable."),
     ] = None
     spread: Annotated[
-        float, typer.Option(min=1e-6, max=1.0, help="With --sensitivity: the share they vary by.")
+        float,
+        typer.Option(
+            min=1e-6, max=1.0, help="With --sensitivity: relative variation of each parameter."
+        ),
     ] = 0.2
     trajectories: Annotated[
         int, typer.Option(min=2, help="With --sensitivity: elementary effects of each parameter.")

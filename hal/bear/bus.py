@@ -305,7 +305,7 @@ def _is_instruction(frame: BusFrame) -> bool:
 
 
 def register_of(name: str) -> Register:
-    """The register of that name.
+    """The register called ``name``.
 
     Raises:
         BusError: there is none; the message names the nearest.

@@ -241,7 +241,7 @@ class SoftStart(Parameters):
 
 
 class DeadMan(Parameters):
-    """What somebody must hold while the drives are on."""
+    """The dead man's switch, which a person holds while the drives are on."""
 
     kind: Literal["gamepad", "key", "none"] = parameter(
         "gamepad", text="a button of a gamepad, the space bar of the terminal, or nothing"
@@ -328,7 +328,7 @@ class Hardware(Parameters):
         return np.array([self.torque_constant_of(name) for name in robot.transmission.motors])
 
     def torque_constant_of(self, motor: str) -> float:
-        """The torque constant of one motor [N m/A]: its own, or that of all drives."""
+        """The torque constant of one motor [N m/A]: its own, or the common one."""
         return self.motors[motor].torque_constant or self.drives.torque_constant
 
     def at_ports(self, bus: str, board: str, *, virtual: bool) -> str:

@@ -355,7 +355,7 @@ class MotorThread:
         self._loop.follow(command)
 
     def wait_for(self, cycle: int, seconds: float) -> bool:
-        """Wait until so many cycles are done; says whether they are."""
+        """Wait until this number of cycles is done; returns whether it is."""
         with self._cycle:
             return self._cycle.wait_for(lambda: self._done >= cycle, seconds)
 

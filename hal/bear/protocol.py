@@ -27,7 +27,7 @@ LONGEST = 255
 
 
 class Instruction(IntEnum):
-    """What an actuator is told to do."""
+    """Instructions to an actuator."""
 
     PING = 0x01
     READ_STATUS = 0x02

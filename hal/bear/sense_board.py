@@ -33,7 +33,7 @@ MAX_COOLING = 10
 
 
 class BoardMode(IntEnum):
-    """What the board is told to do."""
+    """Instructions to the sensor board."""
 
     IDLE = 0
     NOMINAL = 1

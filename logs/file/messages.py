@@ -146,7 +146,7 @@ def sealed(head: bytes, body: bytes, seal: FileMessage, begun: int = 0) -> bytes
 
 
 def closing(place: int, index: bytes, number: int) -> bytes:
-    """What closes, at ``place``, a file of so many messages."""
+    """The message that closes, at ``place``, a file with this number of messages."""
     message = sealed(
         HEAD.pack(END, len(index)), index, FileMessage(0, 0, END, Content.INDEX, number)
     )

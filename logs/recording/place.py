@@ -37,7 +37,7 @@ def whole_of(path: Path) -> Path | None:
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether somebody writes the file ``path`` just now. Raises ``OSError`` if it is not there."""
+    """Whether a recorder is writing the file ``path``. Raises ``OSError`` if it is not there."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         return not _lock(descriptor)
@@ -92,7 +92,7 @@ class RecordingPlace:
                 self.part.unlink()
 
     def publish(self) -> str:
-        """Give the file its name. Returns a warning if somebody had removed it, else nothing.
+        """Give the file its name. Returns a warning if it had been removed, else nothing.
 
         Raises:
             OSError: it cannot be renamed, or a removed file cannot be written again.

@@ -130,7 +130,7 @@ def plot(header: Header, name: str, lines: Sequence[PlotLine], shown: Sequence[S
 
 
 def legend(count: int) -> Any:
-    """The legend of a plot with so many lines: in a corner, or none where it would hide them."""
+    """The legend of a plot: in a corner, or none where there are too many lines."""
     import rerun.blueprint as rrb
 
     return rrb.PlotLegend("RightTop", visible=1 < count <= MOST_IN_LEGEND)

@@ -1,4 +1,4 @@
-"""What the arguments of a kernel are: arrays of so many dimensions, numbers, and records of these."""
+"""Types of a kernel's arguments: arrays by number of dimensions, numbers, and records of these."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ class PlanLibrary:
         return self._folders
 
     def path_of(self, task: JumpTask) -> Path | None:
-        """The file of that very task, or ``None``."""
+        """The file of the plan of exactly this task, or ``None``."""
         for folder in self._folders:
             found = sorted(folder.glob(f"*-{task.hash(self.robot)}.npz"))
             if found:
@@ -185,7 +185,7 @@ class PlanLibrary:
         return frozenset(path.stem.rpartition("-")[2] for path in files)
 
     def find(self, task: JumpTask) -> PlannedJump | None:
-        """The plan of that very task, or ``None``.
+        """The plan of exactly this task, or ``None``.
 
         Raises:
             PlanFileError: its file is damaged; the message names it.

@@ -1,4 +1,4 @@
-"""The coordinates a jump is planned in: all of the robot's, or those of a mirrored motion.
+"""The coordinates a jump is planned in: all joints of the robot, or one side of a mirrored motion.
 
 A jump straight ahead is the same left and right, so half of the limbs need to be computed and the
 others mirror them. Where the robot stands with its legs upright, only the joints that turn about y

@@ -62,7 +62,7 @@ def _clip(value: float, least: float, most: float) -> float:
 
 
 def task_of(wanted: HopRequest, robot: str = "bruce") -> JumpTask:
-    """The task of that jump.
+    """The task of the requested jump.
 
     Raises:
         JumpTaskError: there is no such jump.

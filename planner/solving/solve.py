@@ -153,7 +153,7 @@ def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
 
 
 def asks_for_finer(task: JumpTask, plan: PlannedJump | None) -> bool:
-    """Whether a plan to start from is a failed one of that very task."""
+    """Whether the plan to start from is a failed plan of the same task."""
     return (
         plan is not None
         and bool(plan.report)

@@ -131,7 +131,7 @@ class PhaseSpec(FreeTimes):
 
 
 def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
-    """What is wrong with a sequence of phases for so many jumps; empty where nothing is."""
+    """What is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
     if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
         return (
             "the phases must be squat or thrust, then flights with thrust or landing between "

@@ -50,7 +50,7 @@ def coarse(values: Array) -> list[float]:
 
 
 def along(axis: int, half_length: float, radius: float) -> Capsule:
-    """A capsule about the origin along the coordinate axis of that number."""
+    """A capsule about the origin along coordinate axis ``axis``."""
     end = np.zeros(3)
     end[axis] = max(half_length, 0.5 * SHORTEST)
     return Capsule(-end, end, radius)

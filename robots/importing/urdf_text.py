@@ -73,7 +73,7 @@ class XmlFile:
         return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
 
     def has(self, tag: str, name: str) -> bool:
-        """Whether the root has an element of that tag and name."""
+        """Whether the root has an element with this tag and name."""
         return any(element.get("name") == name for element in self.root.findall(tag))
 
     def place(self, tag: str, name: str) -> tuple[int, int]:

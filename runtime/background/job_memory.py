@@ -68,7 +68,7 @@ class JobMemory:
 
     @staticmethod
     def make(slots: int, inputs: int, results: int) -> int:
-        """A file descriptor of memory of that size."""
+        """A file descriptor of shared memory of this size."""
         line = rounded(8 * _WORDS)
         record = 2 * line + rounded(LONGEST_TEXT) + rounded(inputs) + rounded(results)
         return nameless_memory((slots + 1) * record, "aloft-background")
@@ -125,7 +125,7 @@ class JobMemory:
         self._done[slot, _DONE] = job
 
     def is_finished(self, slot: int, job: int) -> bool:
-        """Whether the slot holds the result of that job."""
+        """Whether the slot holds the result of the job."""
         if self._done[slot, _DONE] != job:
             return False
         with self._fence:

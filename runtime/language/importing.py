@@ -23,7 +23,7 @@ class BlockImportError(AloftError):
 
 
 class UnknownModuleError(UnknownBlockError):
-    """There is no module of that name."""
+    """There is no such module."""
 
 
 def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:

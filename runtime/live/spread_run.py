@@ -82,7 +82,7 @@ class SpreadRun:
             observer.__exit__()
 
     def is_heard(self, seconds: float) -> bool:
-        """Whether any part shows itself within so many seconds."""
+        """Whether any part answers within this many seconds."""
         end = time.monotonic() + seconds
         while all(part.data is None for part in self._parts.values()):
             if time.monotonic() >= end:

@@ -83,7 +83,7 @@ class PlacedGraph:
         return self.graph.machines
 
     def machine(self, name: str) -> MachineSpec:
-        """The machine of that name.
+        """The machine called ``name``.
 
         Raises:
             PlacementError: there is none; the error names those there are.

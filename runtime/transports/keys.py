@@ -40,7 +40,7 @@ class Authority:
 
     @classmethod
     def make(cls, name: str, days: int) -> Authority:
-        """A new one, which is valid for so many days."""
+        """A new certificate authority, valid for this many days."""
         x509, hashes, ec = _library()
         key = ec.generate_private_key(ec.SECP256R1())
         subject = _name(name)

@@ -71,7 +71,7 @@ class NetworkTransport(Transport, Protocol):
 
     @classmethod
     def local_endpoints(cls, count: int, keys: Path | None = None) -> list[str]:
-        """Endpoints on the loopback that nobody uses at present."""
+        """Free endpoints on the loopback."""
 
     def observe(self) -> None:
         """Connect to all machines, wherever there are any yet, to subscribe and send nothing.
@@ -82,7 +82,7 @@ class NetworkTransport(Transport, Protocol):
 
 
 def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> list[int]:
-    """Ports of the loopback that nobody uses at present."""
+    """Free ports of the loopback."""
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.socket(type=kind)) for _ in range(count)]
         for made in sockets:

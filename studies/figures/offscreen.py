@@ -36,6 +36,8 @@ PAINT = {
 }  # fmt: skip
 FORCE = (0.80, 0.15, 0.20, 1.0)
 """The colour of a force."""
+ARROWS = 100
+"""How many forces there is room for."""
 BLOCK, BONE = (0.78, 0.74, 0.66), (0.33, 0.36, 0.40)
 
 
@@ -66,7 +68,7 @@ class Offscreen:
         self._gl = _context(width, height)
         self._model = _painted(robot, scene, width, height)
         self._data = mujoco.MjData(self._model)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=200)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + ARROWS)
         self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
         self._option.sitegroup[:] = 0
         self._option.flags[mujoco.mjtVisFlag.mjVIS_TENDON] = 0
@@ -146,8 +148,9 @@ def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -
 
     spec = mujoco_spec(robot, scene=scene)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-    spec.visual.quality.shadowsize = 2048
+    spec.visual.quality.shadowsize = 3072
     spec.stat.extent, spec.stat.center = 1.5, [0.2, 0.0, 0.2]  # what the shadows have to cover
+    spec.visual.map.shadowclip = 4.0  # less leaves black dots on the floor behind
     spec.visual.headlight.ambient = [0.45, 0.45, 0.45]
     spec.visual.headlight.diffuse = [0.25, 0.25, 0.25]
     spec.add_texture(

@@ -145,7 +145,7 @@ def enough(done: int, failed: int, of: int) -> bool:
 
 
 def required(runs: int) -> int:
-    """How many of so many runs have to land."""
+    """How many of the runs have to land."""
     return next(k for k in range(runs + 1) if k >= RATE * runs - 1e-9)
 
 

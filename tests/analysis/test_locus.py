@@ -38,8 +38,23 @@ def test_the_poles_of_an_integrator_with_a_delay_are_the_roots_of_its_polynomial
     # a traced pole moves little from value to value, but where the pair meets on the real axis
     assert np.abs(np.diff(found.poles, axis=0)).max() < 0.3
     assert np.allclose(np.exp(found.continuous * T), found.poles)
+    assert np.abs(found.leading) == pytest.approx(np.abs(found.poles).max(axis=1))
     drawn = locus_figure(found, "loop").axes[0]
     assert "k.gain from -10 (o) to -150 (x)" in drawn.get_xlabel()
+
+
+def test_what_drifts_is_no_limit(tmp_path: Path) -> None:
+    text = (
+        LOOP + "  d: {use: blocks.Integrator, in: {u: x.y}}\n"
+    )  # a pole at 1, whatever the gain is
+    (tmp_path / "drifting.yaml").write_text(text)
+    found = root_locus(
+        tmp_path / "drifting.yaml", "k.gain=-10:-90", inputs="k.y", outputs="d.y", steps=3, at=0.1
+    )
+    assert np.abs(found.poles).max(axis=1) == pytest.approx(1.0, abs=1e-6)
+    assert found.limits == ()
+    expected = [max(abs(np.roots([1.0, -1.0, -gain * T]))) for gain in found.values]
+    assert np.abs(found.leading) == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_parameter_with_a_unit(tmp_path: Path) -> None:

@@ -157,3 +157,14 @@ def test_who_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     shown = run_here("top", "graph.yaml", "--once", "--wait", "0.2", code=1)
     assert "silent" in shown.stdout and "ground: no connection to tcp/" in shown.stderr
     assert "--json is for --once" in run_for_json("top", "graph.yaml", code=2)["reason"]
+
+
+def test_tls_endpoints_without_keys_are_refused_with_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "pieces.py").write_text(BLOCKS)
+    (tmp_path / "graph.yaml").write_text(GRAPH.replace("tcp/", "tls/"))
+    monkeypatch.chdir(tmp_path)
+    assert run_for_json("top", "graph.yaml", "--once", code=2)["reason"] == (
+        "links over TLS need certificates: `aloft keys GRAPH` makes them, and --keys FOLDER takes them"
+    )

@@ -24,6 +24,18 @@ def test_it_lands_where_it_is_told_and_repeats_to_the_byte() -> None:
 
 
 @pytest.mark.long
+def test_a_target_that_changes_shortly_before_lift_off_is_reached() -> None:
+    """The first jump lifts off at 1.39 s; without the change it lands at 15 cm."""
+    commands = [{"ahead": 0.15}, {"ahead": 0.19, "aside": -0.04, "replaces": True, "at": 1.26}]
+    sets = {"robot.seed": 3, "commands.commands": commands, "score.jumps": 1}
+    run = aloft.load(GRAPH, sets).run()
+    assert run.success, run.reason
+    assert run.signal("plan.goal.position")[-1] == pytest.approx([0.19, -0.04], abs=1e-6)
+    assert run.metrics["jumps"] == 1 and run.metrics["plans_planned"] == 1
+    assert run.metrics["worst_place_error_m"] < 0.02
+
+
+@pytest.mark.long
 def test_a_recording_replays_exactly(tmp_path: Path) -> None:
     file = tmp_path / "steer.rrd"
     graph = aloft.load(GRAPH, {"commands.commands": [{"ahead": 0.1, "turn": 0.3}]})

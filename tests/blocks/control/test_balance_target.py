@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.blocks.control.balance_target import BalanceTarget, lengthen
+from aloft.blocks.control.balance_target import BalanceTarget
 from aloft.blocks.signals import Phase
+from aloft.mathematics.interpolation import lengthen
 from aloft.mathematics.rotations import to_matrix
 from aloft.runtime.testing import BlockBench
 

@@ -33,7 +33,9 @@ def bench():
 
 def make(**params):
     bench = BlockBench(
-        SafetyMonitor, {"damping": 0.5, "speed_limit": 60.0, **params}, robot="bruce"
+        SafetyMonitor,
+        {"damping": 0.5, "speed_limit": 60.0, "stuck_time": 0.0, **params},
+        robot="bruce",
     )
     bench.set("desired", **COMMAND)
     bench.set("base", orientation=leaning(0.1), position=[0.0, 0.0, 0.38])
@@ -130,7 +132,7 @@ def test_limits_and_damping_follow_from_the_motors_or_are_given_by_joint():
 
 def test_a_joint_without_limits_is_never_beyond_them():
     free = ROBOT.changed(joints=tuple(j.model_copy(update={"limits": None}) for j in ROBOT.joints))
-    bench = BlockBench(SafetyMonitor, robot=free)
+    bench = BlockBench(SafetyMonitor, {"stuck_time": 0.0}, robot=free)
     bench.set("desired", **COMMAND)
     bench.set("base", orientation=leaning(0.0))
     bench.set("wbc", solved=True)
@@ -145,16 +147,74 @@ def test_a_joint_too_fast(bench):
     assert_damps(bench, SafetyFault.JOINT_SPEED)
 
 
-def test_readings_that_stop_changing():
-    bench = make(stale_ticks=5)
-    for tick in range(20):
-        bench.set("joints", velocity=1e-9 * tick)
+def noisy(bench, ticks, rng, **stuck):
+    """Readings with noise in the last bits, but for some."""
+    for _ in range(ticks):
+        joints = {"velocity": 1e-9 * rng.normal(size=10)}
+        imu = {
+            "angular_velocity": 1e-9 * rng.normal(size=3),
+            "specific_force": 9.81 + 1e-9 * rng.normal(size=3),
+        }
+        for name, place in stuck.items():
+            values = {**joints, **imu}[name]
+            values[place] = 0.0
+        bench.set("joints", **joints)
+        bench.set("imu", **imu)
         bench.step()
+
+
+@pytest.mark.parametrize(
+    ("stuck", "reason", "text"),
+    [
+        ({"velocity": 3}, SafetyFault.STUCK_JOINT, "joint right_knee has read the very same for 50 ms"),
+        ({"angular_velocity": 1}, SafetyFault.STUCK_IMU, "gyroscope, axis y, has read the very same for 50 ms"),
+        ({"specific_force": 2}, SafetyFault.STUCK_IMU, "accelerometer, axis z, has read the very same for 50 ms"),
+    ],
+)  # fmt: skip
+def test_a_reading_that_stops_changing(stuck, reason, text):
+    bench, rng = make(stuck_time=0.05), np.random.default_rng(0)
+    noisy(bench, 60, rng)
     assert fault(bench) == SafetyFault.NONE
-    bench.step(4)
+    noisy(bench, 25, rng, **stuck)  # the first of them is another value
     assert fault(bench) == SafetyFault.NONE
-    bench.step()
-    assert_damps(bench, SafetyFault.STALE_SENSORS)
+    noisy(bench, 1, rng, **stuck)
+    assert_damps(bench, reason)
+    metrics = bench.block.metrics()
+    assert metrics["safety_reason"] == text and metrics["reason"].endswith(text)
+    assert bench.block.context.clock.stop_reason == text
+    off = make(stuck_time=0.05)
+    off.set("health", state=int(DrivePhase.OFF))
+    noisy(off, 60, rng, **stuck)
+    assert fault(off) == SafetyFault.NONE
+
+
+@pytest.mark.parametrize(
+    ("share", "reason"), [(0.7, SafetyFault.NONE), (1.3, SafetyFault.NONE), (0.05, SafetyFault.TORQUE)]
+)  # fmt: skip
+def test_a_torque_that_does_not_follow_its_command(share, reason):
+    bench = make()
+    position = ROBOT.standing_position
+    bench.set("desired", position=position, stiffness=np.full(10, 40.0), velocity=np.zeros(10))
+    bench.set("joints", position=position - 0.01, torque=COMMAND["torque"] + 0.4)
+    bench.step(50)
+    assert fault(bench) == SafetyFault.NONE
+    torque = COMMAND["torque"] + 0.4
+    torque[8] = share * torque[8]
+    bench.set("joints", torque=torque)
+    bench.step(100)
+    if reason == SafetyFault.NONE:
+        assert fault(bench) == reason
+        return
+    assert_damps(bench, reason)
+    metrics = bench.block.metrics()
+    assert 0.1 < metrics["safety_fault_time_s"] < 0.3
+    assert "joint left_knee: its torque is -" in metrics["safety_reason"]
+    assert metrics["safety_reason"].endswith("N m off its command; torque_error is 80 %")
+
+
+def test_a_robot_that_measures_no_torques_is_not_judged_by_them(bench):
+    bench.step(200)
+    assert fault(bench) == SafetyFault.NONE
 
 
 @pytest.mark.parametrize(

@@ -181,3 +181,76 @@ def test_what_cannot_be_done_moves_the_goal_to_what_is_done() -> None:
 def test_feet_without_a_direction_are_refused() -> None:
     with pytest.raises(BlockError, match="is a point, which has no direction"):
         BlockBench(SteeredPlan, robot="go2")
+
+
+def thrusting(left: float) -> BlockBench[SteeredPlan]:
+    """A jump that was asked to go 15 cm ahead is under way, so long before its lift-off [s]."""
+    bench = standing()
+    bench.set("command", number=1, ahead=0.15)
+    bench.step()
+    hand_over(bench, 1, PlanOutcome.PLANNED)
+    reference = bench.get("reference")
+    for _ in range(1000):
+        if reference.lift_off_time - reference.time <= left:
+            return bench
+        bench.set("phase", phase=Phase(int(reference.phase)))
+        bench.step()
+    raise AssertionError("it never lifts off")
+
+
+def touchdown_of(bench: BlockBench[SteeredPlan]) -> tuple[np.ndarray, np.ndarray]:
+    """Centre of mass and soles at the planned touchdown."""
+    reference = bench.get("reference")
+    for _ in range(400):
+        if reference.time >= reference.touchdown_time - 0.003:
+            break
+        bench.set("phase", phase=Phase(int(reference.phase)))
+        bench.step()
+    return np.array(reference.com), np.array(reference.foot_position)
+
+
+def test_a_landing_moves_until_100_ms_before_lift_off() -> None:
+    unmoved = touchdown_of(thrusting(0.12))
+    bench = thrusting(0.12)
+    goal, com = bench.get("goal"), np.array(bench.get("reference").com)
+    bench.set("command", number=2, ahead=0.17, aside=0.03, replaces=True)
+    bench.step()
+    assert int(bench.get("request").number) == 1, "no new plan is asked for"
+    assert int(bench.get("request").command) == 2
+    assert int(goal.outcome) == PlanOutcome.PLANNED
+    assert np.asarray(goal.position) == pytest.approx([0.17, 0.03])
+    assert np.asarray(bench.get("reference").com) == pytest.approx(com, abs=3e-3), "no jump"
+    moved = touchdown_of(bench)
+    assert (moved[0] - unmoved[0])[:2] == pytest.approx([0.02, 0.03], abs=1e-3)
+    assert (moved[1] - unmoved[1])[:, :2] == pytest.approx(np.array([[0.02, 0.03]] * 2), abs=1e-3)
+    assert (moved[0] - unmoved[0])[2] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "done"),
+    [
+        ({"ahead": 0.30}, [0.20, 0.0]),  # the limit
+        ({"ahead": 0.05}, [0.15 - 0.0195, 0.0]),  # the braking that is left
+        ({"ahead": 0.15, "turn": 0.5}, [0.15, 0.0]),
+        ({"ahead": 0.15, "up": 0.04}, [0.15, 0.0]),
+    ],
+)
+def test_of_what_is_impossible_the_nearest_is_done_and_said(
+    asked: dict[str, float], done: list[float]
+) -> None:
+    bench = thrusting(0.12)
+    bench.set("command", number=2, replaces=True, **{"ahead": 0.0, **asked})
+    bench.step()
+    goal = bench.get("goal")
+    assert int(goal.outcome) == PlanOutcome.NEAREST
+    assert np.asarray(goal.position) == pytest.approx(done, abs=5e-3)
+    assert float(goal.heading) == pytest.approx(0.0)
+    assert float(goal.height) == pytest.approx(0.0)
+
+
+def test_a_later_command_waits_for_the_next_jump() -> None:
+    bench = thrusting(0.09)
+    bench.set("command", number=2, ahead=0.18, replaces=True)
+    bench.step()
+    assert int(bench.get("request").command) == 1
+    assert np.asarray(bench.get("goal").position) == pytest.approx([0.15, 0.0])

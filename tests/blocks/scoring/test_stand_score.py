@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from aloft.blocks.scoring.footing import Footing, measure_feet, unroll
+from aloft.blocks.scoring.footing import Footing, add_roll, measure_feet
 from aloft.blocks.scoring.stand_score import StandScore
 from aloft.robots.description import find_robot
 from aloft.runtime.testing import BlockBench
@@ -170,18 +170,20 @@ def test_point_feet_turn_as_their_pattern_does():
 
 
 def test_a_ball_that_rolls_does_not_slide():
-    """Ball feet roll as the body squats; their places but for the rolling stay."""
+    """A ball rolls as its foot turns over, and not as it turns on the spot."""
     robot = ROBOTS["quadruped"]
-    balls, upright = Footing(robot).ball_feet(), np.array([0.0, 0.0, 0.0, 1.0])
-    lean = robot.standing_position.copy()
-    places = []
-    for turn in (0.0, 0.1):
-        pitch = np.array([0.0, math.sin(0.5 * turn), 0.0, math.cos(0.5 * turn)])
-        middle = np.zeros((4, 2))
-        unroll(balls, lean, pitch, middle)
-        places.append(middle.copy())
-    # Turning the whole robot by 0.1 rad about y rolls every ball by its radius times that.
+    balls, standing = Footing(robot).ball_feet(), robot.standing_position
     radius = robot.contacts[0].radius
-    assert places[1] - places[0] == pytest.approx(np.tile([-0.1 * radius, 0.0], (4, 1)), abs=1e-4)
-    unroll(balls, lean, upright, middle := np.ones((4, 2)))
-    assert middle == pytest.approx(1.0 + places[0])
+
+    def rolled(axis: int, angle: float):
+        """The way of the feet while the whole robot turns about an axis of the world."""
+        turned, way = np.zeros((4, 3, 3)), np.zeros((4, 2))
+        for part in np.linspace(0.0, angle, 21):
+            orientation = np.array([0.0, 0.0, 0.0, math.cos(0.5 * part)])
+            orientation[axis] = math.sin(0.5 * part)
+            add_roll(balls, standing, orientation, turned, way)
+        return way
+
+    assert rolled(0, 0.5) == pytest.approx(np.tile([0.0, -0.5 * radius], (4, 1)), abs=1e-5)
+    assert rolled(1, 0.5) == pytest.approx(np.tile([0.5 * radius, 0.0], (4, 1)), abs=1e-5)
+    assert rolled(2, 0.5) == pytest.approx(np.zeros((4, 2)), abs=1e-9)

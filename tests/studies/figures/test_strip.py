@@ -5,6 +5,7 @@ import pytest
 
 from aloft.hal.simulated.scenes import step
 from aloft.robots.description import find_robot
+from aloft.runtime.language.terrain import Terrain
 from aloft.studies.figures import offscreen
 from aloft.studies.figures.offscreen import NoRendererError, Offscreen, View
 from aloft.studies.figures.strip import Moment, Motion, draw_strip, moments_of
@@ -35,6 +36,18 @@ def test_the_robot_is_where_its_pose_says() -> None:
     rows = [np.nonzero(blue(picture))[0].mean() for picture in (low, high)]
     assert 0.005 < blue(low).mean() < 0.2
     assert rows[0] - rows[1] > 10  # higher up is nearer to the picture's first row
+
+
+def test_the_robot_is_drawn_on_ground_of_many_pieces() -> None:
+    (piece,) = step(0.05, 0.1).blocks
+    ground = Terrain(blocks=(piece,) * 400)
+    try:
+        with Offscreen(ROBOT, ground, 120, 160) as renderer:
+            pose = np.array([0.0, 0.0, 0.4]), UPRIGHT, ROBOT.standing_position
+            picture = renderer.picture(*pose, VIEW)
+    except NoRendererError as error:
+        pytest.skip(str(error))
+    assert blue(picture).mean() > 0.005
 
 
 def test_a_strip_has_a_frame_for_every_moment() -> None:
