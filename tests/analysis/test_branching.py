@@ -1,7 +1,5 @@
 """Runs that go on from the state of a recorded one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
