@@ -35,7 +35,7 @@ from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
-from .stones import stones
+from .stones import staircase, stones
 from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
@@ -62,12 +62,13 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "courses": courses,
     "pushed_courses": pushed_courses,
     "stones": stones,
+    "staircase": staircase,
     "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
-    "pushed_courses", "stones", "every_robot",
+    "pushed_courses", "stones", "staircase", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
@@ -84,6 +85,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "courses",
         "pushed_courses",
         "stones",
+        "staircase",
     ),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),

@@ -126,4 +126,5 @@ def run_seed(
         {"robot.seed": seed, "capture.seed": seed, **sets}, graphs / "bench.yaml",
         [graphs / name for name in behind],
     ).run()  # fmt: skip
-    return {"seed": seed, "success": found.success, "reason": found.reason, **found.metrics}
+    own = {"seed": seed, "success": found.success, "reason": found.reason}
+    return {**own, "duration": found.duration_s, **found.metrics}

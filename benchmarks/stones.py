@@ -1,7 +1,8 @@
-"""Random stepping stones of 12 x 20 cm, of which the robot sees one jump ahead.
+"""Random stepping stones of 12 x 20 cm and a staircase, of which the robot sees one jump ahead.
 
 A course has ten stones with gaps of 2 to 14 cm, up to 3 cm aside of each other, level or up to 5 cm higher or lower
 (``graphs/steer_stones.yaml``), in the robust trial, with the position sensor and without. A stone holds both feet.
+The staircase has six steps of 4 cm, each 20 cm deep, and one jump a step.
 """
 
 from __future__ import annotations
@@ -49,10 +50,42 @@ def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
     return rows
 
 
-def passed(metrics: dict[str, Any]) -> bool:
+STAIRS_SEEDS = range(32200, 32220)
+"""Of robots on the staircase; nothing is tuned on them."""
+STEPS = 6
+STAIRCASE = [
+    {"x": round(0.2 * step, 3), "top": round(0.04 * step, 3)} for step in range(1, STEPS + 1)
+]
+"""m"""
+STEP = (0.198, 0.4)
+"""m; 2 mm less than their distance, as stones do not touch."""
+
+
+def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
+    """Rows: the share of robots that do not come up a staircase, of those that fail a criterion, and how long it takes."""
+    found = [run_staircase(seed) for seed in seeds]
+    n, lost = len(found), [one for one in found if not passed(one, STEPS)]
+    low, high = wilson_interval(len(lost), n)
+    up = [float(one["duration"]) for one in found if passed(one, STEPS)]
+    why = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    return [
+        Row("staircase: not up", len(lost) / n, "", goal=MISSED_GOAL,
+            note=f"{n} robots, {STEPS} steps of 4 cm, 95 % interval {low:.2f} to {high:.2f}"),
+        Row("staircase: no success", sum(not one["success"] for one in found) / n, "", note=why),
+        Row("staircase: from the start to standing above, median", float(np.median(up)) if up else np.nan, "s"),
+    ]  # fmt: skip
+
+
+def run_staircase(seed: int) -> dict[str, Any]:
+    """The metrics of a run up the staircase, with its ``seed``."""
+    sets = {"commands.stones": STAIRCASE, "commands.size": STEP, "duration": LONGEST}
+    return run_seed(seed, "steer_stones.yaml", (), sets)
+
+
+def passed(metrics: dict[str, Any], jumps: int = JUMPS) -> bool:
     """Whether it stood on every stone, and only toes and heels ever touched them."""
     return bool(
-        metrics.get("jumps") == JUMPS and not fell(metrics) and metrics["forbidden_contacts"] == 0
+        metrics.get("jumps") == jumps and not fell(metrics) and metrics["forbidden_contacts"] == 0
     )
 
 

@@ -1,6 +1,7 @@
 """Products and powers of units, written as people write them: ``N m/rad`` times ``rad`` is ``N m``.
 
-Only what is common to the symbols of both is simplified; ``N`` times ``s`` stays ``N s``.
+Only what is common to the symbols of both is simplified, so ``N`` times ``s`` stays ``N s``, and where the mass
+drops out: ``N/kg`` is ``m/s^2``.
 """
 
 from __future__ import annotations
@@ -21,7 +22,12 @@ def times(a: Unit, b: Unit, power: int = 1) -> Unit:
     powers = dict(symbol_powers(a.text))
     for symbol, exponent in symbol_powers(b.text).items():
         powers[symbol] = powers.get(symbol, 0) + power * exponent
-    return parse_unit(_text(powers))
+    unit = parse_unit(_text(powers))
+    if powers.get("kg") and unit.scale == 1.0:
+        text = _in_base_units(unit)
+        if "kg" not in symbol_powers(text):
+            return parse_unit(text)
+    return unit
 
 
 def over(a: Unit, b: Unit) -> Unit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,11 @@ import pytest
 import aloft
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
+from aloft.runtime.loading import load
+from aloft.runtime.placement.placed import spread
+from aloft.runtime.running.executor import run
+from aloft.runtime.testing.spread import run_spread
+from aloft.studies.batch.jobs import job_results
 
 GRAPH = Path(aloft.__file__).parent / "graphs" / "steer.yaml"
 
@@ -44,6 +50,37 @@ def test_a_recording_replays_exactly(tmp_path: Path) -> None:
     aloft.write_recording(file, done)
     again = replay(OpenedRun.of(file))
     assert again.identical, again
+
+
+TICKS = 450
+"""Enough for the first plan to be asked for, made in the background and received."""
+
+
+def hash_of(seed: int) -> str:
+    """The run hash of the beginning of a course."""
+    graph = load(GRAPH, overrides={"robot.seed": seed})
+    result = run(graph, TICKS)
+    assert result.signal("planner.part.number")[-1] == 1
+    return result.run_hash
+
+
+@pytest.mark.long
+def test_bytes_are_equal_on_other_numbers_of_workers() -> None:
+    expected = [hash_of(seed) for seed in (1, 2)]
+    for workers in (1, 2):
+        with closing(job_results(hash_of, [1, 2], workers=workers)) as results:
+            found = {result.index: result.value or result.error for result in results}
+        assert [found[k] for k in range(2)] == expected
+
+
+@pytest.mark.long
+def test_bytes_are_equal_on_two_machines_in_lockstep() -> None:
+    graph = load(GRAPH, overrides={"robot.seed": 1})
+    machines = {"onboard": "tcp/127.0.0.1:7470", "desk": "tcp/127.0.0.1:7471"}
+    placed = spread(graph, machines, {"planner": "desk", "commands": "desk"})
+    spread_out = run_spread(placed, TICKS, timeout=60.0, wall_time=300.0)
+    assert spread_out.ticks == TICKS
+    assert spread_out.run_hash == hash_of(1)
 
 
 def test_the_keyboards_graph_has_no_problems() -> None:

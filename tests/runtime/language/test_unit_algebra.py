@@ -51,6 +51,9 @@ def test_the_text_can_be_read_back(a: Unit, b: Unit) -> None:
         ("", "1/s", "1/s"),
         ("m", "1/m", "1"),
         ("kg/(m s)", "s", "kg/m"),
+        ("N", "1/kg", "m/s^2"),
+        ("N s/kg", "s", "m"),
+        ("N s/m", "1", "N s/m"),
     ],
 )
 def test_texts_are_those_that_people_write(a: str, b: str, text: str) -> None:

@@ -1,0 +1,41 @@
+"""Courses, stones and the staircase: the same of a seed on every machine, and graphs that take them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import pytest
+
+import aloft
+from aloft.benchmarks.courses import JUMPS, course
+from aloft.benchmarks.stones import STAIRCASE, STEP, STEPS, passed
+from aloft.planner.library.library import shipped_folder
+
+
+def test_a_course_is_that_of_its_seed_and_within_what_is_asked() -> None:
+    found = course(31700)
+    assert len(found) == JUMPS
+    assert found == course(31700) != course(31701)
+    for one in found:
+        assert 0.05 <= math.hypot(one["ahead"], one["aside"]) <= 0.3001
+        assert abs(one["turn"]) <= 0.25 * math.pi + 1e-4
+
+
+def test_the_staircase_has_no_gaps() -> None:
+    sets = {"commands.stones": STAIRCASE, "commands.size": STEP}
+    graph = aloft.load(shipped_folder() / "steer_stones.yaml", sets)
+    (commands,) = (block for block in graph.checked.blocks if block.path == "commands")
+    boxes = commands.params.boxes()
+    assert len(boxes) == STEPS + 1
+    for below, above in pairwise(boxes):
+        assert above["x"][0] == pytest.approx(below["x"][1], abs=3e-3)
+        assert above["top"] - below["top"] == pytest.approx(0.04)
+
+
+def test_who_touches_a_stone_with_anything_but_the_feet_has_not_passed() -> None:
+    good = {"jumps": STEPS, "reason": "all criteria hold", "forbidden_contacts": 0}
+    assert passed(good, STEPS)
+    assert not passed(good)
+    assert not passed({**good, "forbidden_contacts": 1}, STEPS)
+    assert not passed({**good, "reason": "fell at 3 s"}, STEPS)
