@@ -45,12 +45,12 @@ def test_a_film_has_a_picture_for_each_step_of_time(
     pushed: Path, renderer: None, tmp_path: Path
 ) -> None:
     film = tmp_path / "film.gif"
-    words = ("--from", "0.1", "--to", "0.4", "--speed", "0.5", "--rate", "20", *SMALL)
+    words = ("--from", "0.1", "--to", "0.4", "--speed", "0.5", "--rate", "10", *SMALL)
     found = run_for_json("render", str(pushed), "-o", str(film), *words)
-    assert found == {"success": True, "file": str(film), "pictures": 13}
+    assert found == {"success": True, "file": str(film), "pictures": 7}
     with Image.open(film) as image:
-        assert (image.size, image.info["duration"]) == ((120, 122), 50)
-        assert 1 < image.n_frames <= 13, "equal pictures are one that stays longer"
+        assert (image.size, image.info["duration"]) == ((120, 122), 100)
+        assert 1 < image.n_frames <= 7, "equal pictures are one that stays longer"
     again = tmp_path / "again.gif"
     run_for_json("render", str(pushed), "-o", str(again), *words)
     assert film.read_bytes() == again.read_bytes()
