@@ -123,10 +123,11 @@ def path_of(name: str, folder: Path | None = None) -> Path:
         LookupError: there is none; the message names the robots that there are.
     """
     if name.endswith((*YAML_FILES, *MODEL_FILES, *OTHER_FORMATS)):
-        path = (folder or Path()) / name
-        if not path.is_file():
-            raise LookupError(f"no robot description at {path}")
-        return path
+        found = find_file(name, folder or Path())
+        if found is None:
+            where = name if name.startswith(SCHEME) else (folder or Path()) / name
+            raise LookupError(f"no robot description at {where}")
+        return found
     path = SHIPPED / name / f"{name}.yaml"
     if not path.is_file():
         raise LookupError(f"no robot called {name!r}; there is {', '.join(robot_names())}")
@@ -305,7 +306,8 @@ __all__ = [
 
 
 def find_robot(name: str, folder: str | Path | None = None) -> RobotDescription:
-    """The description called ``name``: a shipped robot, or a file relative to ``folder``.
+    """The description called ``name``: a shipped robot, or a file relative to ``folder`` or of an installed
+    package, as ``package://NAME/PATH``.
 
     The file is a description in YAML, or a URDF or MJCF file with a short YAML of the same name
     beside it for what these formats lack, or such a YAML that names its URDF or MJCF ``file``.

@@ -7,7 +7,7 @@
 # go to dist/. In an empty folder the wheel alone is installed for every PYTHON (without any: each of 3.11 to
 # 3.14 that is found), from the package index and without what is installed here. There BRUCE must jump with
 # the run hash that .venv gives, without compiling a kernel, and a new project must be checked, run and pass
-# its tests. SIGN=KEY signs what was built with that key of gpg.
+# its tests. Where qemu-aarch64 is installed, the wheel is tried on aarch64, too. SIGN=KEY signs what was built with that key of gpg.
 set -eu
 cd "$(dirname "$0")/.."
 here=$PWD
@@ -91,6 +91,11 @@ for python in "$@"; do
         python -m pytest -q -p no:cacheprovider
     )
 done
+
+if command -v qemu-aarch64 >/dev/null && command -v apt-get >/dev/null; then
+    echo "== try the wheel on aarch64"
+    sh scripts/try_aarch64.sh dist/*.whl "$bin"
+fi
 
 echo "== dist"
 (cd dist && sha256sum -- * >SHA256SUMS)

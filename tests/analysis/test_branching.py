@@ -1,7 +1,5 @@
 """Runs that go on from the state of a recorded one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -22,16 +20,18 @@ blocks:
 """
 
 
-@pytest.fixture
-def graph(tmp_path: Path) -> aloft.Graph:
-    (tmp_path / "graph.yaml").write_text(TEXT)
-    return aloft.load(tmp_path / "graph.yaml")
+@pytest.fixture(scope="module")
+def graph(tmp_path_factory: pytest.TempPathFactory) -> aloft.Graph:
+    path = tmp_path_factory.mktemp("branching") / "graph.yaml"
+    path.write_text(TEXT)
+    return aloft.load(path)
 
 
-@pytest.fixture
-def recorded(graph: aloft.Graph, tmp_path: Path) -> OpenedRun:
-    graph.run(1.5, sinks=[Recorder(tmp_path / "run.rrd", keyframe_period=0.5)])
-    return OpenedRun.of(tmp_path / "run.rrd")
+@pytest.fixture(scope="module")
+def recorded(graph: aloft.Graph, tmp_path_factory: pytest.TempPathFactory) -> OpenedRun:
+    path = tmp_path_factory.mktemp("branching") / "run.rrd"
+    graph.run(1.5, sinks=[Recorder(path, keyframe_period=0.5)])
+    return OpenedRun.of(path)
 
 
 @pytest.mark.parametrize("tick", [30, 50, 73])

@@ -65,6 +65,7 @@ def test_without_noise_it_is_exact_and_with_more_seeds_narrower() -> None:
     assert 2.0 < np.median(few.radius / many.radius) < 4.5  # sqrt(8), and less of Fisher's F
 
 
+@pytest.mark.long
 def test_the_intervals_hold_as_often_as_they_say() -> None:
     graph, held = aloft.load(LOOP), []
     for first in range(100, 160, 3):

@@ -16,11 +16,20 @@ blocks:
 """
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A graph and its recording."""
+    made = tmp_path_factory.mktemp("branch")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(made)
+        Path("graph.yaml").write_text(TEXT)
+        run_here("run", "graph.yaml", "--record", "run.rrd", "--quiet")
+    return made
+
+
 @pytest.fixture
-def recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.chdir(tmp_path)
-    Path("graph.yaml").write_text(TEXT)
-    run_here("run", "graph.yaml", "--record", "run.rrd", "--quiet")
+def recording(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(folder)
     return "run.rrd"
 
 

@@ -36,6 +36,12 @@ def test_a_robot_of_the_users_own_file(tmp_path: Path) -> None:
     assert find_robot("hopper.yaml", str(tmp_path)) == find_robot("hopper.yaml", tmp_path)
     with pytest.raises(LookupError, match=r"no robot description at .*other\.yaml"):
         find_robot("other.yaml", tmp_path)
+    (tmp_path / "hoppers").mkdir()
+    (tmp_path / "hopper.yaml").rename(tmp_path / "hoppers" / "hopper.yaml")
+    read = read_description(tmp_path / "hoppers" / "hopper.yaml")
+    assert find_robot("package://hoppers/hopper.yaml", tmp_path) == read
+    with pytest.raises(LookupError, match=r"no robot description at package://hoppers/other\.yaml"):
+        find_robot("package://hoppers/other.yaml", tmp_path)
 
 
 def test_an_unknown_robot_names_those_there_are() -> None:

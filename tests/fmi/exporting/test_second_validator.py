@@ -44,19 +44,19 @@ def remarks(file: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.getMessage() for record in caplog.records]
 
 
-@pytest.fixture(params=["3.0", "2.0", "3.0 in Python"])
-def exported(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+@pytest.fixture(scope="module", params=["3.0", "2.0", "3.0 in Python"])
+def exported(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    folder = tmp_path_factory.mktemp("exported")
     version, _, python = str(request.param).partition(" ")
-    if python:
-        request.getfixturevalue("monkeypatch").setattr(
-            "aloft.fmi.exporting.write.compiler", lambda: ""
-        )
-    elif not shutil.which("cc"):
+    if not python and not shutil.which("cc"):
         pytest.skip("there is no C compiler (cc)")
-    (tmp_path / "part.yaml").write_text(PART)
-    (tmp_path / "rail.yaml").write_text(RAIL)
-    export(str(tmp_path / "rail.yaml"), tmp_path / "part.fmu", "part", version=version)
-    return tmp_path / "part.fmu"
+    (folder / "part.yaml").write_text(PART)
+    (folder / "rail.yaml").write_text(RAIL)
+    with pytest.MonkeyPatch.context() as patch:
+        if python:
+            patch.setattr("aloft.fmi.exporting.write.compiler", lambda: "")
+        export(str(folder / "rail.yaml"), folder / "part.fmu", "part", version=version)
+    return folder / "part.fmu"
 
 
 def changed(file: Path, old: str, new: str) -> Path:

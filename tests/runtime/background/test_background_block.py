@@ -43,7 +43,8 @@ def test_bytes_are_those_of_a_delay(use: str, latency: int, every: int, offset: 
     result = run(background)
     assert_equal(result, run(loop))
     assert np.unique(result.signal("motor.y.value")).size > 5
-    assert run(background).run_hash == result.run_hash
+    if latency == 7:  # once for each block, as every run starts a process
+        assert run(background).run_hash == result.run_hash
     assert not result.block_warnings and not result.stop_problems
 
 

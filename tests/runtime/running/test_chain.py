@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from aloft.blocks.general.sources import SineWave
-from aloft.blocks.general.user_code import Function
 from aloft.blocks.general.vectors import Vector
 from aloft.files.problems import LoadError
 from aloft.mathematics.compiling import chain_code
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
 from aloft.runtime.graph import load
-from aloft.runtime.language.block import Input, Output, State
+from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.errors import DeclarationError, RunError
 from aloft.runtime.language.kernel_block import KernelBlock
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
@@ -50,6 +49,20 @@ def divide(y, steps, limit, attention):
     attention[0] = 1 if steps[()] == limit else 0
     for i in range(y.shape[0]):
         y[i] = y[i] / (steps[()] - 2.0 * limit)
+
+
+class InPython(Block):
+    """The size of a vector's elements, in plain Python."""
+
+    class Params(Parameters):
+        n: int = parameter(1, text="elements")
+
+    params: Params
+    u = Input(Vector, text="a vector")
+    y = Output(Vector, text="its elements without sign")
+
+    def step(self) -> None:
+        np.absolute(self.u.value, out=self.y.value)
 
 
 class Smooth(KernelBlock):
@@ -97,7 +110,7 @@ def graph(**params: object):
             "one": BlockUse(Smooth, wires={"u": "wave.y"}),
             "slow": BlockUse(Smooth, params, {"u": "one.y"}, period_ticks=2, offset_ticks=1),
             "two": BlockUse(Smooth, wires={"u": "slow.y"}),
-            "gain": BlockUse(Function, wires={"u": "two.y"}),
+            "gain": BlockUse(InPython, wires={"u": "two.y"}),
             "three": BlockUse(Smooth, wires={"u": "gain.y"}),
         }
     )

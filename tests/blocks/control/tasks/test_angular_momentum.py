@@ -9,6 +9,10 @@ import pytest
 
 from aloft.blocks.control.tasks.angular_momentum import AngularGains, AngularMomentum
 from aloft.mathematics.whole_body_qp import TaskRows
+from aloft.robots.description import find_robot
+from aloft.robots.kinematics import standing_feet
+
+from ....robots.example_robots import needs_robots
 
 RANDOM = np.random.default_rng(7)
 
@@ -29,9 +33,26 @@ def test_angular_momentum_is_damped_or_tracked(track):
     )
     assert set(vars(params)) == set(AngularGains.model_fields)
     rows = TaskRows(np.zeros((3, 16)), np.zeros(3), np.zeros(3))
-    AngularMomentum.step(terms, target, params, rows)
+    AngularMomentum.step(terms, target, params, rows, 0.5)
     momentum, drift = terms.angular_momentum, terms.centroidal_drift[3:]
     expected = rate + damping * (goal - momentum) if track else -damping * momentum
     assert rows.desired == pytest.approx(expected - drift)
     assert (rows.jacobian == terms.centroidal_matrix[3:]).all()
-    assert rows.weights.tolist() == [1.0, 2.0, 3.0]
+    assert rows.weights.tolist() == [0.5, 1.0, 1.5]
+
+
+@needs_robots
+@pytest.mark.parametrize("name", ["solo12", "go2", "talos"])
+def test_weights_mean_the_same_for_robots_of_any_size(name):
+    """An N m counts by how fast it turns the robot: by 1 / (m h^2), squared, as the task's cost is."""
+
+    def factor(robot):
+        task = AngularMomentum.__new__(AngularMomentum)
+        task.robot = robot
+        task.setup()
+        return task.size_factor
+
+    robot = find_robot(name)
+    height = -standing_feet(robot)[:, 2].mean()
+    assert factor(find_robot("bruce")) == 1.0, "whose weights they are"
+    assert factor(robot) == pytest.approx((0.553 / (robot.total_mass * height**2)) ** 2, rel=0.05)
