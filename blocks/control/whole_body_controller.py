@@ -186,6 +186,7 @@ class WholeBodyController(KernelBlock):
                 torso_weight=(3.2, 3.2, 3.2),
                 angular_weight=(0.5, 0.5, 0.5),
                 angular_damping=(2.0, 2.0, 2.0),
+                angular_by_size=True,
             ),
             text="gains after touchdown",
         )

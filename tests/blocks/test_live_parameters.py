@@ -317,16 +317,20 @@ SCENES: Mapping[str, list[Scene]] = {
 
 
 IDLE = {
-    "blocks.WholeBodyController": [
-        *(
-            f"{phase}.rolling_{name}"
-            for phase in ("landing", "stand")
-            for name in ("damping", "stiffness", "weight")
-        ),
-        "thrust.swing_stiffness",
-    ],
+    "blocks.WholeBodyController": sorted(
+        [
+            *(f"{phase}.angular_by_size" for phase in ("landing", "stand", "thrust")),
+            *(
+                f"{phase}.rolling_{name}"
+                for phase in ("landing", "stand")
+                for name in ("damping", "stiffness", "weight")
+            ),
+            "thrust.swing_stiffness",
+        ]
+    ),
 }
-"""One set of gains serves all phases: feet roll off only in the thrust, and there none swings down."""
+"""One set of gains serves all phases: feet roll off only in the thrust, and there none swings down. Weights are
+those of BRUCE, so its size changes none."""
 
 
 def blocks_with_live_parameters() -> Iterator[str]:

@@ -19,10 +19,14 @@ class AngularGains(Parameters):
     """Weights and gains of the angular momentum; vectors are x, y, z of the world."""
 
     angular_weight: Vector = parameter(
-        (1.0, 1.0, 1.0), text="weight of the angular momentum, per N m of a robot of 5 kg"
+        (1.0, 1.0, 1.0), text="weight of the angular momentum, per N m"
     )
     angular_damping: Vector = parameter(
         (5.0, 5.0, 5.0), unit="1/s", text="gain on the error of the angular momentum"
+    )
+    angular_by_size: bool = parameter(
+        False,
+        text="whether the weight is that of a robot of 5 kg, and falls with the size of others",
     )
     track_angular_momentum: bool = parameter(
         False, text="track the target's angular momentum instead of damping all of it"
@@ -34,9 +38,10 @@ class AngularMomentum(Task):
     ``track_angular_momentum``, k_ref' + K_d (k_ref - k).
 
     The rows are the angular rows of the centroidal momentum matrix, in N m. Errors of the torso and the centre of
-    mass are in rad/s^2 and m/s^2. For an equal effect on robots of any size the weights here are therefore
-    multiplied by (0.553 kg m^2 / (m h^2))^2, with the mass m and the height h at which the centre of mass stands.
-    A robot of 90 kg would otherwise damp its angular momentum at any cost, and its torso would sway.
+    mass are in rad/s^2 and m/s^2. With ``angular_by_size`` the weights are multiplied by (0.553 kg m^2 / (m h^2))^2,
+    with the mass m and the height h at which the centre of mass stands, so that they mean the same beside those of
+    the torso for robots of any size. After touchdown a robot of 90 kg would otherwise damp its angular momentum at
+    any cost, and its torso would sway.
     """
 
     Gains = Params = AngularGains
@@ -65,4 +70,6 @@ class AngularMomentum(Task):
             if params.track_angular_momentum:
                 rate += target.angular_momentum_rate[i] + damping * target.angular_momentum[i]
             rows.desired[i] = rate - terms.centroidal_drift[3 + i]
-            rows.weights[i] = size_factor * params.angular_weight[i]
+            rows.weights[i] = params.angular_weight[i]
+            if params.angular_by_size:
+                rows.weights[i] = rows.weights[i] * size_factor

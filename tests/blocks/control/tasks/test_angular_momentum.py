@@ -29,6 +29,7 @@ def test_angular_momentum_is_damped_or_tracked(track):
     params = SimpleNamespace(
         angular_weight=(1.0, 2.0, 3.0),
         angular_damping=damping,
+        angular_by_size=np.array(not track),
         track_angular_momentum=np.array(track),
     )
     assert set(vars(params)) == set(AngularGains.model_fields)
@@ -38,7 +39,7 @@ def test_angular_momentum_is_damped_or_tracked(track):
     expected = rate + damping * (goal - momentum) if track else -damping * momentum
     assert rows.desired == pytest.approx(expected - drift)
     assert (rows.jacobian == terms.centroidal_matrix[3:]).all()
-    assert rows.weights.tolist() == [0.5, 1.0, 1.5]
+    assert rows.weights.tolist() == ([1.0, 2.0, 3.0] if track else [0.5, 1.0, 1.5])
 
 
 @needs_robots
