@@ -145,7 +145,7 @@ def _traced(poles: Any) -> Any:
 
 
 def _limits(values: Array, poles: Any, period: float) -> list[float]:
-    size = np.log(np.maximum(np.abs(poles).max(axis=1), 1e-300)) / period - DRIFT
+    size = np.abs(poles).max(axis=1) - np.exp(DRIFT * period)
     found = []
     for k in np.flatnonzero((size[1:] > 0.0) != (size[:-1] > 0.0)).tolist():
         share = size[k] / (size[k] - size[k + 1])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +13,10 @@ from ..runtime.language.errors import AloftError
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
 from .shared.viewing import read
+
+if TYPE_CHECKING:
+    from ..logs.file.reader import RecordedRun
+    from ..plotting import Panel
 
 
 def render(
@@ -52,6 +58,14 @@ def render(
         list[str] | None,
         typer.Option(help="Caption of each run, in order; by default the recording's name."),
     ] = None,
+    overlay: Annotated[
+        bool,
+        typer.Option("--overlay", help="Draw several runs into one picture, half transparent."),
+    ] = False,
+    plots: Annotated[
+        list[str] | None,
+        typer.Option("--plot", help="Plot this signal beside the runs: a.b.c[2]. Repeatable."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Draw a recording as a film or a picture: the robot, the forces, the phase."""
@@ -70,15 +84,15 @@ def render(
         names = list(caption or [file.stem for file in recordings])
         if len(names) != len(recordings):
             raise AloftError(f"{len(recordings)} recordings, but {len(names)} captions")
-        camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces)
-        takes = [
-            Take(read(file), name, camera) for file, name in zip(recordings, names, strict=True)
-        ]
+        camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces, overlay)
+        runs = [read(file) for file in recordings]
+        takes = [Take(run, name, camera) for run, name in zip(runs, names, strict=True)]
+        panels = _panels(runs, names, plots or [], start, end)
         first, last = (start, end) if at is None else (at, at)
         times = instants(takes, first, last, speed / rate)
         out = console()
         with progress_bar(out, "drawing", len(times) * len(takes)) as (progress, task):
-            frames = pictures(takes, times, camera, lambda: progress.advance(task))
+            frames = pictures(takes, times, camera, lambda: progress.advance(task), panels)
             try:
                 count = write_film(path, frames, rate)
             except OSError as error:
@@ -90,3 +104,25 @@ def render(
             out,
             f"{count} picture{'s' if count != 1 else ''} in {path}, {path.stat().st_size / 1e6:.1f} MB",
         )
+
+
+def _panels(
+    runs: Sequence[RecordedRun],
+    names: Sequence[str],
+    signals: Sequence[str],
+    start: float | None,
+    end: float | None,
+) -> list[Panel]:
+    """The panels of all signals, each with the curves of all runs."""
+    from .plot import panels_of
+
+    joined = []
+    for signal in signals:
+        for same in zip(*(panels_of(run, signal, start, end) for run in runs), strict=True):
+            curves = [
+                replace(line, name=" ".join(filter(None, (line.name, name * (len(runs) > 1)))))
+                for panel, name in zip(same, names, strict=True)
+                for line in panel.lines
+            ]
+            joined.append(replace(same[0], lines=curves))
+    return joined

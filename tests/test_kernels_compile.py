@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.blocks.signals import Phase
 from aloft.mathematics import arrays
 from aloft.mathematics.compiling.arguments import pack, type_of
 from aloft.mathematics.compiling.kernel_call import KernelCall
@@ -170,8 +171,12 @@ def steer_alone():
     score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
     for tick in range(400):
         plan.step()
+        if tick == 20:  # the landing of the jump under way moves
+            plan.set("phase", phase=Phase.THRUST)
+            plan.set("command", number=2, ahead=0.12, replaces=True)
         if tick == 100:  # it has jumped, and learns where it landed
-            plan.set("command", number=2, placed=True, ahead=0.3)
+            plan.set("phase", phase=Phase.STAND)
+            plan.set("command", number=3, placed=True, ahead=0.3, replaces=False)
         score.set("goal", number=int(tick >= 10))
         score.set("truth", contact_touched=np.full(4, not 20 <= tick < 80))
         score.step()

@@ -61,7 +61,7 @@ class SafetyMonitor(Block):
     * while the drives are on, angle and speed of a joint, or an axis of the gyroscope or accelerometer where ``imu`` is wired,
       have not changed by a single bit for ``stuck_time``: a sensor that works has noise;
     * while the drives are on, the torque that a joint measures is off what its command asks for by more than ``torque_error`` of it
-      and 3 % of its peak, both smoothed over 50 ms, for ``health_hold``: a motor that spins freely, or does not obey;
+      and 3 % of its peak, both smoothed over 50 ms, for ``torque_hold``: a motor that spins freely, or does not obey;
     * a foot switch is at fault, and ``SwitchMonitor`` asks to stop.
 
     In damping the command is zero torque and stiffness, the measured angle, zero velocity and the
@@ -109,6 +109,7 @@ class SafetyMonitor(Block):
         constants.peak[:] = peak
         constants.fading = min(1.0, period / _SMOOTHING)
         constants.imu_wired = "imu" in self.context.wired
+        constants.torque_ticks = round(p.torque_hold / period)
         constants.stuck_ticks = round(p.stuck_time / period)
         constants.lowest_voltage = p.lowest_voltage or 0.0
         constants.torque_to_motor[:] = robot.torque_to_motor
@@ -355,7 +356,7 @@ def judge_readings(state: SafetyState, constants: SafetyConstants) -> tuple[int,
             if constants.imu_wired and state.stuck_imu[k] >= constants.stuck_ticks:
                 return SafetyFault.STUCK_IMU, k
     for k in range(state.off.shape[0]):
-        if state.off[k] > constants.health_ticks:
+        if state.off[k] > constants.torque_ticks:
             return SafetyFault.TORQUE, k
     return SafetyFault.NONE, 0
 

@@ -37,6 +37,9 @@ class SafetyParams(Parameters):
         text="share of its torque by which a joint may be off its command; zero: not judged",
     )  # fmt: skip
     unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
+    torque_hold: float = parameter(
+        0.1, unit="s", ge=0.0, text="how long a joint's torque may be off its command"
+    )
     damping: PerJoint | None = live_parameter(
         None, unit="N m s/rad", ge=0.0,
         text="joint damping after a fault; none: the motors' peak torque at 20 rad/s",
@@ -123,6 +126,7 @@ class SafetyConstants(Signal):
     peak = Field("n_joints", unit="N m", text="the motors' peak torques at the joints")
     fading = Field(text="share of a smoothed torque that goes in a tick")
     imu_wired = Field(dtype="bool", text="whether there are readings of an IMU")
+    torque_ticks = Field(dtype="int64", text="how many ticks a torque may be off its command")
     stuck_ticks = Field(dtype="int64", text="how many ticks a reading may stay; zero: not judged")
     damping = Field("n_joints", unit="N m s/rad", text="joint damping after a fault")
     lowest_voltage = Field(unit="V", text="zero: not judged")

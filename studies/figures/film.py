@@ -1,4 +1,5 @@
-"""Recordings as moving pictures: robot and forces in 3D with a caption, several runs side by side."""
+"""Recordings as moving pictures: robot and forces in 3D with a caption, several runs side by side or in one
+picture, and plots beside them."""
 
 from __future__ import annotations
 
@@ -16,6 +17,7 @@ from ...logs.file.reader import RecordedRun
 from ...logs.viewing.contacts import force_scale
 from ...logs.viewing.scene_ports import scene_ports
 from ...mathematics.arrays import Array
+from ...plotting import DPI, Panel, draw_panels, image, new_figure, style
 from ...robots.kinematics import link_poses
 from ...runtime.language.errors import AloftError
 from .offscreen import Offscreen, Pixels, View
@@ -32,6 +34,8 @@ COLORS = 128
 """The colours of a GIF: few make the file small, and the scene has few."""
 SAMPLES = 8
 """The pictures from which they are chosen."""
+CURSOR = (204, 38, 51)
+"""The colour of the line in plots at the time that is shown."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class Camera:
         distance: from the robot [m]; zero: so that the whole motion is in the picture.
         follow: whether it goes with the robot.
         forces: whether contact forces and pushes are drawn.
+        overlay: whether several runs are drawn into one picture, the robots half transparent, as the first
+            run's camera sees them.
     """
 
     width: int = 480
@@ -53,6 +59,34 @@ class Camera:
     distance: float = 0.0
     follow: bool = False
     forces: bool = True
+    overlay: bool = False
+
+
+class Plots:
+    """Panels under each other, of the size of a run's picture, with a line at the time that is shown."""
+
+    def __init__(self, panels: Sequence[Panel], camera: Camera) -> None:
+        with style():
+            figure = new_figure(camera.width / DPI, camera.height / DPI)
+            axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+            draw_panels(list(zip(axes, panels, strict=True)))
+            self._image = image(figure)
+        self._areas = [
+            (each.get_window_extent(), each.get_xlim()) for each in axes
+        ]  # in pixels from below, and the times of its sides
+
+    def picture(self, instant: float) -> Pixels:
+        """The panels with the line, (height, width, 3)."""
+        from PIL import ImageDraw
+
+        shown = self._image.copy()
+        draw = ImageDraw.Draw(shown)
+        for area, (first, last) in self._areas:
+            x = area.x0 + (instant - first) / (last - first) * (area.x1 - area.x0)
+            if area.x0 <= x <= area.x1:
+                sides = (x, shown.height - area.y1), (x, shown.height - area.y0)
+                draw.line(sides, fill=CURSOR, width=2)
+        return np.asarray(shown)
 
 
 class Take:
@@ -165,25 +199,39 @@ def instants(takes: Sequence[Take], start: float | None, end: float | None, step
 
 
 def pictures(
-    takes: Sequence[Take], times: Array, camera: Camera, advance: Callable[[], None] = lambda: None
+    takes: Sequence[Take],
+    times: Array,
+    camera: Camera,
+    advance: Callable[[], None] = lambda: None,
+    panels: Sequence[Panel] = (),
 ) -> Iterator[Image]:
-    """The picture at each time, with the runs side by side, each over its caption.
+    """The picture at each time, with the runs side by side or in one, each over its caption, and plots at the right.
 
     Raises:
         NoRendererError: there is nothing here to draw with.
     """
     columns: list[list[Pixels]] = []
     for take in takes:  # one after another, as one renderer is current at a time
-        column = []
+        column, seen = [], takes[0] if camera.overlay else take
         with Offscreen(take.robot, take.terrain, camera.width, camera.height) as renderer:
-            for row in (take.row(float(instant)) for instant in times):
+            for instant in times:
+                row, view = take.row(float(instant)), seen.view(seen.row(float(instant)))
                 pose = take.base[row], take.turn[row], take.joints[row]
-                column.append(renderer.picture(*pose, take.view(row), take.arrows(row)))
+                column.append(renderer.picture(*pose, view, take.arrows(row)))
                 advance()
         columns.append(column)
+    plots = Plots(panels, camera) if panels else None
     for k, instant in enumerate(times):
         texts = [take.text(take.row(float(instant))) for take in takes]
-        yield _captioned([column[k] for column in columns], texts)
+        parts = [column[k] for column in columns]
+        if camera.overlay:
+            mean = np.mean(np.asarray(parts, np.float64), axis=0)
+            parts = [np.rint(mean).astype(np.uint8)]
+            others = [take.caption for take in takes[1:]]
+            texts = [", ".join([texts[0], *others])]
+        if plots is not None:
+            parts, texts = [*parts, plots.picture(float(instant))], [*texts, ""]
+        yield _captioned(parts, texts)
 
 
 def _captioned(parts: Sequence[Pixels], texts: Sequence[str]) -> Image:

@@ -83,6 +83,33 @@ def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path:
     assert red[0] > 2 and red[1] == 0, "the forces on the feet"
 
 
+def test_several_runs_in_one_picture(pushed: Path, renderer: None, tmp_path: Path) -> None:
+    one, two = tmp_path / "one.png", tmp_path / "two.png"
+    words = ("--at", "0.3", *SMALL, "--no-forces", "--caption", "a")
+    run_here("render", str(pushed), "-o", str(one), *words)
+    run_here("render", *[str(pushed)] * 2, "-o", str(two), *words, "--caption", "b", "--overlay")
+    alone, both = (np.asarray(Image.open(path)) for path in (one, two))
+    assert both.shape == alone.shape
+    assert np.array_equal(both[:100], alone[:100]), "a run over itself looks like one"
+    assert not np.array_equal(both[100:], alone[100:]), "the second caption"
+
+
+def test_plots_beside_the_run(pushed: Path, renderer: None, tmp_path: Path) -> None:
+    lines = []
+    for at in ("0.1", "0.4"):
+        path = tmp_path / f"{at}.png"
+        run_here("render", str(pushed), "-o", str(path), "--at", at, "--plot", "robot.truth.com[2]",
+                 "--width", "300", "--height", "240")  # fmt: skip
+        pixels = np.asarray(Image.open(path))
+        assert pixels.shape == (262, 600, 3)
+        red = (pixels[:, 300:] == (204, 38, 51)).all(axis=2)
+        lines.append(float(np.flatnonzero(red.any(axis=0)).mean()))
+    width = (lines[1] - lines[0]) / 0.3 * 0.5  # of 0.5 s
+    assert 100 < width < 300, "the line is at the time that is shown"
+    done = run_here("render", str(pushed), "--plot", "robot.truth.comm[2]", code=2)
+    assert "robot.truth.com" in done.stderr
+
+
 def test_mp4(pushed: Path, renderer: None, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     path = tmp_path / "film.mp4"
