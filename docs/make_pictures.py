@@ -68,6 +68,13 @@ PAGES = (
      "Solo12"),
     ("uneven", "../graphs/forward_20cm.yaml ../graphs/trials/uneven.yaml", "render", "RECORDING", "--at", "1.45",
      "--width", "640", "--elevation", "-20", "--caption", "ahead 20 cm, uneven"),
+    ("stones", "../graphs/steer_stones.yaml", "render", "RECORDING", "--at", "9", "--width", "640", "--elevation", "-25",
+     "--distance", "2.2", "--caption", "from stone to stone"),
+    ("other_robots",
+     ("../graphs/robots/anymal_c_stand.yaml ../graphs/robots/hyq_stand.yaml "
+      "../graphs/robots/talos_stand.yaml"),
+     "render", "RECORDING", "--at", "1", "--width", "320", "--caption", "ANYmal C", "--caption", "HyQ", "--caption",
+     "Talos"),
     ("machines", "../graphs/machines/jump_two.yaml", "graph", "GRAPH"),
 )  # fmt: skip
 """The same for other pages; of several graphs, which stand side by side, and trials, which change them."""

@@ -293,12 +293,12 @@ def greatest(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 
 @kernel
-def floor(a: Array1D, out: Array1D) -> None:
+def round_down(a: Array1D, out: Array1D) -> None:
     np.floor(a, out)
 
 
 @kernel
-def ceil(a: Array1D, out: Array1D) -> None:
+def round_up(a: Array1D, out: Array1D) -> None:
     np.ceil(a, out)
 
 
@@ -312,8 +312,8 @@ FUNCTIONS: Mapping[str, Any] = {
     "abs": absolute, "sign": sign, "negative": negative, "reciprocal": reciprocal, "square": square,
     "sqrt": square_root, "exp": exponential, "log": logarithm, "log10": logarithm_10, "sin": sine,
     "cos": cosine, "tan": tangent, "asin": arc_sine, "acos": arc_cosine, "atan": arc_tangent,
-    "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine, "tanh": hyperbolic_tangent, "floor": floor,
-    "ceil": ceil, "round": nearest,
+    "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine, "tanh": hyperbolic_tangent, "floor": round_down,
+    "ceil": round_up, "round": nearest,
 }  # fmt: skip
 """Functions of one array, by name."""
 OF_TWO: Mapping[str, Any] = {"atan2": angle, "min": least, "max": greatest, "hypot": hypotenuse}

@@ -17,8 +17,19 @@ unset PYTHONPATH
 cd "$folder"
 export XDG_CACHE_HOME="$folder/cache"
 
-"$bin/aloft" run aloft:jump.yaml --record jump.rrd --json >/dev/null 2>&1
-"$bin/python" -c 'import sys; from aloft.mathematics.kept_arrays import processor; sys.stdout.buffer.write(processor())' >processor
+cat >here.py <<'PROGRAM'
+import sys
+from pathlib import Path
+
+from aloft.cli import main
+from aloft.mathematics import kept_arrays
+
+kept_arrays.LIBRARIES = ()  # those of another Python may be of other versions
+Path("processor").write_bytes(kept_arrays.processor())
+sys.argv[1:] = ["run", "aloft:jump.yaml", "--record", "jump.rrd", "--quiet"]
+main()
+PROGRAM
+"$bin/python" here.py >/dev/null
 rm -r cache/aloft/kernels
 
 mkdir -p state/lists/partial archives/partial debs root
@@ -53,6 +64,7 @@ from aloft.mathematics import kept_arrays
 from aloft.mathematics.compiling.compile_calls import watchers
 
 assert platform.machine() == "aarch64"
+kept_arrays.LIBRARIES = ()
 kept_arrays.processor = Path("processor").read_bytes
 told = []
 watchers.append(lambda done, total: told.append(total))

@@ -11,8 +11,10 @@ from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
 from aloft.hal.simulated import plant
+from aloft.mathematics import elementwise
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion
 from aloft.mathematics.compiling.arguments import record_type
+from aloft.mathematics.compiling.kernel_registry import arguments_of, is_kernel
 from aloft.mathematics.landing_law import LandingCost, flight_map
 from aloft.mathematics.whole_body_motion import (
     FixedPoints,
@@ -462,3 +464,11 @@ UNUSED = {
     "aloft.mathematics.rotations.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
 }  # fmt: skip
 """Arguments of kernels that ``graphs/jump.yaml`` does not call with either estimator."""
+UNUSED |= {
+    f"{each.__module__}.{each.__name__}": tuple(
+        0.7 if each.__annotations__[name] == "float" else NORMAL(4) for name in arguments_of(each)
+    )
+    for each in vars(elementwise).values()
+    if is_kernel(each) and each.__module__ == elementwise.__name__
+}
+UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)
