@@ -12,7 +12,7 @@ from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
 from aloft.hal.simulated import plant
 from aloft.mathematics import elementwise
-from aloft.mathematics.body_dynamics import BodyMotion, body_motion
+from aloft.mathematics.body_dynamics import BodyMotion, body_motion, composite_inertias
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.compiling.kernel_registry import arguments_of, is_kernel
 from aloft.mathematics.landing_law import LandingCost, flight_map
@@ -22,6 +22,7 @@ from aloft.mathematics.whole_body_motion import (
     MotionTerms,
     PushedTurns,
     motion_memory,
+    place_and_move,
     turn_memory,
 )
 from aloft.mathematics.whole_body_qp import RigidBodyTerms
@@ -185,6 +186,19 @@ EVALUATED = MotionTerms(
     *np.zeros((3, 2, 3)), np.tile([1.0, 1.2, 0.9, 0.1, -0.2, 0.05], (2, 1)), *NORMAL((3, 2, 4, 3)),
     np.zeros((2, 6)), np.zeros((2, 10)),
 )  # fmt: skip
+IN_MOTION = motion_memory(10)
+place_and_move(TREE, AT_TWO.position[1], AT_TWO.velocity[1], AT_TWO.bend[1], IN_MOTION)
+composite_inertias(TREE, IN_MOTION.motion, IN_MOTION.composite)
+STEERED = {
+    "goal": [0.1, 0.02], "goal_heading": 0.1, "level": 0.0, "before": [0.0, 0.01],
+    "before_heading": 0.0, "before_level": 0.0, "heading": 0.2, "asked": [0.1, 0.01, 0.1, 0.0],
+    "shift": [0.01, 0.02, 0.0], "shift_time": 0.1, "taken": 3,
+}  # fmt: skip
+STEERED_JUMP = {
+    "time": 1.2, "lift_off_time": 1.0, "touchdown_time": 1.3, "com": [0.1, 0.0, 0.4],
+    "com_velocity": [0.3, 0.0, 0.1], "com_acceleration": [0.0, 0.0, -9.8],
+    "foot_position": NORMAL((2, 3)), "foot_velocity": NORMAL((2, 3)),
+}  # fmt: skip
 TURNING = PushedTurns(
     np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
     np.array([0, 2]), np.array([[0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 3)), NORMAL((1, 3)),
@@ -230,7 +244,7 @@ UNUSED = {
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
     ),
     "aloft.mathematics.whole_body_motion.momentum_terms": (
-        AT_TWO.velocity[1], 1, motion_memory(10), EVALUATED,
+        AT_TWO.velocity[1], 1, IN_MOTION, EVALUATED,
     ),
     "aloft.mathematics.whole_body_motion.point_terms": (
         SOLES_OF_TREE, AT_TWO.position[0], 0, body_motion(10), EVALUATED,
@@ -239,10 +253,10 @@ UNUSED = {
         EVALUATED.inertia[0], NORMAL(3), np.zeros(3),
     ),
     "aloft.mathematics.whole_body_motion.base_acceleration": (
-        AT_TWO, 1, motion_memory(10), EVALUATED,
+        AT_TWO, 1, IN_MOTION, EVALUATED,
     ),
     "aloft.mathematics.whole_body_motion.joint_torques": (
-        TREE, SOLES_OF_TREE, AT_TWO, 1, motion_memory(10), EVALUATED,
+        TREE, SOLES_OF_TREE, AT_TWO, 1, IN_MOTION, EVALUATED,
     ),
     "aloft.mathematics.whole_body_motion.turn_rate": (
         TURNING, 1, 0, NORMAL(7), turn_memory(), np.zeros(7),
@@ -471,4 +485,19 @@ UNUSED |= {
     for each in vars(elementwise).values()
     if is_kernel(each) and each.__module__ == elementwise.__name__
 }
+UNUSED["aloft.blocks.jumping.steered_plan.shift_landing"] = records(STEERED_JUMP, STEERED)
+UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
+    *records(
+        {"placed": False, "ahead": 0.12, "aside": -0.01, "turn": 0.1, "up": 0.0, "number": 4},
+        STEERED_JUMP,
+    ),
+    0.15,
+    *records(
+        {
+            "retarget_window": 0.2, "retarget_acceleration": 3.0, "retarget_limit": 0.05,
+            "retarget_braking": 1.0,
+        },
+        {"outcome": 0}, STEERED,
+    ),
+)  # fmt: skip
 UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)
