@@ -155,7 +155,8 @@ class EarlierController:
         self.commit = commit
         self._folder = tempfile.TemporaryDirectory(prefix="aloft_")
         with tarfile.open(fileobj=io.BytesIO(found.stdout)) as archive:
-            archive.extractall(Path(self._folder.name) / "aloft", filter="data")
+            archive.extraction_filter = getattr(tarfile, "data_filter", None)  # not before 3.11.4
+            archive.extractall(Path(self._folder.name) / "aloft")
 
     def run(self) -> dict[str, float]:
         """Run its jump once, in a process of its own; returns the median time of every block of the

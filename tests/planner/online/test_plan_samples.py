@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -59,12 +60,18 @@ def test_the_nearest_plan_is_one_within_reach() -> None:
     assert within_reach(found) == found
 
 
+def members(path: Path) -> dict[str, bytes]:
+    """The files in an archive; its own bytes depend on the version of Python."""
+    with ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 @pytest.mark.parametrize("steps", [False, True])
 def test_the_file_gives_what_was_written(tmp_path: Path, steps: bool) -> None:
     samples = STEPS if steps else SAMPLES
     path = write_samples(tmp_path / "hops.npz", samples)
     again = read_samples(path)
-    assert path.read_bytes() == samples_path("bruce", steps=steps).read_bytes()
+    assert members(path) == members(samples_path("bruce", steps=steps))
     for name in ARRAYS:
         np.testing.assert_array_equal(again.arrays[name], samples.arrays[name])
 
