@@ -161,8 +161,9 @@ def _rows(chirped: Graph, seed: int, window: _Window) -> Any:
     def element(name: str) -> Array:
         field, _, index = name.partition("[")
         values = result.signal(field)[window.first : window.last]
-        places = tuple(int(each) for each in index.removesuffix("]").split(",")) if index else ()
-        return np.asarray([row[places] for row in values], np.float64)
+        places = map(int, index.removesuffix("]").split(",")) if index else ()
+        of_all: tuple[Any, ...] = (slice(None), *places)
+        return np.asarray(values[of_all], np.float64)
 
     return element
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from ..analysis import FrequencyResponse, Linearisation, Margins, RootLocus
 
-Number = TypeVar("Number", int, float)
 MOST_POLES = 12
 
 
@@ -77,6 +76,7 @@ def linearise(
     from ..analysis.locus import locus_figure
     from ..analysis.loop_margins import margins_figure
     from ..runtime.graph import load
+    from ..studies.batch.seeds import parse_seeds
 
     with errors_reported(as_json):
         if at is None and not when:
@@ -98,23 +98,29 @@ def linearise(
         loop = opened and (outputs is None or outputs == inputs)
         if (png or svg) and not loop:
             raise AloftError("diagrams show an opened loop: give --open and no --to")
+        loaded = load(graph, overrides or [])
         model = linearise_graph(
-            load(graph, overrides or []), inputs=inputs, outputs=outputs or inputs, at=at,
+            loaded, inputs=inputs, outputs=outputs or inputs, at=at,
             when=when, opened=opened,
         )  # fmt: skip
         found = margins(model) if loop else None
         measured: list[FrequencyResponse] = []
         if chirp:
-            low, high = numbers_of(band, "--band", float)
-            first, *last = numbers_of(seeds, "--seeds", int, 1)
+            low, high = band_of(band)
+            try:
+                chosen = parse_seeds(seeds)
+            except AloftError:
+                raise AloftError(
+                    f"--seeds cannot be {seeds!r}; write it as --seeds 1000:1005"
+                ) from None
             measured = [
                 each
                 for signal in inputs
                 for target in ([""] if loop else outputs or inputs)
                 for each in frequency_responses(
-                    load(graph, overrides or []), inputs=signal, outputs=target,
+                    loaded, inputs=signal, outputs=target,
                     at=model.tick * model.base_period, size=chirp, low=low, high=high, period=period,
-                    periods=periods, seeds=range(first, *(last or [first + 1])),
+                    periods=periods, seeds=chosen,
                 )
             ]  # fmt: skip
         if found is not None:
@@ -134,16 +140,15 @@ def linearise(
     show_measured(console(), model, measured)
 
 
-def numbers_of(text: str, option: str, kind: type[Number], least: int = 2) -> list[Number]:
-    """The numbers of ``a:b``. Raises ``AloftError``."""
-    example = "1000:1005" if kind is int else "1:50"
+def band_of(text: str) -> tuple[float, float]:
+    """The frequencies of ``low:high``. Raises ``AloftError``."""
     try:
-        found = [kind(part) for part in text.split(":")]
+        low, high = map(float, text.split(":"))
     except ValueError:
-        found = []
-    if not least <= len(found) <= 2 or found != sorted(found):
-        raise AloftError(f"{option} cannot be {text!r}; write it as {option} {example}")
-    return found
+        low, high = 1.0, 0.0
+    if not low <= high:
+        raise AloftError(f"--band cannot be {text!r}; write it as --band 1:50")
+    return low, high
 
 
 def predicted(model: Linearisation, measured: FrequencyResponse) -> Any:

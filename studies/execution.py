@@ -32,7 +32,8 @@ class Run:
 def run_job(work: Job) -> Outcome:
     """Make one run, in the process that does the work.
 
-    Draws that differ in live parameters share their beginning, with the same bytes. A run that fails is an outcome, and so is a graph that cannot be set up.
+    Draws that differ in live parameters share their beginning, with the same bytes. A run that fails is an outcome,
+    and so is a graph that cannot be set up.
 
     Raises:
         AloftError: the process was told to stop.
