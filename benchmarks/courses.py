@@ -107,12 +107,13 @@ def fell(metrics: Mapping[str, Any]) -> bool:
 
 
 def run_course(
-    seed: int, more: Mapping[str, Any] | None = None, behind: Sequence[str] = (SENSOR,)
-) -> dict[str, Any]:
+    seed: int, more: Mapping[str, Any] | None = None, behind: Sequence[str] = (SENSOR,),
+    graph: str = "steer.yaml",
+) -> dict[str, Any]:  # fmt: skip
     """The metrics of a course, with its ``seed``; ``more`` overrides what the graph says, and the files
     ``behind`` are included behind it."""
     return run_seed(
-        seed, "steer.yaml", behind, {"commands.commands": course(seed), "duration": LONGEST, **(more or {})},
+        seed, graph, behind, {"commands.commands": course(seed), "duration": LONGEST, **(more or {})},
     )  # fmt: skip
 
 
