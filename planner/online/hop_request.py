@@ -73,13 +73,14 @@ class StepReach(NamedTuple):
     aside: float
     turn: float
     up: float
+    down: float
     rise: float
 
     def nearest(self, wanted: HopRequest) -> HopRequest:
         """The nearest request in the box of these limits."""
         return HopRequest(
             _clip(wanted.ahead, self.least, self.ahead), _clip(wanted.aside, -self.aside, self.aside),
-            _clip(wanted.turn, -self.turn, self.turn), _clip(wanted.up, -self.up, self.up),
+            _clip(wanted.turn, -self.turn, self.turn), _clip(wanted.up, -self.down, self.up),
         )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ valid plan are left out. Either takes five minutes of one core for a biped.
 
 What is asked for are the limits of BRUCE, times how high the robot's centre of mass stands, unless options such as ``--back 0.3``
 say other ones. The reach of the plans is the largest share of them within which nine of ten requests have a plan.
-``--steps`` plans those up and down, too.
+``--steps 80`` plans those up and down, too, whose limits are options such as ``--step-ahead 0.5``.
 """
 
 from __future__ import annotations
@@ -26,19 +26,17 @@ from ..task.plan import PlannedJump
 from ..task.scaling import HEIGHT, standing_height
 from .hop_plans import samples_path
 from .hop_request import HopReach, HopRequest, StepReach, coarse, task_of
-from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
+from .plan_samples import SCALES, PlanSamples, read_samples, samples_of, write_samples
 
 REACH = HopReach(ahead=0.32, back=0.10, aside=0.30, turn=0.87, rise=0.09)
 """BRUCE's. Jumps further back with a turn are planned, but in the robust trial they land askew."""
-STEP_REACH = StepReach(least=0.12, ahead=0.32, aside=0.10, turn=0.35, up=0.06, rise=0.09)
+STEP_REACH = StepReach(least=0.12, ahead=0.32, aside=0.10, turn=0.35, up=0.06, down=0.06, rise=0.09)
 ENOUGH = 0.9
 """The share of requests within a reach that have a plan."""
 COUNT = 96
-"""Requests that are tried."""
+"""Requests on level ground that are tried."""
 MARGIN = 1.08
 """How much further than the reach they go, so that requests at its edge lie between them."""
-STEPPED = 80
-"""The same of jumps up and down."""
 BASES = (2, 3, 5, 7)
 STILL = HopRequest(0.0, 0.0, 0.0)
 
@@ -68,10 +66,11 @@ def request(index: int, reach: HopReach) -> HopRequest:
 def step_request(index: int, reach: StepReach) -> HopRequest:
     """A request of the sequence of jumps up and down."""
     distance, aside, turn, up = (2.0 * halton(index + 1, base) - 1.0 for base in BASES)
+    level, height = 0.5 * (reach.up - reach.down), 0.5 * (reach.up + reach.down)
     middle, half = 0.5 * (reach.ahead + reach.least), 0.5 * (reach.ahead - reach.least)
     return HopRequest(
         round(middle + MARGIN * half * distance, 4), round(MARGIN * reach.aside * aside, 4),
-        round(MARGIN * reach.turn * turn, 4), round(MARGIN * reach.up * up, 4),
+        round(MARGIN * reach.turn * turn, 4), round(level + MARGIN * height * up, 4),
     )  # fmt: skip
 
 
@@ -89,8 +88,8 @@ def reach_for(robot: RobotDescription) -> HopReach:
 
 def step_reach_for(robot: RobotDescription, rise: float) -> StepReach:
     """What is asked of it up and down."""
-    least, ahead, aside, up = scaled((*STEP_REACH[:3], STEP_REACH.up), robot)
-    return StepReach(least, ahead, aside, STEP_REACH.turn, up, rise)
+    least, ahead, aside, up, down = scaled((*STEP_REACH[:3], *STEP_REACH[4:6]), robot)
+    return StepReach(least, ahead, aside, STEP_REACH.turn, up, down, rise)
 
 
 def find_samples(robot: RobotDescription, wanted: HopReach, count: int = COUNT) -> PlanSamples:
@@ -113,7 +112,7 @@ def reached(
 
 
 def find_steps(
-    robot: RobotDescription, level: PlanSamples, wanted: StepReach, count: int = STEPPED
+    robot: RobotDescription, level: PlanSamples, wanted: StepReach, count: int
 ) -> PlanSamples:
     """Plan those up and down, the first from its neighbour on level ground."""
     rows = range(len(level.requests))
@@ -179,17 +178,28 @@ def main() -> None:
     """Plan the hops of the robot that the command line names."""
     parser = argparse.ArgumentParser(description="Plans the hops of a robot.")
     parser.add_argument("robot", nargs="?", default="bruce")
-    parser.add_argument("--count", type=int, default=COUNT, help="requests on level ground")
-    parser.add_argument("--steps", action="store_true", help="plan those up and down, too")
+    parser.add_argument(
+        "--count", type=int, default=COUNT, help="requests on level ground; 0: none"
+    )
+    parser.add_argument("--steps", type=int, default=0, help="requests up and down, such as 80")
     for limit in HopReach._fields:
-        parser.add_argument(f"--{limit}", type=float, help="m or rad, of jumps on level ground")
-    given = parser.parse_args()
-    robot = find_robot(given.robot)
-    told = {name: value for name in HopReach._fields if (value := getattr(given, name)) is not None}
-    level = find_samples(robot, reach_for(robot)._replace(**told), given.count)
-    print(write_samples(samples_path(robot.name), level), level.reach)
-    if given.steps:
-        steps = find_steps(robot, level, step_reach_for(robot, level.reach.rise))
+        parser.add_argument(f"--{limit}", type=float, help="m or rad, on level ground")
+    for limit in StepReach._fields:
+        parser.add_argument(f"--step-{limit}", type=float, help="m or rad, up and down")
+    given = vars(parser.parse_args())
+
+    def told(fields: Sequence[str], prefix: str = "") -> dict[str, float]:
+        return {name: given[prefix + name] for name in fields if given[prefix + name] is not None}
+
+    robot = find_robot(given["robot"])
+    if given["count"]:
+        wanted = reach_for(robot)._replace(**told(HopReach._fields))
+        level = find_samples(robot, wanted, given["count"])
+        print(write_samples(samples_path(robot.name), level), level.reach)
+    if given["steps"]:
+        level = read_samples(samples_path(robot.name))
+        own = step_reach_for(robot, level.reach.rise)._replace(**told(StepReach._fields, "step_"))
+        steps = find_steps(robot, level, own, given["steps"])
         print(write_samples(samples_path(robot.name, steps=True), steps), steps.reach)
 
 
