@@ -13,7 +13,7 @@ from ..library.jump_table import JumpTable, table_rows
 from ..library.library import SHIPPED
 from ..library.reference_table import COARSE_STEPS, reference_table
 from ..task.plan import PlannedJump
-from .hop_request import HopReach
+from .hop_request import HopReach, StepReach
 from .plan_samples import PlanSamples, read_samples
 
 
@@ -56,6 +56,13 @@ def level_reach(robot: str) -> HopReach:
     """How far a robot hops on level ground."""
     reach = shipped_samples(robot).reach
     assert isinstance(reach, HopReach)
+    return reach
+
+
+def step_reach(robot: str) -> StepReach:
+    """How far a robot hops up and down, which must have such plans."""
+    reach = shipped_samples(robot, steps=True).reach
+    assert isinstance(reach, StepReach)
     return reach
 
 

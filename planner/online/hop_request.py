@@ -62,7 +62,8 @@ class HopReach(NamedTuple):
 
     def shortened(self, share: float) -> HopReach:
         """That share of all limits; the jumps are as high."""
-        return HopReach(*(_rounded(share * limit) for limit in self[:4]), self.rise)
+        ahead, back, aside, turn = (_rounded(share * limit) for limit in self[:4])
+        return HopReach(ahead, back, aside, turn, self.rise)
 
 
 class StepReach(NamedTuple):
