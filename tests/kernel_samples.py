@@ -361,7 +361,7 @@ UNUSED = {
     "aloft.mathematics.linear_algebra.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
-    "aloft.blocks.control.balance_target.pattern_turn": (
+    "aloft.mathematics.rotations.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
     ),
     "aloft.mathematics.landing_law.landing_place": (
@@ -405,10 +405,6 @@ UNUSED = {
     "aloft.robots.five_joint_leg.pitched_line": (np.eye(3), 0.4, np.zeros(3)),
     "aloft.mathematics.rotations.yaw": (np.array([0.1, 0.2, 0.3, 0.9]),),
     "aloft.mathematics.rotations.pitch_angle": (np.array([0.1, 0.2, 0.3, 0.9]),),
-    "aloft.mathematics.feet_heading.heading_of_feet": (
-        np.array([[0.2, 0.1, 0.0], [-0.2, 0.1, 0.0]]), np.stack([POSE[1:], POSE[1:]]), np.array([0.01, 0.1, 0.0]),
-        np.array([[0.2, 0.0], [1.0, 0.0]]), np.array([True, False]),
-    ),
     "aloft.mathematics.interpolation.lengthen": (
         np.array([0.01, -0.04, 0.0]), 0.7, 0.02, 0.25, 0.2, 0.6, *(np.ones(3) for _ in range(3)),
     ),

@@ -8,10 +8,9 @@ import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.elementary import hypot, sincos
-from ...mathematics.feet_heading import heading_of_feet
 from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import turn_about_vertical, wrap
+from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
 from ...planner.library.jump_table import (
     FlightRotation,
     TableRows,
@@ -109,6 +108,7 @@ class SteeringConstants(ProgressConstants):
     ahead = Field(unit="m", text="the farthest jump ahead")
     back = Field(unit="m", text="the farthest back")
     aside = Field(unit="m", text="the farthest to a side")
+    of_points = Field(dtype="bool", text="no foot has a direction of its own")
 
 
 class SteeredPlan(Block):
@@ -135,7 +135,7 @@ class SteeredPlan(Block):
 
     Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
     feet before the jump, with x ahead. It moves when a plan begins. Ahead is where the feet point, or, for feet that are points,
-    how all of them together are turned from where they are as the robot stands (``mathematics.feet_heading``). The reference's time is that of the run. Until the first plan begins the robot
+    how all of them together are turned from where they are as the robot stands (as in ``BalanceTarget``). The reference's time is that of the run. Until the first plan begins the robot
     stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
     told at ``JumpPlan``: by the speed and height that the thrust has reached.
 
@@ -198,6 +198,9 @@ class SteeredPlan(Block):
         values = Field("plan_width", text="columns of an instant")
         middle = Field(3, unit="m", frame="world", text="of the feet, in the estimator's world")
         vector = Field(3, unit="m", text="the same in the jump's frame")
+        origin = Field(
+            3, unit="m", text="zeros, where the middle of the feet is as the robot stands"
+        )
 
     Constants = SteeringConstants
     needs = ("floating base", "feet")
@@ -236,7 +239,9 @@ class SteeredPlan(Block):
             followed.contact, self.scratch.values,
         )  # fmt: skip
         self.rotation = FlightRotation(*(np.zeros(size) for size in (1, 1, 1, 4)))
-        self.directions, self.points = standing_directions(self.robot)
+        self.directions, points = standing_directions(self.robot)
+        self.counted = ~points
+        self.constants.of_points = bool(points.all())
         reach = level_reach(self.robot.name)
         self.constants.ahead, self.constants.back = reach.ahead, reach.back
         self.constants.aside = reach.aside
@@ -271,7 +276,7 @@ class SteeredPlan(Block):
         table: TableRows,
         rotation: FlightRotation,
         directions: Array2D,
-        points: Flags1D,
+        counted: Flags1D,
         params: Params,
         constants: SteeringConstants,
         scratch: Scratch,
@@ -281,8 +286,10 @@ class SteeredPlan(Block):
         middle_of(terms.foot_position, scratch.vector)
         turn_about_vertical(scratch.vector, memory.heading, scratch.middle)
         scratch.middle[:] = scratch.middle + memory.origin
-        heading = memory.heading + heading_of_feet(
-            terms.foot_position, terms.foot_rotation, scratch.vector, directions, points
+        heading = memory.heading + (
+            pattern_turn(directions, scratch.origin, terms.foot_position, scratch.vector)
+            if constants.of_points
+            else mean_heading(terms.foot_rotation, counted)
         )
         stands = phase.phase == Phase.STAND and now >= params.settle_time
         if stands and not memory.started:
