@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Array2D, Rows3, Vector3
+from ...mathematics.arrays import Array1D, Rows3, Vector3
 from ...mathematics.elementary import atan2, sincos
 from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
