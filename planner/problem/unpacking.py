@@ -16,6 +16,7 @@ from ..models.symbolic_model import SymbolicModel, centroidal_momentum
 from ..task.plan import PlannedJump
 from ..task.sequence import LEVEL, ground_axes
 from .guess import ballistic_guess
+from .layout import ProblemPhase
 from .problem import FullProblem
 
 Phases = Sequence[int]
@@ -93,17 +94,17 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
     for stretch in problem.stretches:
-        for k in range(stretch.first, stretch.stop):
-            control = assembly.control_start[k]
-            impacts[k] = stretch.impact
-            grounded[k, list(stretch.contacts)] = True
-            if not stretch.impact:
-                bend[k] = coordinates.matrix @ values[control : control + n]
-            if not stretch.flies:
-                pushed = values[control + n : control + n + coordinates.forces]
-                force[k] = coordinates.force_matrix @ pushed
-                force[k].reshape(-1, 3)[~grounded[k]] = 0.0
-                _turn_forces(problem, k, force[k], to_world=True)
+        here = slice(stretch.first, stretch.stop)
+        control = assembly.control_start[here, None] + np.arange(n)
+        impacts[here] = stretch.impact
+        grounded[here, list(stretch.contacts)] = True
+        if not stretch.impact:
+            bend[here] = values[control] @ coordinates.matrix.T
+        if not stretch.flies:
+            pushed = values[control[:, :1] + n + np.arange(coordinates.forces)]
+            force[here] = pushed @ coordinates.force_matrix.T
+            force.reshape(count, -1, 3)[here][~grounded[here]] = 0.0
+            _turn_forces(problem, stretch, force[here], to_world=True)
     phases = [int(phase) for phase in problem.phases]
     for array in (bend, force, grounded):
         array[-1] = array[-2]
@@ -134,13 +135,16 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     }
 
 
-def _turn_forces(problem: FullProblem, k: int, force: Array, *, to_world: bool) -> None:
-    """Turn the forces at a knot (3 n_contacts) from the axes of the ground that it stands on to the
+def _turn_forces(
+    problem: FullProblem, stretch: ProblemPhase, force: Array, *, to_world: bool
+) -> None:
+    """Turn the forces in a stretch (n, 3 n_contacts) from the axes of the ground that it stands on to the
     world's, or back, in place."""
-    slope = problem.stances[problem.stretch_at(k).place].slope
+    slope = problem.stances[stretch.place].slope
     if slope != LEVEL:
         axes = ground_axes(slope)
-        force[:] = (force.reshape(-1, 3) @ (axes.T if to_world else axes)).ravel()
+        for each in force:
+            each[:] = (each.reshape(-1, 3) @ (axes.T if to_world else axes)).ravel()
 
 
 def _middles_in_flight(
@@ -150,15 +154,15 @@ def _middles_in_flight(
     """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
     coordinates, assembly = problem.coordinates, problem.assembly
     own = list(coordinates.turning)
+    base = slice(3, 6)
     for flight in problem.flights:
-        for k in flight:
-            start = assembly.control_start[k] + coordinates.size
-            rates = np.zeros(coordinates.size)
-            rates[own] = values[start : start + len(own)]
-            base = slice(3, 6)
-            moving[k, base] = (coordinates.matrix @ rates)[base]
-            middle[k, base] = 0.5 * (q[k, base] + q[k + 1, base])
-            middle[k, base] += 0.125 * steps[k] * (v[k, base] - v[k + 1, base])
+        here, behind = slice(flight.start, flight.stop), slice(flight.start + 1, flight.stop + 1)
+        rates = np.zeros((len(flight), coordinates.size))
+        start = assembly.control_start[here, None] + coordinates.size
+        rates[:, own] = values[start + np.arange(len(own))]
+        moving[here, base] = (rates @ coordinates.matrix.T)[:, base]
+        middle[here, base] = 0.5 * (q[here, base] + q[behind, base])
+        middle[here, base] += 0.125 * steps[here, None] * (v[here, base] - v[behind, base])
 
 
 def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
@@ -200,8 +204,8 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     values = np.empty(assembly.variables)
     place, rate = coordinates.reduce(q), coordinates.reduce(v)
     force = force.copy()
-    for k in range(len(force)):
-        _turn_forces(problem, k, force[k], to_world=False)
+    for stretch in problem.stretches:
+        _turn_forces(problem, stretch, force[stretch.first : stretch.stop], to_world=False)
     pushes = coordinates.reduce_forces(force)
     own = np.arange(n)
     values[assembly.state_start[:, None] + own] = place
