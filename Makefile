@@ -79,8 +79,9 @@ docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/python docs/refresh.py
 	@$(BIN)/python docs/make_pictures.py
 
-site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves
-	@$(BIN)/python -m sphinx -q --fail-on-warning --keep-going -c docs -d build/doctrees . site
+site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves; other versions there stay
+	@$(BIN)/python -m sphinx -q --fail-on-warning --keep-going -c docs -d build/doctrees . \
+		site/$$($(BIN)/python -c "import aloft; print(aloft.__version__)")
 	@echo "site/index.html"
 
 demo: $(COMPLETE)  ## build the page on which BRUCE jumps in a browser in site/demo; needs npm and wasm-ld

@@ -2,14 +2,19 @@
 
 Sphinx starts from the folder above, so README, the pages of docs/ and the projects link to each other as
 they stand, and a link to a source file leads to a copy of it. docs/index.md says which page is in which part.
+
+Each version lies in a folder of its own, `site/VERSION`. Those that were built before stay, and every page leads to them.
 """
 
+import json
 import sys
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT.parent))
+
+from packaging.version import Version
 
 import aloft
 
@@ -27,6 +32,13 @@ html_copy_source = False
 html_show_copyright = False
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
+templates_path = ["site_templates"]
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html", "versions.html", "sidebar/search.html", "sidebar/scroll-start.html",
+        "sidebar/navigation.html", "sidebar/scroll-end.html",
+    ]
+}  # fmt: skip
 html_theme_options = {
     "light_css_variables": {"font-stack--monospace": "'DejaVu Sans Mono', monospace"},
 }
@@ -40,11 +52,19 @@ napoleon_use_rtype = False
 suppress_warnings = ["myst.header"]
 
 
-def redirect(app: Any, failure: Exception | None) -> None:
-    """The site begins at its root, too."""
-    if failure is None and app.builder.format == "html":
-        page = '<!doctype html><meta http-equiv="refresh" content="0; url=docs/index.html">\n'
-        (Path(app.outdir) / "index.html").write_text(page)
+def list_versions(app: Any, failure: Exception | None) -> None:
+    """Write beside the versions which there are, and a first page that leads to the newest."""
+    if failure is not None or app.builder.format != "html":
+        return
+    folder = Path(app.outdir).parent
+    versions = sorted(
+        (found.parents[1].name for found in folder.glob("*/docs/index.html")),
+        key=Version,
+        reverse=True,
+    )
+    (folder / "versions.js").write_text(f"window.siteVersions = {json.dumps(versions)};\n")
+    page = f'<!doctype html><meta http-equiv="refresh" content="0; url={versions[0]}/docs/index.html">\n'
+    (folder / "index.html").write_text(page)
 
 
 def keep_colons(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -56,4 +76,4 @@ def keep_colons(app: Any, what: str, name: str, thing: Any, options: Any, lines:
 def setup(app: Any) -> None:
     """Connect what is above."""
     app.connect("autodoc-process-docstring", keep_colons, priority=400)  # before napoleon
-    app.connect("build-finished", redirect)
+    app.connect("build-finished", list_versions)

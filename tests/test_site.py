@@ -8,8 +8,12 @@ import re
 import shlex
 import subprocess
 import sys
+import threading
+import time
 import tomllib
+from functools import partial
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -19,6 +23,8 @@ import yaml
 
 import aloft
 from aloft.cli.app import make_app
+
+from .logs.viewing.browser import PROGRAM, Browser
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -117,15 +123,67 @@ class References(HTMLParser):
                 self.anchors.add(value)
 
 
-@pytest.mark.long
-def test_the_site_is_built_without_a_warning_and_every_link_leads_somewhere(tmp_path: Path) -> None:
+OTHER_VERSIONS = ("0.1.0", "10.0.0")
+"""Of which the site has a first page, and no other."""
+
+
+@pytest.fixture(scope="module")
+def built_site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the present version, beside older and newer ones."""
+    folder = tmp_path_factory.mktemp("site")
+    for version in OTHER_VERSIONS:
+        page = folder / version / "docs" / "index.html"
+        page.parent.mkdir(parents=True)
+        page.write_text(f"<!doctype html><title>{version}</title>")
+    site = folder / aloft.__version__
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-q", "--fail-on-warning", "--keep-going", "-c", "docs",
-         "-d", tmp_path / "doctrees", ".", tmp_path / "site"],
+         "-d", tmp_path_factory.mktemp("doctrees"), ".", site],
         cwd=ROOT, capture_output=True, text=True, timeout=500, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    site = tmp_path / "site"
+    return site
+
+
+@pytest.mark.long
+@pytest.mark.skipif(PROGRAM is None, reason="chooses in a real browser; install Debian's chromium")
+@pytest.mark.parametrize("page", ["docs/index.html", "docs/planning.html"])
+def test_a_page_leads_to_other_versions(built_site: Path, tmp_path: Path, page: str) -> None:
+    first = (built_site.parent / "index.html").read_text()
+    assert "url=10.0.0/docs/index.html" in first  # 10.0.0 is newer than 0.2.0
+    handler = partial(SimpleHTTPRequestHandler, directory=str(built_site.parent))
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), handler) as server,
+        Browser(tmp_path, (1200, 800)) as browser,
+    ):
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        browser.open(f"http://127.0.0.1:{server.server_port}/{aloft.__version__}/{page}")
+
+        def evaluate(expression: str) -> object:
+            return browser.ask("Runtime.evaluate", expression=expression)["result"].get("value")
+
+        box = "document.querySelector('label.versions')"
+        assert (
+            evaluate(f"{box}.innerText.split(/\\s+/).join(' ')")
+            == f"Version 10.0.0 {aloft.__version__} 0.1.0"
+        )
+        assert evaluate(f"{box}.firstElementChild.value") == aloft.__version__
+        # It has no page of that name but the first, to which the browser is led.
+        evaluate(
+            f"{{const list = {box}.firstElementChild; list.value = '0.1.0';"
+            " list.dispatchEvent(new Event('change'));}"
+        )
+        for _ in range(300):
+            if evaluate("document.title") == "0.1.0":
+                break
+            time.sleep(0.1)
+        assert str(evaluate("location.href")).endswith("/0.1.0/docs/index.html")
+        server.shutdown()
+
+
+@pytest.mark.long
+def test_every_link_of_the_site_leads_somewhere(built_site: Path) -> None:
+    site = built_site
     pages = {path: References(path.read_text()) for path in site.rglob("*.html")}
     assert len(pages) > len(PAGES)
     for path, page in pages.items():
@@ -146,5 +204,4 @@ def test_the_site_is_built_without_a_warning_and_every_link_leads_somewhere(tmp_
             assert f">{name}</span>" in interface, name
     assert "searchindex" in (site / "search.html").read_text()
     assert "docs/tutorial" in (site / "searchindex.js").read_text()
-    assert "docs/index.html" in (site / "index.html").read_text()
     assert "data-theme" in (site / "docs" / "index.html").read_text()

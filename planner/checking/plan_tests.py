@@ -132,6 +132,12 @@ def task_done(e: Evidence) -> Iterator[PlanTestResult]:
             yield PlanTestResult(
                 name, max(errors), limit, unit, text, _which(e, int(np.argmax(errors)))
             )
+    least = None if task.margins is None else task.margins.lift_off_speed
+    if least is not None:
+        slowest = min(float(r.com_velocity[start, 2]) for start, _ in r.flights)
+        yield PlanTestResult(
+            "lift_off_speed", least - slowest, 5e-3, "m/s", "what it lacks of the least one"
+        )
     standing = [*_standing_knots(e), -1]
     goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
     missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)

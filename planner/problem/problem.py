@@ -402,12 +402,14 @@ class ProblemBuilder:
     def _fill_take_off(self, k: int) -> None:
         hop, stretch = self.structure.hop_at(k)[0], self.of_knot[k]
         rise = self.stances[stretch.place].com[2] + (hop.rise or 0.0)
-        speed = hop.take_off_speed or 0.0
+        speeds = (self.margins.lift_off_speed or 0.0, np.inf)
+        if hop.take_off_speed is not None:
+            speeds = (hop.take_off_speed, hop.take_off_speed)
         lift_off, touchdown = self.task.lift_off_momentum, self.task.touchdown_momentum
         given = lift_off if stretch.flies else touchdown
         most = np.inf if given is None else given
         self._rows("take_off", k, [
-            ("apex", 1, rise, rise), ("take-off speed", 1, speed, speed),
+            ("apex", 1, rise, rise), ("take-off speed", 1, *speeds),
             ("angular momentum", 3, -most, most),
         ])  # fmt: skip
 

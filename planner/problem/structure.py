@@ -334,7 +334,10 @@ class Structure:
         kept = []
         if lift_off:
             hop = self.hops[stretch.place]
-            kept = [0] if hop.rise is not None else [1] if hop.take_off_speed is not None else []
+            margins = self.task.margins
+            least = None if margins is None else margins.lift_off_speed
+            kept = [0] if hop.rise is not None else []
+            kept += [1] if hop.take_off_speed is not None or least is not None else []
         elif not self.is_touchdown(before, stretch) or self.task.touchdown_momentum is None:
             return None
         most = self.task.lift_off_momentum if lift_off else self.task.touchdown_momentum

@@ -51,6 +51,10 @@ class Margins(Parameters):
         text="least share of the robot's weight that the ground bears until lift-off, alike at every contact "
         "point that touches it; None: a contact point may bear nothing",
     )  # fmt: skip
+    lift_off_speed: float | None = parameter(
+        None, unit="m/s", gt=0.0, le=20.0,
+        text="least vertical speed of the centre of mass at lift-off, in a jump that is given by its rise; None: any",
+    )  # fmt: skip
     touchdown_speed: float | None = parameter(
         None, unit="m/s", gt=0.0, le=20.0,
         text="largest downward speed of a contact point where it hits the ground with an impact; "

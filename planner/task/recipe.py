@@ -12,6 +12,7 @@ the ground follow from the robot:
 - until lift-off every contact point on the ground bears some load, so that the feet stay flat;
 - feet come down slowly, and more slowly still along the ground; from high up the toes touch down
   before the heels;
+- a jump that is low beside the robot leaves the ground with a least speed;
 - from touchdown on the torso leans little and the knees are bent; joints keep off their limits.
 
 A parameter that the task sets is kept: ``effort``, ``impact``, ``phases``, a time, or any single one of
@@ -62,6 +63,10 @@ SQUAT, DEEP_SQUAT = 0.4, 0.5
 DEEP, DEEP_BACK = (0.65, 0.75), (0.8, 0.9)
 """Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
 number the squat begins to be a deep one, and from the second on it wholly is."""
+LOW, FLOWN = 0.1, 0.75
+"""Up to which rise, as a multiple of the centre of mass's height, a robot with toes is asked to fly a share of the
+rise, and that share. Without it such a jump is hardly more than standing up onto the toes, and the toes, which
+leave the ground some milliseconds late, take away more of its speed than the plan has to spare."""
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, TOUCHDOWN_ROLL = 1.7, 0.6, 1.2
 """m/s of the feet at touchdown, downwards and along the ground, of soles and of balls, which roll on, for a robot of
 BRUCE's size."""
@@ -273,6 +278,13 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         share = round(LOAD + deep(task, robot) * (DEEP_LOAD - LOAD), 2)
         yield Choice(
             "margins.load", share, "it does not squat so fast that its feet lose the ground"
+        )
+    rise = min(_rise(hop) for hop in hops)
+    low = 0.0 < rise < LOW * size_of(robot).height and toe_name_token(robot)
+    if "lift_off_speed" not in said and low and all(hop.rise for hop in hops):
+        speed = rounded(math.sqrt(2.0 * GRAVITY * FLOWN * rise))
+        yield Choice(
+            "margins.lift_off_speed", speed, "it flies, and does not only stand up onto its toes"
         )
     if "landing_lean" not in said:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")

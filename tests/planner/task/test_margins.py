@@ -104,6 +104,20 @@ def test_a_plan_hits_the_ground_no_faster_than_it_may() -> None:
     assert "touchdown_speed" in check_plan(replace(plan, task=faster), ROBOT).explain()
 
 
+def test_a_plan_leaves_the_ground_no_slower_than_it_may() -> None:
+    jump = {"recipe": "paper", "name": "a", "rise": 0.09}
+    free = solve_jump(make_task(jump), ROBOT)
+    lift_off = int(np.argmax(free.phase == Phase.FLIGHT))
+    speed = float(free.com_velocity[lift_off, 2])
+    wanted = round(speed + 0.1, 3)
+    faster = make_task({**jump, "margins": {"lift_off_speed": wanted}})
+    assert "lift_off_speed" in check_plan(replace(free, task=faster), ROBOT).explain()
+    plan = solve_jump(faster, ROBOT)
+    assert check_plan(plan, ROBOT).explain() == ""
+    lift_off = int(np.argmax(plan.phase == Phase.FLIGHT))
+    assert plan.com_velocity[lift_off, 2] == pytest.approx(wanted, abs=1e-4)
+
+
 def test_the_landing_has_the_tasks_effort_unless_the_margins_say_another() -> None:
     asked = {"name": "a", "rise": 0.1, "effort": 0.8}
     assert make_task({**asked, "margins": None}).landing_effort == 0.8

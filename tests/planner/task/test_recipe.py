@@ -1,5 +1,7 @@
 """What a task of a few lines leaves unsaid is chosen from task and robot; what it says stays."""
 
+import math
+
 import pytest
 from tests.robots.limbed_robots import quadruped
 
@@ -133,6 +135,19 @@ def test_a_step_is_kept_away_from_and_not_lain_down_in_front_of(
     assert (margins.squat_lean, margins.step) == (lean, gap)
     row = resolved(landing_height=height, repeat=2).margins
     assert row is not None and row.squat_lean is None, "in a row nothing squats in front of a step"
+
+
+def test_a_jump_that_is_low_beside_the_robot_leaves_the_ground_with_a_least_speed() -> None:
+    def least(robot: str, rise: float) -> float | None:
+        margins = make_task({"name": "a", "rise": rise}).resolved(find_robot(robot)).margins
+        assert margins is not None
+        return margins.lift_off_speed
+
+    assert least("g1", 0.05) == pytest.approx(math.sqrt(2.0 * 9.81 * 0.75 * 0.05), abs=0.005)
+    assert least("g1", 0.1) is None
+    assert least("bruce", 0.05) is None  # he is half as high
+    assert least("bruce", 0.03) is not None
+    assert least("go2", 0.02) is None  # balls have no toes to stand up onto
 
 
 @pytest.mark.parametrize(
