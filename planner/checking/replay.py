@@ -154,7 +154,8 @@ class _Flight:
 
 def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     """The flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
-    passed, steps, times, knots = [np.zeros(1)], list[Array](), list[Array](), list[int]()
+    passed: list[Array] = [np.zeros(1)]
+    steps, times, knots = list[Array](), list[Array](), list[int]()
     for k in range(lift_off, touchdown):
         duration = float(plan.time[k + 1] - plan.time[k])
         # An even number of steps, so that the interval's middle is among them.
