@@ -161,7 +161,7 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
         # An even number of steps, so that the interval's middle is among them.
         count = 2 * math.ceil(0.5 * duration / FLIGHT_STEP)
         step = duration / count
-        passed.append(0.5 * step * np.arange(1, 2 * count + 1))
+        passed.append(np.asarray(0.5 * step * np.arange(1, 2 * count + 1), dtype=np.float64))
         steps.append(np.full(count, step))
         times.append(plan.time[k] + step * np.arange(1, count + 1))
         knots += [k] * count
