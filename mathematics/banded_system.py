@@ -69,6 +69,8 @@ def factorise_band(equations: int, regularisation: float, band: Array2D, last: I
     Two columns are eliminated together, so that a row of the band is read and written once for both. Each entry
     loses their products in the same order as one by one.
 
+    Of ``band`` the last diagonal must be zero, and wherever ``assemble_normal`` writes zeros.
+
     Returns whether all pivots are positive.
     """
     for j in range(equations):

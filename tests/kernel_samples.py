@@ -210,7 +210,7 @@ UNUSED = {
         np.zeros((3, 3)), np.zeros(3, dtype=np.int64),
     ),
     "aloft.mathematics.banded_system.factorise_band": (
-        3, 1e-3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]),
+        3, 1e-3, np.array([[3.0, 0.5, 0.0], [4.0, -0.7, 0.0], [2.0, 0.0, 0.0]]), np.array([1, 2, 2]),
     ),
     "aloft.mathematics.banded_system.solve_band": (
         3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
