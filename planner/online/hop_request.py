@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 from ..task.sequence import PhaseSpec
@@ -93,6 +94,7 @@ def _rounded(value: float) -> float:
     return round(value, 3)
 
 
+@lru_cache(maxsize=4)
 def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
     """The task of the requested jump of a robot, whose apex is ``rise`` [m] above standing on level ground.
 
