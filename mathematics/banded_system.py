@@ -12,6 +12,9 @@ import math
 from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .kernel import kernel
 
+TOGETHER = 2
+"""Columns that are eliminated together."""
+
 
 @kernel
 def assemble_normal(
@@ -26,11 +29,25 @@ def assemble_normal(
         place: which equation a row is, ascending, and -1 of those left out.
         equations: how many are chosen.
 
-    Returns whether all of it is inside of the band.
+    Returns whether all of it is inside of the band, of which the last diagonal stays zero.
     """
     for j in range(equations):
         last[j] = j
-        for k in range(band.shape[1]):
+    for column in range(inverse_weights.shape[0]):
+        end = -1
+        for a in range(starts[column + 1] - 1, starts[column] - 1, -1):
+            j = place[rows[a]]
+            if j >= 0 and values[a] != 0.0:
+                end = max(end, j)
+                last[j] = max(last[j], end)
+    # The factor fills what is above the last row of any column before, and columns are eliminated together.
+    reach = 0
+    for j in range(equations):
+        for i in range(j, min(j + TOGETHER, equations)):
+            reach = max(reach, last[i])
+        if reach - j >= band.shape[1]:
+            return False
+        for k in range(reach - j + 1):
             band[j, k] = 0.0
     for column in range(inverse_weights.shape[0]):
         for a in range(starts[column], starts[column + 1]):
@@ -40,10 +57,7 @@ def assemble_normal(
                 for b in range(a, starts[column + 1]):
                     i = place[rows[b]]
                     if i >= 0:
-                        if i - j >= band.shape[1]:
-                            return False
                         band[j, i - j] += value * values[b]
-                        last[j] = max(last[j], i)
     return True
 
 
@@ -52,24 +66,44 @@ def factorise_band(equations: int, regularisation: float, band: Array2D, last: I
     """The Cholesky factor, in place. To its diagonal the matrix gets that share of it. An equation without
     a variable that may change, whose diagonal is zero, holds nothing.
 
+    Two columns are eliminated together, so that a row of the band is read and written once for both. Each entry
+    loses their products in the same order as one by one.
+
+    Of ``band`` the last diagonal must be zero, and wherever ``assemble_normal`` writes zeros.
+
     Returns whether all pivots are positive.
     """
     for j in range(equations):
         band[j, 0] = band[j, 0] * (1.0 + regularisation) if band[j, 0] > 0.0 else 1.0
-    for j in range(equations):
-        pivot = band[j, 0]
-        if not 0.0 < pivot < math.inf:
-            return False
-        root = math.sqrt(pivot)
-        width = last[j] - j
-        for k in range(width + 1):
-            band[j, k] = band[j, k] / root
-        for k in range(1, width + 1):
-            value = band[j, k]
-            if value != 0.0:
-                for m in range(width - k + 1):
-                    band[j + k, m] = band[j + k, m] - value * band[j, k + m]
-                last[j + k] = max(last[j + k], last[j])
+    for first in range(0, equations, TOGETHER):
+        stop = min(first + TOGETHER, equations)
+        end = first
+        for j in range(first, stop):
+            pivot = band[j, 0]
+            if not 0.0 < pivot < math.inf:
+                return False
+            root = math.sqrt(pivot)
+            width = last[j] - j
+            for k in range(width + 1):
+                band[j, k] = band[j, k] / root
+            for k in range(1, width + 1):
+                if band[j, k] != 0.0:
+                    last[j + k] = max(last[j + k], last[j])
+            for k in range(1, min(width + 1, stop - j)):
+                value = band[j, k]
+                if value != 0.0:
+                    for m in range(width - k + 1):
+                        band[j + k, m] = band[j + k, m] - value * band[j, k + m]
+            end = max(end, last[j])
+        if stop - first < TOGETHER:
+            return True
+        # Sums of numbers that are not negative, so that no index can count from the end.
+        for k in range(1, end - stop + 2):
+            one, two = band[first, k + 1], band[first + 1, k]
+            if one != 0.0 or two != 0.0:
+                for m in range(end - stop - k + 2):
+                    value = band[first + 1 + k, m] - one * band[first, k + 1 + m]
+                    band[first + 1 + k, m] = value - two * band[first + 1, k + m]
     return True
 
 

@@ -207,17 +207,17 @@ UNUSED = {
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
-        np.zeros((3, 2)), np.zeros(3, dtype=np.int64),
+        np.zeros((3, 3)), np.zeros(3, dtype=np.int64),
     ),
     "aloft.mathematics.banded_system.factorise_band": (
-        3, 1e-3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]),
+        3, 1e-3, np.array([[3.0, 0.5, 0.0], [4.0, -0.7, 0.0], [2.0, 0.0, 0.0]]), np.array([1, 2, 2]),
     ),
     "aloft.mathematics.banded_system.solve_band": (
         3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
     ),
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
-        np.array([3]), 1e-12, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), NORMAL(3),
+        np.array([3]), 1e-12, np.zeros((3, 3)), np.zeros(3, dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
     "aloft.mathematics.ground_surface.height_of_slope": (

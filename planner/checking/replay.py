@@ -24,7 +24,6 @@ from ..models.exact_dynamics import (
     Stretch,
     dynamics_of,
     half_steps,
-    joint_motion,
     joint_motions,
     rotation_between,
 )
@@ -155,26 +154,25 @@ class _Flight:
 
 def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     """The flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
-    angles, speeds = list[Array](), list[Array]()
-    steps, times, knots = list[Array](), list[Array](), list[NDArray[np.int64]]()
+    passed: list[Array] = [np.zeros(1)]
+    steps, times, knots = list[Array](), list[Array](), list[int]()
     for k in range(lift_off, touchdown):
-        joints = joint_motion(plan.position, plan.velocity, plan.time, k)
-        duration = float(joints.duration)
+        duration = float(plan.time[k + 1] - plan.time[k])
         # An even number of steps, so that the interval's middle is among them.
         count = 2 * math.ceil(0.5 * duration / FLIGHT_STEP)
         step = duration / count
-        own = joints.at(np.asarray(0.5 * step * np.arange(2 * count + 1)[:, None]))
-        kept = slice(1 if angles else 0, None)
-        angles.append(own[0][kept])
-        speeds.append(own[1][kept])
+        passed.append(np.asarray(0.5 * step * np.arange(1, 2 * count + 1), dtype=np.float64))
         steps.append(np.full(count, step))
         times.append(plan.time[k] + step * np.arange(1, count + 1))
-        knots.append(np.full(count, k))
+        knots += [k] * count
+    of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
+    joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
+    angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
     stretch = Stretch(
-        plan.position[lift_off, :7], plan.velocity[lift_off, :6], np.concatenate(angles),
-        np.concatenate(speeds), np.zeros(plan.contact_force.shape[1:]), np.concatenate(steps),
+        plan.position[lift_off, :7], plan.velocity[lift_off, :6], angles, speeds,
+        np.zeros(plan.contact_force.shape[1:]), np.concatenate(steps),
     )  # fmt: skip
-    return _Flight(stretch, np.concatenate(times), np.concatenate(knots))
+    return _Flight(stretch, np.concatenate(times), np.array(knots))
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:

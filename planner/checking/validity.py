@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,7 @@ class ValidityReport:
         """The report as plain data, as it stands in a plan's file."""
         return {
             "valid": self.valid,
-            "tests": [asdict(test) for test in self.tests],
+            "tests": [dict(vars(test)) for test in self.tests],
             "figures": dict(self.figures),
         }
 

@@ -216,19 +216,25 @@ class ExactDynamics:
         shapes = (place, place, place, points, of_feet, of_feet, angle, angle)
         found = FeetStates(*(np.empty(shape) for shape in shapes))
         jacobians = np.empty((count, feet, 6, model.nv))
-        up = np.empty((count, feet, 3))
+        turns = np.empty((count, feet, 3, 3))
+        base = np.empty((count, 3, 3))
+        # What Pinocchio places is written in memory that stays, which is looked up once.
+        of_contacts = [data.oMf[frame].translation for frame in self.contact_frames]
+        of_soles = [data.oMf[frame].translation for frame in self.sole_frames]
+        of_turns = [data.oMf[frame].rotation for frame in self.sole_frames]
+        of_base = data.oMi[1].rotation
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             moved = pin.computeCentroidalMomentum(model, data, q, v)
             found.com[i], found.com_velocity[i] = data.com[0], moved.linear
             found.momentum[i] = moved.angular
             pin.computeJointJacobians(model, data, q)
             pin.updateFramePlacements(model, data)
-            found.points[i] = self._contact_places()
-            found.soles[i] = self._places(self.sole_frames)
-            found.yaw[i], found.pitch[i] = self.foot_angles()
+            found.points[i] = self._contact_places() if self.balls else of_contacts
+            found.soles[i], turns[i], base[i] = of_soles, of_turns, of_base
             for foot, frame in enumerate(self.sole_frames):
                 jacobians[i, foot] = pin.getFrameJacobian(model, data, frame, axes)
-                up[i, foot] = data.oMf[frame].rotation[:, 2]
+        found.yaw[:], found.pitch[:] = self._angles(turns, base)
+        up = turns[..., 2]
         found.com_velocity[:] /= self.mass
         rates = np.add.reduce(jacobians * velocity[:, None, None, :], axis=-1)
         found.sole_velocity[:] = rates[:, :, :3]
@@ -242,12 +248,20 @@ class ExactDynamics:
     def foot_angles(self) -> tuple[Array, Array]:
         """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
         last. A ball has none of its own: it has the base's heading and no pitch."""
-        ahead = [self.data.oMf[frame].rotation[:, 0] for frame in self.sole_frames]
-        base = self.data.oMi[1].rotation
-        yaw = np.array([math.atan2(y, x) for x, y, _ in ahead])
-        pitch = np.array([math.atan2(-z, math.hypot(x, y)) for x, y, z in ahead])
+        turns = [self.data.oMf[frame].rotation for frame in self.sole_frames]
+        yaw, pitch = self._angles(
+            np.array(turns).reshape(1, -1, 3, 3), np.array(self.data.oMi[1].rotation)[None]
+        )
+        return yaw[0], pitch[0]
+
+    def _angles(self, turns: Array, base: Array) -> tuple[Array, Array]:
+        """The same, both (n, n_feet), of feet (n, n_feet, 3, 3) and a base (n, 3, 3) turned like that."""
+        ahead = turns[..., 0]
+        each, shape = ahead.reshape(-1, 3).tolist(), ahead.shape[:-1]
+        yaw = np.array([math.atan2(y, x) for x, y, _ in each]).reshape(shape)
+        pitch = np.array([math.atan2(-z, math.hypot(x, y)) for x, y, z in each]).reshape(shape)
         for ball in self.balls:
-            yaw[ball.foot], pitch[ball.foot] = np.arctan2(base[1, 0], base[0, 0]), 0.0
+            yaw[:, ball.foot], pitch[:, ball.foot] = np.arctan2(base[:, 1, 0], base[:, 0, 0]), 0.0
         return yaw, pitch
 
     def _contact_places(self) -> Array:

@@ -101,6 +101,7 @@ class StanceFinder:
         self.robot, self.pairs = robot, tuple(pairs)
         self._body = ExactDynamics(robot)
         self._placed: dict[tuple[bytes, StanceLocation], Stance] = {}
+        self._levelled: dict[bytes, Array] = {}
 
     def on_ground(self, joints: Array, place: StanceLocation) -> Stance:
         """The stance at a place. On ground that leans the base is as upright as on level ground, and
@@ -165,6 +166,20 @@ class StanceFinder:
             q[6:] += step * min(1.0, 0.3 / max(np.abs(step).max(), 1e-12))
         return q
 
+    def _level(self, joints: Array) -> Array:
+        """The coordinates with those joints, over the origin, whose base leans as in ``place``."""
+        key = joints.tobytes()
+        if key not in self._levelled:
+            if len(self._levelled) > MOST_PLACED:
+                self._levelled.clear()
+            q = np.concatenate([np.zeros(6), symmetrised_angles(self.pairs, joints)])
+            for _ in range(LEANS):
+                # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
+                points = self._body.points(pose_of(q))
+                q[3:5] = _lean(_base_rotation(q).T @ _normal(points))
+            self._levelled[key] = q
+        return self._levelled[key].copy()
+
     def place(
         self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
     ) -> Stance:
@@ -176,13 +191,9 @@ class StanceFinder:
             PlanError: the contact points do not lie in one plane with these joint angles, or there
                 are none.
         """
-        q = np.concatenate([np.zeros(6), symmetrised_angles(self.pairs, joints)])
         if not self.robot.contacts:
             raise PlanError(f"{self.robot.name} has no contact points to stand on", family="stance")
-        for _ in range(LEANS):
-            # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
-            points = self._body.points(pose_of(q))
-            q[3:5] = _lean(_base_rotation(q).T @ _normal(points))
+        q = self._level(joints)
         if heading:  # turn the leaning pose as a whole: R = Rz(heading) R(lean)
             q[3:6] = _turned(q, heading)
         points = self._body.points(pose_of(q))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 from ..task.sequence import PhaseSpec
@@ -61,6 +62,7 @@ def _clip(value: float, least: float, most: float) -> float:
     return min(max(value, least), most)
 
 
+@lru_cache(maxsize=4)
 def task_of(wanted: HopRequest, robot: str = "bruce") -> JumpTask:
     """The task of the requested jump.
 

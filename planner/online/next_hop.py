@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 from ...blocks.signals import PlanOutcome
 from ...robots.description import RobotDescription
 from ..checking.validity import checked
-from ..problem.guess import ballistic_guess
 from ..problem.problem import FullProblem
 from ..problem.unpacking import can_start, pack, unpack
-from ..solving.solve import make_problem
 from ..task.plan import PlannedJump
 from .correction import Corrector
+from .hop_problems import HopProblems
 from .hop_request import HopRequest, coarse, task_of, within_reach
 from .plan_samples import PlanSamples
 
@@ -47,6 +46,7 @@ class HopPlanner:
     def __init__(self, robot: RobotDescription, samples: PlanSamples, steps: PlanSamples) -> None:
         self.robot = robot
         self._level, self._steps = samples, steps
+        self._problems = HopProblems(robot)
         self._correctors: dict[object, Corrector] = {}
 
     def prepare(self) -> None:
@@ -98,12 +98,12 @@ class HopPlanner:
         task = coarse(task_of(wanted, self.robot.name).resolved(self.robot))
         straight = not wanted.aside and not wanted.turn
         coordinates = "sagittal" if straight else "full"
-        problem = make_problem(task, self.robot, coordinates=coordinates)
+        problem = self._problems.problem(task, coordinates)
         plan, steps = None, 0
         for near in self._guesses(wanted):
             if not can_start(problem, near):
                 continue
-            guess = pack(problem, near, ballistic_guess(problem))
+            guess = pack(problem, near)
             found = self._corrector(problem).correct(problem, guess)
             steps += found.steps
             if found.solved:

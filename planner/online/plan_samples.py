@@ -110,8 +110,9 @@ def differences(requests: Array, wanted: HopRequest) -> Array:
 
 def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:
     """The weighted sum over the first axis."""
-    flat = rows.reshape(len(rows), -1).astype(np.float64)
-    return np.asarray((weights[:, None] * flat).sum(axis=0).reshape(rows.shape[1:]))
+    used = np.flatnonzero(weights)
+    flat = rows.reshape(len(rows), -1)[used].astype(np.float64)
+    return np.asarray((weights[used, None] * flat).sum(axis=0).reshape(rows.shape[1:]))
 
 
 def samples_of(

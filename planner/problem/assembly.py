@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class Assembly:
         """Whether CasADi's virtual machine evaluates the pieces."""
         return any(piece.value.class_name() != "External" for piece in self.pieces.values())
 
-    @property
+    @cached_property
     def signature(self) -> tuple[object, ...]:
         """Equal for problems of the same structure and functions."""
         shape = tuple(

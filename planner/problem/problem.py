@@ -7,8 +7,9 @@ chooses, and so is that of any other phase whose time is free.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ from .structure import Structure
 
 BODY_CLEARANCE = 0.002
 """m; what a body between two knots may come nearer to a step than at them."""
+LEADING = ("contact", "take_off", "air", "obstacle")
+"""The pieces that depend on where the task leads."""
 Rows = tuple[str, int, float, float]
 """Constraint rows that follow each other: their family, their number and their bounds."""
 
@@ -141,26 +144,55 @@ class ProblemBuilder:
             self.parameters, self.families, self.task, self.model, self.coordinates,
             self.stances, self.stretches, self.steps, self.exact,
         )  # fmt: skip
-        fill: Mapping[str, Callable[[int], None]] = {
-            "stance": self._fill_stance,
-            "free_stance": self._fill_stance,
-            "flight": self._fill_flight,
-            "impact": self._fill_impact,
-            "contact": self._fill_contact,
-            "take_off": self._fill_take_off,
-            "air": self._fill_air,
-            "obstacle": self._fill_obstacle,
-        }
         for k in range(len(self.of_knot) + 1):
             self._bound_state(k)
-            for row, (_, value, family) in zip(
-                self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
-            ):
-                self.row_lower[row] = self.row_upper[row] = value
-                self.families[row] = family
+            self._give(k)
             for name in self.assembly.knots[k].pieces:
-                fill[name](k)
+                self._fill(name, k)
         return self.problem
+
+    def moved(self, task: JumpTask, stances: Sequence[Stance]) -> FullProblem:
+        """The built problem for a task that leads elsewhere: only distances, turn, rise and landing height may differ,
+        with the same signs, so that the structure is the same. What does not follow from them is not worked out again."""
+        other, built = copy(self), self.problem
+        other.task, other.structure = task, self.structure.moved(task, stances)
+        other.stances, other.hops = other.structure.stances, other.structure.hops
+        other.lower, other.upper = self.lower.copy(), self.upper.copy()
+        other.row_lower, other.row_upper = self.row_lower.copy(), self.row_upper.copy()
+        other.parameters, other.families = self.parameters.copy(), self.families.copy()
+        other._nominal, other._tables = {}, self._tables.copy()
+        other.problem = replace(
+            built, task=task, stances=other.stances, lower=other.lower, upper=other.upper,
+            row_lower=other.row_lower, row_upper=other.row_upper, parameters=other.parameters,
+            families=other.families,
+        )  # fmt: skip
+        for k, stretch in enumerate(self.of_knot):
+            begins = stretch.place == 0 and not stretch.flies
+            if not begins:
+                other._bound_lean(k)
+                if not stretch.impact:
+                    other._set(stretch.piece, k, nominal=other.nominal(k))
+            for name in self.assembly.knots[k].pieces:
+                if name in LEADING and not (begins and name == "contact"):
+                    other._fill(name, k)
+        end = len(self.of_knot)
+        other._give(end)
+        for name in self.assembly.knots[end].pieces:
+            other._fill(name, end)
+        return other.problem
+
+    def _fill(self, name: str, k: int) -> None:
+        """Bounds and parameters of a piece on a knot."""
+        fill = self._fill_stance if name == "free_stance" else getattr(self, f"_fill_{name}")
+        fill(k)
+
+    def _give(self, k: int) -> None:
+        """Bounds of the rows of a knot's variables that are given."""
+        for row, (_, value, family) in zip(
+            self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
+        ):
+            self.row_lower[row] = self.row_upper[row] = value
+            self.families[row] = family
 
     # Bounds of the variables
 
@@ -176,10 +208,7 @@ class ProblemBuilder:
             limits = limits[list(self.coordinates.moving)]
             self.lower[start + base : start + n] = limits[:, 0]
             self.upper[start + base : start + n] = limits[:, 1]
-            lean = self._most_lean(k)
-            pitch = start + self.free_base.index(3)
-            nominal = float(self.nominal(k)[pitch - start])
-            self.lower[pitch], self.upper[pitch] = nominal - lean, nominal + lean
+            self._bound_lean(k)
         if k == 0 and stretch.timed:
             self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
         control = int(self.assembly.control_start[k])
@@ -191,6 +220,12 @@ class ProblemBuilder:
         following = self.of_knot[k + 1] if knot.hold is not None else None
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
+
+    def _bound_lean(self, k: int) -> None:
+        """How far the torso may lean at a knot behind the first."""
+        pitch, lean = self.free_base.index(3), self._most_lean(k)
+        nominal, at = float(self.nominal(k)[pitch]), int(self.assembly.state_start[k]) + pitch
+        self.lower[at], self.upper[at] = nominal - lean, nominal + lean
 
     def _least_load(self, stretch: ProblemPhase) -> float:
         """The least upward force of every contact point on the ground [N]."""

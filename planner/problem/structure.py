@@ -14,6 +14,7 @@ if it adds to the rank.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from functools import lru_cache
 
 import numpy as np
@@ -157,11 +158,9 @@ class Structure:
         pieces: Mapping[str, StageFunction],
         stances: Sequence[Stance],
     ) -> None:
-        self.task = task
-        self.coordinates, self.pieces, self.stances = coordinates, pieces, tuple(stances)
+        self.coordinates, self.pieces = coordinates, pieces
         self.n, self.forces = coordinates.size, coordinates.forces
-        self.hops, self.places = task.hops(), task.places()
-        self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
+        self._lead(task, stances)
         self.stretches = layout(task, model.robot)
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
@@ -202,16 +201,33 @@ class Structure:
             self._give(k, knot, stretch, after if holds else None)
             knots.append(knot)
         # The last interval leads to a knot that has no interval length among its states.
-        base = len(self.coordinates.free_base)
-        at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
-        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
-        self.given[end] = values + [(n + i, 0.0, "stance") for i in range(n)]
+        self.given[end] = self._given_at_the_end()
         fixed = tuple(i for i, _, _ in self.given[end])
         last = Knot(2 * n, 0, fixed=fixed)
         obstacle = self._obstacle_rows(end)
         if knees_fold and len(obstacle):  # where the base is given, knees can still fold
             last.pieces["obstacle"] = (np.arange(n), obstacle)
         return [*knots, last]
+
+    def _given_at_the_end(self) -> list[tuple[int, float, str]]:
+        """There the robot stands still."""
+        at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
+        base = len(self.coordinates.free_base)
+        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
+        return values + [(self.n + i, 0.0, "stance") for i in range(self.n)]
+
+    def moved(self, task: JumpTask, stances: Sequence[Stance]) -> Structure:
+        """That of a task of the same structure that leads elsewhere, see ``ProblemBuilder.moved``."""
+        found = copy(self)
+        found._lead(task, stances)
+        found.given = self.given | {len(self.of_knot): found._given_at_the_end()}
+        return found
+
+    def _lead(self, task: JumpTask, stances: Sequence[Stance]) -> None:
+        """Take on where the task leads."""
+        self.task, self.stances = task, tuple(stances)
+        self.hops, self.places = task.hops(), task.places()
+        self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
 
     def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:
         """What is given at a knot: the start, forces on points without contact, a next time."""

@@ -15,6 +15,8 @@ from ..models.euler_angles import coordinates_of, pose_of, twist_of
 from ..models.symbolic_model import SymbolicModel, centroidal_momentum
 from ..task.plan import PlannedJump
 from ..task.sequence import LEVEL, ground_axes
+from .guess import ballistic_guess
+from .layout import ProblemPhase
 from .problem import FullProblem
 
 Phases = Sequence[int]
@@ -92,17 +94,17 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
     for stretch in problem.stretches:
-        for k in range(stretch.first, stretch.stop):
-            control = assembly.control_start[k]
-            impacts[k] = stretch.impact
-            grounded[k, list(stretch.contacts)] = True
-            if not stretch.impact:
-                bend[k] = coordinates.matrix @ values[control : control + n]
-            if not stretch.flies:
-                pushed = values[control + n : control + n + coordinates.forces]
-                force[k] = coordinates.force_matrix @ pushed
-                force[k].reshape(-1, 3)[~grounded[k]] = 0.0
-                _turn_forces(problem, k, force[k], to_world=True)
+        here = slice(stretch.first, stretch.stop)
+        control = assembly.control_start[here, None] + np.arange(n)
+        impacts[here] = stretch.impact
+        grounded[here, list(stretch.contacts)] = True
+        if not stretch.impact:
+            bend[here] = values[control] @ coordinates.matrix.T
+        if not stretch.flies:
+            pushed = values[control[:, :1] + n + np.arange(coordinates.forces)]
+            force[here] = pushed @ coordinates.force_matrix.T
+            force.reshape(count, -1, 3)[here][~grounded[here]] = 0.0
+            _turn_forces(problem, stretch, force[here], to_world=True)
     phases = [int(phase) for phase in problem.phases]
     for array in (bend, force, grounded):
         array[-1] = array[-2]
@@ -133,13 +135,16 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     }
 
 
-def _turn_forces(problem: FullProblem, k: int, force: Array, *, to_world: bool) -> None:
-    """Turn the forces at a knot (3 n_contacts) from the axes of the ground that it stands on to the
+def _turn_forces(
+    problem: FullProblem, stretch: ProblemPhase, force: Array, *, to_world: bool
+) -> None:
+    """Turn the forces in a stretch (n, 3 n_contacts) from the axes of the ground that it stands on to the
     world's, or back, in place."""
-    slope = problem.stances[problem.stretch_at(k).place].slope
+    slope = problem.stances[stretch.place].slope
     if slope != LEVEL:
         axes = ground_axes(slope)
-        force[:] = (force.reshape(-1, 3) @ (axes.T if to_world else axes)).ravel()
+        for each in force:
+            each[:] = (each.reshape(-1, 3) @ (axes.T if to_world else axes)).ravel()
 
 
 def _middles_in_flight(
@@ -149,15 +154,15 @@ def _middles_in_flight(
     """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
     coordinates, assembly = problem.coordinates, problem.assembly
     own = list(coordinates.turning)
+    base = slice(3, 6)
     for flight in problem.flights:
-        for k in flight:
-            start = assembly.control_start[k] + coordinates.size
-            rates = np.zeros(coordinates.size)
-            rates[own] = values[start : start + len(own)]
-            base = slice(3, 6)
-            moving[k, base] = (coordinates.matrix @ rates)[base]
-            middle[k, base] = 0.5 * (q[k, base] + q[k + 1, base])
-            middle[k, base] += 0.125 * steps[k] * (v[k, base] - v[k + 1, base])
+        here, behind = slice(flight.start, flight.stop), slice(flight.start + 1, flight.stop + 1)
+        rates = np.zeros((len(flight), coordinates.size))
+        start = assembly.control_start[here, None] + coordinates.size
+        rates[:, own] = values[start + np.arange(len(own))]
+        moving[here, base] = (rates @ coordinates.matrix.T)[:, base]
+        middle[here, base] = 0.5 * (q[here, base] + q[behind, base])
+        middle[here, base] += 0.125 * steps[here, None] * (v[here, base] - v[behind, base])
 
 
 def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
@@ -178,11 +183,11 @@ def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
     )
 
 
-def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
-    """Variables near a plan of a task like this one; ``guess`` elsewhere.
+def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) -> Array:
+    """Variables near a plan of a task like this one.
 
     The plan may have other numbers of knots: it is followed phase by phase, and must go through
-    the same phases.
+    the same phases. Only then the interval lengths of a ``guess`` are needed.
     """
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
@@ -191,39 +196,41 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array) -> Array:
     instants = plan.time
     if not _same_grid(problem, plan):
         phases = [int(phase) for phase in problem.phases]
-        lengths = np.diff(knot_times(problem, guess))
+        lengths = np.diff(knot_times(problem, ballistic_guess(problem) if guess is None else guess))
         instants = matching_times(plan.time, plan.phase[:-1].tolist(), lengths, phases)
         q, v = states_at(instants, plan.time, q, v)
         force = means_over(instants, plan.time, force)
         steps = np.diff(instants)
-    means = {s: float(instants[s.stop] - instants[s.first]) / s.count for s in problem.stretches}
-    values = guess.copy()
+    values = np.empty(assembly.variables)
     place, rate = coordinates.reduce(q), coordinates.reduce(v)
     force = force.copy()
-    for k in range(len(force)):
-        _turn_forces(problem, k, force[k], to_world=False)
+    for stretch in problem.stretches:
+        _turn_forces(problem, stretch, force[stretch.first : stretch.stop], to_world=False)
     pushes = coordinates.reduce_forces(force)
-    for k in range(problem.knots):
-        start, control = assembly.state_start[k], assembly.control_start[k]
-        values[start : start + n] = place[k]
-        values[start + n : start + 2 * n] = rate[k]
-        if k == problem.knots - 1:
-            break
-        stretch = problem.stretch_at(k)
-        bend = (rate[k + 1] - rate[k]) / (1.0 if stretch.impact else steps[k])
-        values[control : control + n] = bend
+    own = np.arange(n)
+    values[assembly.state_start[:, None] + own] = place
+    values[assembly.state_start[:, None] + n + own] = rate
+    turning = np.array(coordinates.turning, dtype=np.int64)
+    before: int | None = None
+    for stretch in problem.stretches:
+        here = slice(stretch.first, stretch.stop)
+        behind = slice(stretch.first + 1, stretch.stop + 1)
+        control = assembly.control_start[here, None]
+        step = 1.0 if stretch.impact else steps[here, None]
+        values[control + own] = (rate[behind] - rate[here]) / step
+        if stretch.flies:
+            turned = (place[behind] - place[here]) / steps[here, None]
+            rates = 1.5 * turned - 0.25 * (rate[here] + rate[behind])
+            values[control + n + np.arange(len(turning))] = rates[:, turning]
+        else:
+            values[control + n + np.arange(coordinates.forces)] = pushes[here]
+        mean = float(instants[stretch.stop] - instants[stretch.first]) / stretch.count
         if stretch.timed:
-            values[start + 2 * n] = means[stretch]
-        if not stretch.flies:
-            values[control + n : control + n + coordinates.forces] = pushes[k]
-        elif k + 1 < problem.knots:
-            turned = (place[k + 1] - place[k]) / steps[k]
-            rates = 1.5 * turned - 0.25 * (rate[k] + rate[k + 1])
-            own = list(coordinates.turning)
-            values[control + n : control + n + len(own)] = rates[own]
-        hold = assembly.knots[k].hold
-        if hold is not None:
-            values[control + hold] = means[problem.stretch_at(k + 1)]
+            values[assembly.state_start[here] + 2 * n] = mean
+        hold = None if before is None else assembly.knots[before].hold
+        if before is not None and hold is not None:
+            values[assembly.control_start[before] + hold] = mean
+        before = stretch.stop - 1
     return values
 
 

@@ -307,6 +307,29 @@ def make_problem(
 
     Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
+    builder = _builder(task, robot, compiled, progress, coordinates)
+    return builder.build()
+
+
+def problems_like(
+    task: JumpTask, robot: RobotDescription, *, coordinates: str
+) -> Callable[[JumpTask], FullProblem]:
+    """Makes the problems of tasks that differ from one only in where they lead; see ``ProblemBuilder.moved``. The tasks
+    must have been resolved.
+
+    Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
+    """
+    builder, robot = _builder(task, robot, True, None, coordinates), task.equipped(robot)
+    builder.build()
+    mirrored = builder.coordinates.name != "full"
+    finder = (symmetric_model_of if mirrored else model_of)(robot)[1]
+    return lambda other: builder.moved(other, stances_of(other, robot, finder))
+
+
+def _builder(
+    task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
+) -> ProblemBuilder:  # fmt: skip
+    """See ``make_problem``."""
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)
@@ -326,14 +349,14 @@ def make_problem(
     free = any(stretch.timed and not stretch.flies for stretch in stretches)
     if free and chosen.name == "full" and not coordinates:
         given = with_ground_times(task, robot, compiled=compiled, progress=progress)
-        return make_problem(given, robot, compiled=compiled, progress=progress)
+        return _builder(given, robot, compiled, progress, "")
     used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
     names = tuple(name for name in PIECES if name in used)
     if task.leans:
         names = tuple(SLOPED + name if name in SLOPED_PIECES else name for name in names)
     loaded = load_pieces(model, chosen, names=names, compiled=compiled, progress=progress)
     pieces = {name.removeprefix(SLOPED): piece for name, piece in loaded.items()}
-    return ProblemBuilder(task, model, chosen, pieces, stances, exact).build()
+    return ProblemBuilder(task, model, chosen, pieces, stances, exact)
 
 
 def _mirrors(task: JumpTask) -> tuple[str, ...]:

@@ -53,6 +53,9 @@ LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 """m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
+LEAST_CLEARANCE = 0.04
+"""m. Over a step that is lower than the feet's share they need to rise by its own height only, or by this: 8 cm over a
+step of 3 cm made G1 leave the ground on bent knees, after a squat in which its base was 0.21 m above the ground."""
 KNEE_SAG = 0.04
 """Of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are
 50 mrad off."""
@@ -169,11 +172,12 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         why = f"the jump asks for {asked:.2g} (easy below {EASY:g}, hard from {HARD:g}); "
         yield Choice("effort", round(EFFORT + share * (MOST_EFFORT - EFFORT), 2),
                      why + "the rest is the feedback's")  # fmt: skip
-    if "foot_clearance" not in said and any(
-        (hop.landing_height or 0.0) > 0.0 for hop in task.hops()
-    ):
-        high = rounded(FOOT_CLEARANCE * size_of(robot).height)
-        yield Choice("foot_clearance", high, "feet pass a step's edge")
+    heights = [max(0.0, hop.landing_height or 0.0) for hop in task.hops()]
+    if "foot_clearance" not in said and any(heights):
+        high = FOOT_CLEARANCE * size_of(robot).height
+        if len(heights) == 1:
+            high = min(high, max(LEAST_CLEARANCE, heights[0]))
+        yield Choice("foot_clearance", rounded(high), "feet pass a step's edge")
     if "knots" not in said:
         why = "the flight is exact on any grid; where feet stand knots are closer"
         yield Choice("knots", task.knots.model_copy(update=KNOTS), why)

@@ -17,7 +17,7 @@ def chain(rng: np.random.Generator) -> np.ndarray:
     return matrix
 
 
-def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT, then=None):
+def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT + 1, then=None):
     rows, columns = np.nonzero(matrix.T)[::-1]
     starts = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
     place = np.where(chosen, np.cumsum(chosen) - 1, -1)

@@ -9,6 +9,7 @@ from aloft.robots.importing.urdf_text import find_file
 PACKAGE = "package://example-robot-data/robots/"
 URDF = {
     "a1": "a1_description/urdf/a1.urdf",
+    "alexander": "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf",
     "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
     "bolt": "bolt_description/robots/bolt.urdf",
     "g1": "g1_description/urdf/g1_29dof_rev_1_0.urdf",

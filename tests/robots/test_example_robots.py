@@ -17,7 +17,7 @@ from aloft.robots.pinocchio_model import build_pinocchio_model
 from .example_robots import URDF, needs_robots, urdf
 
 MASSES = {
-    "a1": 13.741, "anymal_c": 52.13485, "bolt": 1.25387789, "g1": 33.34114202, "go2": 16.085,
+    "a1": 13.741, "alexander": 49.08069743, "anymal_c": 52.13485, "bolt": 1.25387789, "g1": 33.34114202, "go2": 16.085,
     "hyq": 86.774005, "simple_humanoid": 130.8, "solo12": 2.50000279, "talos": 90.272192,
 }  # fmt: skip
 

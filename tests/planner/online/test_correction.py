@@ -9,7 +9,6 @@ from aloft.planner.online import correction
 from aloft.planner.online.correction import Corrector
 from aloft.planner.online.hop_plans import shipped_samples
 from aloft.planner.online.hop_request import HopRequest, coarse, task_of
-from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.problem.unpacking import pack
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.solving.solver import VIOLATION, violation_of
@@ -22,7 +21,7 @@ SAMPLES = shipped_samples("bruce")
 def problem_and_guess(wanted: HopRequest):
     task = coarse(task_of(wanted).resolved(ROBOT))
     problem = make_problem(task, ROBOT, coordinates="full")
-    return problem, pack(problem, SAMPLES.interpolated(wanted), ballistic_guess(problem))
+    return problem, pack(problem, SAMPLES.interpolated(wanted))
 
 
 @pytest.mark.long

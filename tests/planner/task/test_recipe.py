@@ -137,6 +137,19 @@ def test_a_step_is_kept_away_from_and_not_lain_down_in_front_of(
     assert row is not None and row.squat_lean is None, "in a row nothing squats in front of a step"
 
 
+def test_feet_clear_a_step_lower_than_their_share_by_its_height_alone() -> None:
+    def clearance(robot: str, height: float) -> float:
+        asked = {"name": "a", "rise": 0.2, "distance_x": 0.4, "landing_height": height}
+        return make_task(asked).resolved(find_robot(robot)).foot_clearance
+
+    share = 0.12 * size_of(find_robot("g1")).height
+    assert share > 0.07
+    assert clearance("g1", 0.03) == pytest.approx(0.04)
+    assert clearance("g1", 0.06) == pytest.approx(0.06)
+    assert clearance("g1", 0.15) == pytest.approx(share, abs=1e-3)
+    assert clearance("bruce", 0.02) == clearance("bruce", 0.08) < 0.04
+
+
 def test_a_jump_that_is_low_beside_the_robot_leaves_the_ground_with_a_least_speed() -> None:
     def least(robot: str, rise: float) -> float | None:
         margins = make_task({"name": "a", "rise": rise}).resolved(find_robot(robot)).margins
