@@ -80,7 +80,7 @@ def frequency_responses(
     graph: Graph | str | Path,
     *,
     inputs: str,
-    outputs: str = "",
+    outputs: str | Sequence[str] = (),
     at: float,
     size: float | str,
     seeds: Sequence[int],
@@ -91,10 +91,13 @@ def frequency_responses(
 ) -> list[FrequencyResponse]:
     """Measure responses: from each element of ``inputs``, one after another, to all of ``outputs``.
 
+    The runs are as many as elements of ``inputs`` times seeds, however many outputs there are.
+
     Args:
         graph: a graph or its file. It must last for ``at`` and one period more than ``periods``.
         inputs: elements such as ``joint_pd.command.torque[*_knee]``.
-        outputs: what is observed; empty for the loop that is opened at each element of ``inputs``, the others closed.
+        outputs: what is observed, one selection or several, all in the same runs; empty for the loop that is opened at
+            each element of ``inputs``, the others closed.
         at: when the chirp begins [s].
         size: its root mean square, in the unit of the signal or as ``50 mN m``.
         seeds: of the runs.
@@ -111,8 +114,9 @@ def frequency_responses(
     bound = BoundGraph(loaded.checked)
     signals = {field.name: field for field in recorded_signals(bound)}
     chosen = signal_coordinates(bound, signals, inputs)
-    seen = signal_coordinates(bound, signals, outputs) if outputs else None
-    if chosen.quaternion or (seen is not None and seen.quaternion):
+    targets = [outputs] if isinstance(outputs, str) and outputs else list(outputs)
+    seen = [signal_coordinates(bound, signals, each) for each in dict.fromkeys(targets)]
+    if any(each.quaternion for each in (chosen, *seen)):
         raise AloftError("a chirp goes on numbers, not on orientations; choose a rate")
     locate = bound.memory.bus.layout.locate
     settings = {
@@ -134,16 +138,16 @@ def frequency_responses(
             written.append(window.coefficients(rows, element, chosen.block))
             _, _, rest = element.removeprefix(f"{chosen.block}.").partition(".")
             read.append(window.coefficients(rows, f"{FOLDER}{NAME}.y.{rest}", chosen.block))
-            if seen is not None:
-                observed.append([
-                    window.coefficients(rows, locate("float64", each), seen.block)
-                    for each in seen.places.tolist()
-                ])  # fmt: skip
+            observed.append([
+                window.coefficients(rows, locate("float64", each), target.block)
+                for target in seen
+                for each in target.places.tolist()
+            ])  # fmt: skip
         u, y = np.concatenate(written), np.concatenate(read)
-        if seen is None:
+        if not seen:
             found.append(_response(label, label, True, window.lines, -u, y, y - u))
             continue
-        for k, name in enumerate(seen.labels):
+        for k, name in enumerate(name for target in seen for name in target.labels):
             b = np.concatenate([each[k] for each in observed])
             found.append(_response(label, name, False, window.lines, b, y - u, y - u))
     return found

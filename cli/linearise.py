@@ -116,9 +116,8 @@ def linearise(
             measured = [
                 each
                 for signal in inputs
-                for target in ([""] if loop else outputs or inputs)
                 for each in frequency_responses(
-                    loaded, inputs=signal, outputs=target,
+                    loaded, inputs=signal, outputs=() if loop else outputs or inputs,
                     at=model.tick * model.base_period, size=chirp, low=low, high=high, period=period,
                     periods=periods, seeds=chosen,
                 )

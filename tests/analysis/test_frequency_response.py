@@ -57,6 +57,25 @@ def test_the_closed_loop_to_another_signal() -> None:
     assert not found.holds(1.5 * predicted)[:5].any()
 
 
+def test_several_outputs_are_read_in_the_same_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    graph, seeds = aloft.load(LOOP), range(5)
+    alone = [
+        each
+        for target in ("m.y", "x.y")
+        for each in frequency_responses(graph, seeds=seeds, outputs=target, **ASKED)
+    ]
+    run, ran = aloft.Graph.run, []
+
+    def counted(self: aloft.Graph, *args: object, **named: object) -> object:
+        ran.append(named["seed"])
+        return run(self, *args, **named)
+
+    monkeypatch.setattr(aloft.Graph, "run", counted)
+    both = frequency_responses(graph, seeds=seeds, outputs=["m.y", "x.y", "m.y"], **ASKED)
+    assert ran == list(seeds)
+    assert [each.as_data() for each in both] == [each.as_data() for each in alone]
+
+
 def test_without_noise_it_is_exact_and_with_more_seeds_narrower() -> None:
     (exact,) = frequency_responses(aloft.load(LOOP, {"noise.std": 0.0}), seeds=range(1), **ASKED)
     assert np.abs(exact.value / opened(exact.frequency) - 1.0).max() < 1e-4
