@@ -125,6 +125,6 @@ def run_seed(
         graphs / graph, [graphs / "trials/robust.yaml"],
         {"robot.seed": seed, "capture.seed": seed, **sets}, graphs / "bench.yaml",
         [graphs / name for name in behind],
-    ).run()  # fmt: skip
+    ).run(log=False)  # fmt: skip
     own = {"seed": seed, "success": found.success, "reason": found.reason}
     return {**own, "duration": found.duration_s, **found.metrics}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -51,7 +52,7 @@ from .tasks.task import (
     choose_tasks,
     own_tasks,
 )
-from .whole_body_solver import ACTIVE_SET, FALLBACKS, check_solver, solver_call
+from .whole_body_solver import ACTIVE_SET, check_solver, fallback_call, solver_call
 
 PAPER_TASKS = (
     "ContactPoints", "LinearMomentum", "TorsoOrientation", "AngularMomentum", "Posture",
@@ -108,8 +109,8 @@ class WholeBodyController(KernelBlock):
     finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
     solution is exact up to rounding and depends on the inputs alone; with ``cones: round`` it solves
     the program with the cones themselves, as exactly (``mathematics/whole_body_cones``). Any other name is
-    that of a library's solver; of these only Clarabel takes round cones. Where the chosen solver finds no
-    solution, DAQP is tried, or Clarabel with round cones.
+    that of a library's solver; of these only Clarabel takes round cones. Where a library finds no solution, the
+    own method is tried; where that finds none with round cones, the pyramids inside them are.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
@@ -294,8 +295,10 @@ class WholeBodyController(KernelBlock):
         self._reduce = KernelCall(reduce_program, self._program, reduction, solution)
         problem = self._program, reduction, solution
         self._solve = solver_call(p.solver, p.cones, *problem)
-        fallback = FALLBACKS[p.cones]
-        self._fallback = solver_call(fallback, p.cones, *problem) if fallback != p.solver else None
+        self._inscribed = np.zeros(1)
+        self._fallback = fallback_call(
+            p.solver, p.cones, self._program, self._inscribed, reduction, solution
+        )
         self._active_calls = ActiveCalls(*(np.zeros(1, np.int64) for _ in ActiveCalls._fields))
         self._unsolved = np.zeros(1, np.int64)
         self._activate = signal_call(activate_calls, self.phase, self._active_calls)
@@ -305,9 +308,9 @@ class WholeBodyController(KernelBlock):
         )  # fmt: skip
         self._hold_settings = HoldSettings(np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
         self._hold = signal_call(
-            hold_torque, self.phase, self._model, command, self.memory, self._hold_settings
-        )
-        self.event_calls = (self._hold,)
+            hold_torque, self._unsolved, self.phase, self._model, command, self.memory,
+            self._hold_settings,
+        )  # fmt: skip
         self._arrange()
 
     def _make_tasks(self, n: int) -> None:
@@ -345,6 +348,7 @@ class WholeBodyController(KernelBlock):
         )  # fmt: skip
         weights.acceleration[0], weights.force[0] = p.acceleration_weight, p.force_weight
         weights.friction[0], weights.force_min[0] = p.friction, p.force_min
+        self._inscribed[0] = math.sqrt(0.5) * p.friction
         weights.force_max[0] = 8.0 * self._weight if p.force_max is None else p.force_max
         peak = p.peak_torque.resolve(self.robot) * self.robot.motors.peak_torque
         np.multiply(p.torque_margin, peak, out=self._motors.peak)
@@ -367,14 +371,13 @@ class WholeBodyController(KernelBlock):
             self._activate, *self._frames.calls, *calls, self._reduce, self._solve, self._keep,
         )  # fmt: skip
         self.event = self._unsolved
+        again = () if self._fallback is None else (self._fallback, self._keep)
+        self.event_calls = (*again, self._hold)
 
     def on_event(self) -> None:
-        """Try the other solver where the chosen one has found no solution."""
-        if self._fallback is not None:
-            self._fallback.run()
-            self._keep.run()
-        if self._unsolved[0]:
-            self._hold.run()
+        """Fall back where the chosen solver has found no solution."""
+        for call in self.event_calls:
+            call.run()
 
 
 @cache
@@ -460,13 +463,17 @@ class HoldSettings(NamedTuple):
 
 @kernel
 def hold_torque(
+    unsolved: Indices1D,
     phase: PhaseState,
     model: RigidBodyTerms,
     command: WholeBodyCommand,
     memory: SolverMemory,
     settings: HoldSettings,
 ) -> None:
-    """The last solved torque, which decays, and then the torque that carries the weight."""
+    """Where the program is ``unsolved`` (1,): the last solved torque, which decays, and then the torque that
+    carries the weight."""
+    if unsolved[0] == 0:
+        return
     memory.failed += 1
     memory.failures += 1
     command.solved = False

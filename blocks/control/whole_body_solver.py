@@ -6,13 +6,9 @@ from typing import Literal
 
 import numpy as np
 
+from ...mathematics.arrays import Array1D
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.quadratic_program import (
-    CLARABEL,
-    DAQP,
-    QuadraticProgramSolver,
-    cone_rows,
-)
+from ...mathematics.quadratic_program import CLARABEL, QuadraticProgramSolver, cone_rows
 from ...mathematics.whole_body_cones import PLANES, cone_memory, solve_with_cones
 from ...mathematics.whole_body_qp import NOT_FOUND, WholeBodyProgram, WholeBodySolution
 from ...mathematics.whole_body_reduction import (
@@ -27,8 +23,6 @@ from ...runtime.language.steps import PythonCall
 Cones = Literal["pyramid", "round"]
 ACTIVE_SET = "active_set"
 """The name of the own method, which needs no library."""
-FALLBACKS: dict[Cones, str] = {"pyramid": DAQP, "round": CLARABEL}
-"""What solves the program where the chosen solver finds no solution."""
 
 
 def check_solver(name: str, cones: Cones) -> None:
@@ -58,6 +52,34 @@ def solver_call(
         return KernelCall(solve_with_cones, program, reduction, memory, own, solution)
     own = active_set_program(n, n_contacts)
     return KernelCall(solve_with_pyramids, program, reduction, own, solution)
+
+
+def fallback_call(
+    name: str,
+    cones: Cones,
+    program: WholeBodyProgram,
+    inscribed: Array1D,
+    reduction: Reduction,
+    solution: WholeBodySolution,
+) -> KernelCall | None:
+    """The call that solves the program where the solver ``name`` finds no solution.
+
+    After a library's solver that is the own method. After the own method there is none with pyramids: of 59,000
+    programs it solved all that DAQP could solve. With round cones its search fails in 2 of 50,000; then the
+    cones become the pyramids inside them.
+
+    Args:
+        inscribed: the friction of those pyramids, (1,), which the caller keeps up to date.
+    """
+    if name != ACTIVE_SET:
+        own = solver_call(ACTIVE_SET, cones, program, reduction, solution)
+        assert isinstance(own, KernelCall)
+        return own
+    if cones == "pyramid":
+        return None
+    inside = program._replace(weights=program.weights._replace(friction=inscribed))
+    pyramids = active_set_program(len(solution.acceleration), len(solution.force))
+    return KernelCall(solve_with_pyramids, inside, reduction, pyramids, solution)
 
 
 class LibrarySolver:

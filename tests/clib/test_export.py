@@ -3,7 +3,9 @@
 import ctypes
 import shutil
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -52,6 +54,30 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def written(folder: Path) -> Path:
     return write_library(str(folder / "mass.yaml"), folder / "pd", "controller").description
+
+
+UNSOLVABLE = """\
+include: [aloft:jump.yaml]
+duration: 0.4 s  # it falls later
+set: {{wbc.force_min: 50 N, wbc.force_max: 20 N, wbc.cones: {cones}}}
+"""
+"""No force is at least 50 N and at most 20 N."""
+STATUSES = {"FALLBACK": 199, "EVENT": 1}
+"""In one tick the safety monitor asks for attention as well."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("cones", ["pyramid", "round"])
+def test_what_a_controller_does_without_a_solution_gives_all_recorded_bytes(
+    tmp_path: Path, target: str, cones: str
+) -> None:
+    graph, recording = tmp_path / "unsolvable.yaml", tmp_path / "run.rrd"
+    graph.write_text(UNSOLVABLE.format(cones=cones))
+    result = aloft.load(graph).run(sinks=[Recorder(recording)])
+    assert result.metrics["qp_failures"] == 200  # every tick
+    found = back_to_back(str(graph), recording, tmp_path, target, statuses=STATUSES)
+    assert (found.ticks, found.signal_bytes > 200 * 1000) == (200, True)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -303,14 +329,17 @@ def test_the_graph_of_general_blocks_has_all_that_a_library_can_have() -> None:
     ) == sorted(IN_PYTHON)
 
 
-def back_to_back(graph: str, recording: Path, folder: Path, target: str, part: str = "") -> Checked:
+def back_to_back(
+    graph: str, recording: Path, folder: Path, target: str, part: str = "",
+    statuses: Mapping[str, int] = MappingProxyType({}),
+) -> Checked:  # fmt: skip
     """Write a graph, or a part of it, as a library for a processor, and feed it a recording."""
     tools = TARGETS[target]
     if not tools.linker() or not all(map(shutil.which, tools.runner[:1])):
         pytest.skip(f"no tools for {target}: apt install {tools.packages}")
     found = check(write_library(graph, folder / target, part, target=target).description, recording)
     assert found.difference == ""
-    assert found.statuses == {}
+    assert found.statuses == statuses
     return found
 
 

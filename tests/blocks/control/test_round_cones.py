@@ -9,9 +9,6 @@ from aloft.benchmarks.full_program import rows_without_pyramids
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.signals import Phase
-from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.kernel import kernel
-from aloft.mathematics.whole_body_qp import ILL_POSED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -56,24 +53,6 @@ def test_clarabel_finds_the_same_with_the_whole_program(terms):
     own, other = solved(terms, cones="round"), solved(terms, cones="round", solver="clarabel")
     assert bool(other.get("command").solved)
     assert other.get("command").torque == pytest.approx(own.get("command").torque, abs=1e-5)
-
-
-@kernel
-def give_up_on_cones(code):
-    code[0] = ILL_POSED
-
-
-def test_where_the_own_method_fails_clarabel_follows(terms):
-    bench = solved(terms, cones="round")
-    block, exact = bench.block, bench.get("command").torque.copy()
-    fails = KernelCall(give_up_on_cones, block._code)
-    fails.when = block._solve.when
-    block.kernel_calls = tuple(
-        fails if call is block._solve else call for call in block.kernel_calls
-    )
-    bench.step()
-    assert bool(bench.get("command").solved) and int(bench.get("command").failures) == 0
-    assert bench.get("command").torque == pytest.approx(exact, abs=1e-5)
 
 
 def test_other_solvers_are_refused():

@@ -11,7 +11,7 @@ from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.signals import Phase
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import kernel
-from aloft.mathematics.whole_body_qp import ILL_POSED, NOT_FOUND
+from aloft.mathematics.whole_body_qp import ILL_POSED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.steps import call_of
 from aloft.runtime.testing import BlockBench
@@ -45,27 +45,55 @@ def give_up(code):
     code[0] = ILL_POSED
 
 
-@kernel
-def find_nothing(code):
-    code[0] = NOT_FOUND
+def failing(block):
+    """The calls of a step in which the solver finds no solution."""
+    fails = KernelCall(give_up, block._code)
+    fails.when = block._solve.when
+    return tuple(fails if call is block._solve else call for call in block.kernel_calls)
 
 
 @pytest.mark.parametrize("plain", [False, True])
-def test_where_the_own_method_fails_daqp_and_then_the_fallback_follow(plain):
+@pytest.mark.parametrize(
+    "params", [{"solver": "daqp"}, {"solver": "clarabel", "cones": "round"}, {"cones": "round"}]
+)
+def test_where_a_solver_fails_another_follows(plain, params):
+    bench = BlockBench(WholeBodyController, params, robot=ROBOT, plain=plain)
+    feed(bench, model())
+    bench.step()
+    block, command = bench.block, bench.get("command")
+    last = command.torque.copy()
+    block.kernel_calls = failing(block)
+    bench.step()
+    assert bool(command.solved) and int(command.failures) == 0
+    assert command.torque == pytest.approx(last, abs=1e-4)  # standing needs no friction
+
+
+def test_pyramids_inside_the_cones_follow_where_round_cones_fail():
+    bench = BlockBench(WholeBodyController, {"cones": "round", "friction": 0.05}, robot=ROBOT)
+    feed(bench, model())
+    # more than friction allows
+    bench.set("target", com_acceleration=[6.0, 0.0, 0.0])
+    block, command = bench.block, bench.get("command")
+    for calls, share in ((block.kernel_calls, 1.0), (failing(block), np.sqrt(0.5))):
+        block.kernel_calls = calls
+        bench.step()
+        assert bool(command.solved)
+        along, normal = np.abs(command.force[:, :2]), 0.05 * command.force[:, 2]
+        assert (np.linalg.norm(along, axis=1) <= normal + 1e-6).all()
+        loaded = normal > 0.1
+        assert (along.max(axis=1) / normal)[loaded].max() == pytest.approx(share, abs=1e-3)
+    assert (along <= np.sqrt(0.5) * normal[:, None] + 1e-8).all()
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_where_nothing_finds_a_solution_the_torque_is_held(plain):
     bench = BlockBench(WholeBodyController, robot=ROBOT, plain=plain)
     feed(bench, model())
     bench.step()
     block, command = bench.block, bench.get("command")
     last = command.torque.copy()
     own = tuple(block.kernel_calls)
-    fails = KernelCall(give_up, block._code)
-    fails.when = block._solve.when
-    block.kernel_calls = tuple(fails if call is block._solve else call for call in own)
-    bench.step()
-    assert bool(command.solved) and int(command.failures) == 0
-    assert command.torque == pytest.approx(last, abs=1e-5)
-    last = command.torque.copy()
-    block._fallback = KernelCall(find_nothing, block._code)
+    block.kernel_calls = failing(block)
     for failed in (1, 2):
         bench.step()
         assert not bool(command.solved) and int(command.failures) == failed

@@ -299,8 +299,8 @@ def test_the_fallback_is_the_defined_one(dynamics):
     command = bench.get("command")
     last = command.torque.copy()
     block = bench.block
-    own, daqp = block._solve, block._fallback
-    block._solve = block._fallback = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
+    own = block._solve
+    block._solve = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
     block._arrange()
     for failed in (1, 2, 3):
         bench.step()
@@ -316,14 +316,10 @@ def test_the_fallback_is_the_defined_one(dynamics):
     assert command.torque == pytest.approx(wanted, abs=1e-10)
     assert command.force == pytest.approx(np.tile(quarter, (4, 1)))
     assert int(command.failures) == 4
-    block._fallback = daqp  # as where the own method fails
-    bench.step()
-    assert bool(command.solved)
-    assert int(command.failures) == 4
-    assert command.torque == pytest.approx(last, abs=1e-5)
     block._solve = own
     block._arrange()
     bench.step()
+    assert bool(command.solved) and int(command.failures) == 4
     assert command.torque.tolist() == last.tolist()
 
 
@@ -331,7 +327,7 @@ def test_the_fallback_survives_a_snapshot(dynamics):
     bench = make(model(dynamics))
     bench.step()
     block = bench.block
-    block._solve = block._fallback = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
+    block._solve = PythonCall(lambda code: code.fill(NOT_FOUND), (block._code,))
     block._arrange()
     bench.step(2)
     snapshot = bench.snapshot()

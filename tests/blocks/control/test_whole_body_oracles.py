@@ -16,6 +16,7 @@ import quadprog
 import aloft
 from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
+from aloft.blocks.control.whole_body_solver import LibrarySolver
 from aloft.mathematics.active_set import INFEASIBLE
 from aloft.mathematics.quadratic_program import QuadraticProgramSolver
 from aloft.mathematics.whole_body_qp import SOLVED
@@ -77,6 +78,8 @@ class Solvers:
     def __init__(self, block: WholeBodyController) -> None:
         self.block, self.full = block, FullProgram(block)
         self.daqp, self.clarabel = map(QuadraticProgramSolver, ("daqp", "clarabel"))
+        program, reduction, *_, solution = block._solve.arguments
+        self.reduced = LibrarySolver("daqp", "pyramid", program, reduction, solution)
 
     def set(self, state: State, stance: np.ndarray) -> None:
         block = self.block
@@ -99,10 +102,10 @@ class Solvers:
         """The joint torque of a solution of the full program."""
         return self.full.torque(x, self.active)
 
-    def fallback(self):
-        """The torque by DAQP on the reduced program; none if it fails."""
+    def by_daqp(self):
+        """The torque by DAQP on the reduced program; none if it finds no solution."""
         self.block._reduce.run()
-        self.block._fallback.run()
+        self.reduced.solve()
         solved = int(self.block._code[0]) == SOLVED
         return self.block.command.torque.copy() if solved else None
 
@@ -162,11 +165,12 @@ def compare(solvers, states, turns):
         x = solvers.reference()
         if x is None:
             assert code == INFEASIBLE
+            assert solvers.by_daqp() is None  # so that nothing is lost without another solver
             infeasible += 1
             continue
         assert code == SOLVED
         best = solvers.torque(x)
-        daqp, reduced = solvers.by(solvers.daqp), solvers.fallback()
+        daqp, reduced = solvers.by(solvers.daqp), solvers.by_daqp()
         assert daqp is not None and reduced is not None
         found = torque, solvers.torque(daqp), reduced
         errors.append([np.abs(each - best).max() for each in found])
