@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,12 +19,16 @@ from .urdf_text import SCHEME, XmlFile, find_file
 
 @dataclass(frozen=True)
 class RawMesh:
-    """A mesh as the file names it, in its body's frame; ``scale`` (3,) comes before the pose."""
+    """A mesh as the file names it, in its body's frame; ``scale`` (3,) comes before the pose.
+
+    ``color`` is ``#RRGGBB``; None where the file gives the mesh none.
+    """
 
     file: str
     rotation: Array
     position: Array
     scale: Array
+    color: str | None = None
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,11 @@ class LinkLook:
 def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
     """What each link of a URDF is drawn as, by name; what cannot be read is left out."""
     found = {}
+    named = {
+        material.get("name", ""): color
+        for material in file.root.iter("material")
+        if (color := _material_color(material)) is not None
+    }
     for link in file.root.findall("link"):
         meshes: list[RawMesh] = []
         shapes: list[fit.Capsule] = []
@@ -59,11 +69,33 @@ def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
                 continue
             if shape.tag == "mesh":
                 scale = _numbers(shape.get("scale"), (1.0, 1.0, 1.0))
-                meshes.append(RawMesh(shape.get("filename", ""), rotation, position, scale))
+                material = visual.find("material")
+                color = None if material is None else _material_color(material)
+                if material is not None and len(material) == 0:
+                    color = named.get(material.get("name", ""))
+                name = shape.get("filename", "")
+                meshes.append(RawMesh(name, rotation, position, scale, color))
             else:
                 shapes += [each.moved(rotation, position) for each in _simple(shape)]
         found[link.get("name", "")] = RawLook(meshes, shapes)
     return found
+
+
+def _material_color(material: ElementTree.Element) -> str | None:
+    """The color of a URDF's material; None where it has a texture or no color."""
+    color = material.find("color")
+    if color is None or material.find("texture") is not None:
+        return None
+    values = _numbers(color.get("rgba"), (math.nan, math.nan, math.nan, 1.0))
+    return hex_color(values)
+
+
+def hex_color(rgba: Array) -> str | None:
+    """``#RRGGBB`` of red, green and blue from 0 to 1; None where one is no number."""
+    if not np.isfinite(rgba[:3]).all():
+        return None
+    levels = np.rint(255.0 * np.clip(rgba[:3], 0.0, 1.0)).astype(int)
+    return "#" + "".join(f"{level:02x}" for level in levels)
 
 
 def _simple(shape: ElementTree.Element) -> list[fit.Capsule]:
@@ -130,6 +162,7 @@ def link_looks(
                 "position": _tidy(frame.rotation @ mesh.position + frame.position),
                 "orientation": _tidy(quaternions_of_matrices(frame.rotation @ mesh.rotation)),
                 "scale": _tidy(mesh.scale),
+                **({} if mesh.color is None else {"color": mesh.color}),
             })  # fmt: skip
         for capsule in raw.capsules:
             moved = capsule.moved(frame.rotation, frame.position)

@@ -11,17 +11,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
-from .looks import NOTHING_SEEN, RawLook, RawMesh, urdf_looks
+from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
 from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, full_tensor
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, find_file, urdf_joints
+
+
+class TakenMesh(NamedTuple):
+    """A mesh that was taken out of the model: its name in the file, the file itself, if it is there,
+    its ``scale`` (3,) and its ``color`` as ``#RRGGBB``, None where the file gives none."""
+
+    written: str
+    path: Path | None
+    scale: Array
+    color: str | None
 
 
 def read_model(path: Path) -> RawModel:
@@ -166,16 +176,22 @@ def _take_inertials(spec: Any, is_urdf: bool) -> dict[str, tuple[float, Array]]:
 
 def _take_meshes(
     spec: Any, folder: Path, inertials: dict[str, Any], notes: list[str]
-) -> dict[str, tuple[str, Path | None, Array]]:
-    """Take the meshes of bodies with an inertial out of the model: name, file and scale by geom."""
+) -> dict[str, TakenMesh]:
+    """Take the meshes of bodies with an inertial out of the model, by geom."""
     import mujoco
 
     kinds = mujoco.mjtGeom
-    found: dict[str, tuple[str, Path | None, Array]] = {}
+    found: dict[str, TakenMesh] = {}
+    usual = np.array(mujoco.MjSpec().default.geom.rgba)
+    materials = {each.name: each for each in spec.materials}
     files = {mesh.name: mesh for mesh in spec.meshes}
     base = folder / (spec.compiler.meshdir or "")
     needed: list[str] = []
     for geom in list(spec.geoms):
+        material, rgba = materials.get(geom.material), np.array(geom.rgba)
+        color = None if (rgba == usual).all() else hex_color(rgba)
+        if color is None and material is not None and not any(material.textures):
+            color = hex_color(np.array(material.rgba))
         geom.material = ""
         if geom.type not in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF):
             continue
@@ -184,7 +200,7 @@ def _take_meshes(
             needed.append(geom.meshname)
         elif mesh is not None:
             path = find_file(mesh.file, base)
-            found[geom.name] = (mesh.file, path, np.array(mesh.scale))
+            found[geom.name] = TakenMesh(mesh.file, path, np.array(mesh.scale), color)
             geom.meshname, geom.type, geom.size = "", kinds.mjGEOM_SPHERE, [0.01, 0.0, 0.0]
     for mesh in list(spec.meshes):
         if mesh.name not in needed:
@@ -261,7 +277,7 @@ def _motor_torque(model: Any, j: int) -> float:
 
 
 def _capsules(
-    model: Any, k: int, meshes: dict[str, tuple[str, Path | None, Array]], notes: list[str]
+    model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]
 ) -> list[fit.Capsule]:
     """The capsules of a body, in its own frame; shapes that touch nothing are left out."""
     import mujoco
@@ -282,7 +298,7 @@ def _capsules(
         kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
         shapes: list[fit.Capsule] = []
         if name in meshes:
-            written, path, scale = meshes[name]
+            written, path, scale, _ = meshes[name]
             if path is None:
                 notes.append(f"link {body}: the mesh {written} is not there, so it has no shape")
             elif path.suffix.lower() not in READABLE:
@@ -308,7 +324,7 @@ def _capsules(
     return found
 
 
-def _look(model: Any, k: int, meshes: dict[str, tuple[str, Path | None, Array]]) -> RawLook:
+def _look(model: Any, k: int, meshes: dict[str, TakenMesh]) -> RawLook:
     """The meshes that an MJCF body is drawn as: those that touch nothing, if it has such."""
     import mujoco
 
@@ -317,12 +333,12 @@ def _look(model: Any, k: int, meshes: dict[str, tuple[str, Path | None, Array]])
         name = model.geom(g).name
         if model.geom_bodyid[g] != k or name not in meshes:
             continue
-        written, path, scale = meshes[name]
+        written, path, scale, color = meshes[name]
         turn = np.zeros(9)
         mujoco.mju_quat2Mat(turn, model.geom_quat[g])
         file = written if path is None else str(path.resolve())
         touches = bool(model.geom_contype[g] or model.geom_conaffinity[g])
-        mesh = RawMesh(file, turn.reshape(3, 3), np.array(model.geom_pos[g]), scale)
+        mesh = RawMesh(file, turn.reshape(3, 3), np.array(model.geom_pos[g]), scale, color)
         found[touches].append(mesh)
     return RawLook(found[False] or found[True])
 

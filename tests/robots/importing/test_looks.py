@@ -66,6 +66,40 @@ def test_an_mjcf_body_looks_like_what_touches_nothing(tmp_path: Path) -> None:
     assert mesh.position == (0.0, 0.0, 0.2) and mesh.scale == (0.1, 0.1, 0.1)
 
 
+def test_meshes_have_the_colors_of_the_file(tmp_path: Path) -> None:
+    for name in ("upper.obj", "look.obj", "hull.obj"):
+        (tmp_path / name).write_text(OBJ)
+    colored = URDF.replace(
+        'scale="2 2 2"/></geometry>', 'scale="2 2 2"/></geometry><material name="sea"/>'
+    ).replace(
+        'hand.stl"/></geometry>',
+        'hand.stl"/></geometry><material name=""><color rgba="0 0.5 2 1"/></material>',
+    )
+    named = '<material name="sea"><color rgba="0.2 0.4 0.6 1"/></material></robot>'
+    path = tmp_path / "arm.urdf"
+
+    def colors(text: str) -> list[str | None]:
+        path.write_text(text)
+        return [mesh.color for mesh in read_description(path).looks["upper"].meshes]
+
+    assert colors(URDF) == [None, None]
+    assert colors(colored) == [None, "#0080ff"]  # no material of that name has a color
+    assert colors(colored.replace("</robot>", named)) == ["#336699", "#0080ff"]
+    textured = named.replace("</material>", '<texture filename="sea.png"/></material>')
+    assert colors(colored.replace("</robot>", textured)) == [None, "#0080ff"]
+
+    def color(attributes: str) -> str | None:
+        material = '<asset><material name="sea" rgba="0.2 0.4 0.6 1"/>'
+        text = MJCF.replace("<asset>", material).replace('mesh="look"', f'mesh="look" {attributes}')
+        (tmp_path / "stick.xml").write_text(text)
+        (mesh,) = read_description(tmp_path / "stick.xml").looks["torso"].meshes
+        return mesh.color
+
+    assert color("") is None
+    assert color('material="sea"') == "#336699"
+    assert color('material="sea" rgba="1 0 0 1"') == "#ff0000"
+
+
 def test_a_user_gives_links_meshes(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     (tmp_path / "arm.yaml").write_text("looks: {base: {meshes: [{file: parts/b.stl}]}}\n")
