@@ -497,6 +497,7 @@ UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
             "retarget_window": 0.2, "retarget_acceleration": 3.0, "retarget_limit": 0.05,
             "retarget_braking": 1.0,
         },
+        {"ahead": 0.32, "back": 0.1, "aside": 0.3},
         {"outcome": 0}, STEERED,
     ),
 )  # fmt: skip
