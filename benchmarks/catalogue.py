@@ -15,7 +15,7 @@ import numpy as np
 
 from .agreement import agreement
 from .background import background
-from .courses import courses, pushed_courses
+from .courses import courses, go2_courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .export import export
@@ -35,7 +35,7 @@ from .recorder import recorder
 from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
-from .stones import staircase, stones
+from .stones import go2_staircase, staircase, stones
 from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
@@ -60,15 +60,18 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "identification": identification,
     "frontier": frontier,
     "courses": courses,
+    "go2_courses": go2_courses,
     "pushed_courses": pushed_courses,
     "stones": stones,
     "staircase": staircase,
+    "go2_staircase": go2_staircase,
     "every_robot": every_robot,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
-    "pushed_courses", "stones", "staircase", "every_robot",
+    "go2_courses",
+    "pushed_courses", "stones", "staircase", "go2_staircase", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
@@ -83,9 +86,11 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "known_effects",
         "identification",
         "courses",
+        "go2_courses",
         "pushed_courses",
         "stones",
         "staircase",
+        "go2_staircase",
     ),
     "jitter": ("link_delays",),
     "loss": ("link_delays",),

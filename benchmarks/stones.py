@@ -57,6 +57,9 @@ STAIRCASE = [
     {"x": round(0.2 * step, 3), "top": round(0.04 * step, 3)} for step in range(1, STEPS + 1)
 ]
 """m"""
+GO2_STAIRS_SEEDS = range(33600, 33620)
+"""Of Go2 on its staircase (``graphs/robots/go2_stairs.yaml``), the same."""
+GO2_STEPS = 7
 STEP = (0.198, 0.4)
 """m; 2 mm less than their distance, as stones do not touch."""
 
@@ -64,15 +67,27 @@ STEP = (0.198, 0.4)
 def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
     """Rows: the share of robots that do not come up a staircase, of those that fail a criterion, and how long it takes."""
     found = [run_staircase(seed) for seed in seeds]
-    n, lost = len(found), [one for one in found if not passed(one, STEPS)]
+    return _rows_of_stairs("staircase", found, STEPS, "4 cm")
+
+
+def go2_staircase(seeds: Sequence[int] = GO2_STAIRS_SEEDS) -> list[Row]:
+    """The same of Go2 on seven steps of 8 cm that hold all of its feet, each 50 cm deep."""
+    found = [run_seed(seed, "robots/go2_stairs.yaml", (), {"duration": LONGEST}) for seed in seeds]
+    return _rows_of_stairs("Go2's staircase", found, GO2_STEPS, "8 cm")
+
+
+def _rows_of_stairs(
+    name: str, found: Sequence[dict[str, Any]], steps: int, height: str
+) -> list[Row]:
+    n, lost = len(found), [one for one in found if not passed(one, steps)]
     low, high = wilson_interval(len(lost), n)
-    up = [float(one["duration"]) for one in found if passed(one, STEPS)]
+    up = [float(one["duration"]) for one in found if passed(one, steps)]
     why = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
     return [
-        Row("staircase: not up", len(lost) / n, "", goal=MISSED_GOAL,
-            note=f"{n} robots, {STEPS} steps of 4 cm, 95 % interval {low:.2f} to {high:.2f}"),
-        Row("staircase: no success", sum(not one["success"] for one in found) / n, "", note=why),
-        Row("staircase: from the start to standing above, median", float(np.median(up)) if up else np.nan, "s"),
+        Row(f"{name}: not up", len(lost) / n, "", goal=MISSED_GOAL,
+            note=f"{n} robots, {steps} steps of {height}, 95 % interval {low:.2f} to {high:.2f}"),
+        Row(f"{name}: no success", sum(not one["success"] for one in found) / n, "", note=why),
+        Row(f"{name}: from the start to standing above, median", float(np.median(up)) if up else np.nan, "s"),
     ]  # fmt: skip
 
 

@@ -230,6 +230,25 @@ def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
 
 
 @kernel
+def pattern_turn(
+    planned: Array2D, planned_middle: Array1D, points: Array2D, middle: Array1D
+) -> float:
+    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
+
+    Args:
+        planned, planned_middle: the pattern before the rotation, and its middle (3,).
+        points, middle: the same points now, and their middle.
+    """
+    sine = cosine = 0.0
+    for i in range(planned.shape[0]):
+        ax, ay = planned[i, 0] - planned_middle[0], planned[i, 1] - planned_middle[1]
+        bx, by = points[i, 0] - middle[0], points[i, 1] - middle[1]
+        sine += ax * by - ay * bx
+        cosine += ax * bx + ay * by
+    return atan2(sine, cosine)
+
+
+@kernel
 def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
     """Rotate a vector (3,) about the world's z axis by ``angle`` [rad]."""
     sine, cosine = sincos(angle)

@@ -361,7 +361,7 @@ UNUSED = {
     "aloft.mathematics.linear_algebra.solve_rows": (
         REGULAR + REGULAR.T, np.array([[0.3, -0.2, 0.5], [1.0, 0.4, -0.7]]),
     ),
-    "aloft.blocks.control.balance_target.pattern_turn": (
+    "aloft.mathematics.rotations.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
     ),
     "aloft.mathematics.landing_law.landing_place": (

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...blocks.signals import PlanOutcome
 from ...planner.library.jump_table import table_rows
-from ...planner.online.hop_plans import hop_table, shipped_samples
-from ...planner.online.hop_request import REACH, STEP_REACH, HopRequest
+from ...planner.online.hop_plans import hop_table, level_reach, shipped_samples, step_reach
+from ...planner.online.hop_request import HopRequest
 from ...planner.online.next_hop import HopPlanner
 from ...planner.solving.solver_process import cpu_time
 from ...robots.description import find_robot
@@ -27,20 +27,20 @@ GOALS = {"straight": (0.02, 0.04), "all coordinates": (0.06, 0.12), "up and down
 
 def requests(kind: str, count: int = COUNT, seed: int = SEED) -> list[HopRequest]:
     """The hops of a kind; the same on every machine."""
-    rng, r, s = np.random.default_rng(seed), REACH, STEP_REACH
+    rng, r, s = np.random.default_rng(seed), level_reach("bruce"), step_reach("bruce")
     found = []
     for _ in range(count):
-        ahead, aside = rng.uniform(-r["back"], r["ahead"]), rng.uniform(-r["aside"], r["aside"])
-        turn, up = rng.uniform(-r["turn"], r["turn"]), rng.uniform(0.01, s["up"])
+        ahead, aside = rng.uniform(-r.back, r.ahead), rng.uniform(-r.aside, r.aside)
+        turn, up = rng.uniform(-r.turn, r.turn), rng.uniform(0.01, s.up)
         if kind == "straight":
             found.append(HopRequest(ahead, 0.0, 0.0))
         elif kind == "all coordinates":
             found.append(HopRequest(ahead, aside, turn))
         else:
-            across, least = aside * s["aside"] / r["aside"], s["least"]
-            ahead = least + (s["ahead"] - least) * abs(ahead) / r["ahead"]
+            across, least = aside * s.aside / r.aside, s.least
+            ahead = least + (s.ahead - least) * abs(ahead) / r.ahead
             found.append(
-                HopRequest(ahead, across, turn * s["turn"] / r["turn"], up if turn > 0.0 else -up)
+                HopRequest(ahead, across, turn * s.turn / r.turn, up if turn > 0.0 else -up)
             )
     return found  # fmt: skip
 

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Array2D, Rows3, Vector3
+from ...mathematics.arrays import Array1D, Rows3, Vector3
 from ...mathematics.elementary import atan2, sincos
 from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
@@ -17,6 +17,7 @@ from ...mathematics.rotations import (
     logarithm,
     mean_heading,
     multiply,
+    pattern_turn,
     turn_about_vertical,
 )
 from ...robots.limb import FootKind, foot_shape
@@ -375,25 +376,6 @@ def middle_point(points: Rows3, out: Vector3) -> None:
     out[:] = 0.0
     for i in range(points.shape[0]):
         out[:] += points[i] / points.shape[0]
-
-
-@kernel
-def pattern_turn(
-    planned: Array2D, planned_middle: Array1D, points: Array2D, middle: Array1D
-) -> float:
-    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
-
-    Args:
-        planned, planned_middle: the pattern before the rotation, and its middle (3,).
-        points, middle: the same points now, and their middle.
-    """
-    sine = cosine = 0.0
-    for i in range(planned.shape[0]):
-        ax, ay = planned[i, 0] - planned_middle[0], planned[i, 1] - planned_middle[1]
-        bx, by = points[i, 0] - middle[0], points[i, 1] - middle[1]
-        sine += ax * by - ay * bx
-        cosine += ax * bx + ay * by
-    return atan2(sine, cosine)
 
 
 @kernel

@@ -76,13 +76,13 @@ class OnlinePlanner(Block):
         return {"request": {"number": 0}}
 
     def setup(self) -> None:
-        from ...planner.online.hop_plans import hop_table, shipped_samples
+        from ...planner.online.hop_plans import hop_table, shipped_samples, shipped_steps
         from ...planner.online.next_hop import HopPlanner
         from ...planner.task.plan import PlanFileError
 
         try:
             name = self.robot.name
-            samples = shipped_samples(name), shipped_samples(name, steps=True)
+            samples = shipped_samples(name), shipped_steps(name)
         except PlanFileError as error:
             raise BlockError(str(error)) from error
         self._planner = HopPlanner(self.robot, *samples)

@@ -10,7 +10,7 @@ from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.elementary import hypot, sincos
 from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import mean_heading, turn_about_vertical, wrap
+from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
 from ...planner.library.jump_table import (
     FlightRotation,
     TableRows,
@@ -18,10 +18,10 @@ from ...planner.library.jump_table import (
     integrate_rows,
     row_dimensions,
 )
-from ...planner.online.hop_plans import missing_plans, standing_row
-from ...planner.online.hop_request import LEVEL, REACH
+from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
+from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
-from ...robots.limb import FootKind, foot_shape
+from ...robots.foot_directions import standing_directions
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import Parameters, parameter
@@ -48,7 +48,6 @@ DIRECTED = 0.05
 """A jump is one ahead or back from that distance on [m]."""
 MOST_BIAS = 0.02
 """The largest error of place [m] that is taken for the robot's own, and not for a push."""
-FARTHEST, FARTHEST_BACK, FARTHEST_ASIDE = REACH["ahead"], REACH["back"], REACH["aside"]
 HARDEST = 1.875
 """The largest rate of ``minimum_jerk``."""
 SAME_TURN = 0.02
@@ -103,6 +102,15 @@ class SteeringState(Signal):
     )
 
 
+class SteeringConstants(ProgressConstants):
+    """What follows from the parameters and the robot's stored plans."""
+
+    ahead = Field(unit="m", text="the farthest jump ahead")
+    back = Field(unit="m", text="the farthest back")
+    aside = Field(unit="m", text="the farthest to a side")
+    of_points = Field(dtype="bool", text="no foot has a direction of its own")
+
+
 class SteeredPlan(Block):
     """Asks for the next jump where a command has come, and follows its plan.
 
@@ -126,7 +134,8 @@ class SteeredPlan(Block):
     ``goal.outcome`` is NEAREST. A jump is moved once; a command that comes later waits for the next jump.
 
     Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
-    feet before the jump, with x ahead. It moves when a plan begins. The reference's time is that of the run. Until the first plan begins the robot
+    feet before the jump, with x ahead. It moves when a plan begins. Ahead is where the feet point, or, for feet that are points,
+    how all of them together are turned from where they are as the robot stands (as in ``BalanceTarget``). The reference's time is that of the run. Until the first plan begins the robot
     stands; after a plan the reference stays at its end. How a plan is kept in time with the robot is
     told at ``JumpPlan``: by the speed and height that the thrust has reached.
 
@@ -189,11 +198,14 @@ class SteeredPlan(Block):
         values = Field("plan_width", text="columns of an instant")
         middle = Field(3, unit="m", frame="world", text="of the feet, in the estimator's world")
         vector = Field(3, unit="m", text="the same in the jump's frame")
+        origin = Field(
+            3, unit="m", text="zeros, where the middle of the feet is as the robot stands"
+        )
 
-    Constants = ProgressConstants
+    Constants = SteeringConstants
     needs = ("floating base", "feet")
     params: Params
-    constants: ProgressConstants
+    constants: SteeringConstants
     command = Input(JumpCommand, text="the next jump")
     part = Input(PlanPart, text="the planner's answer")
     phase = Input(PhaseState, text="the phase; wire it with a delay of 1")
@@ -215,20 +227,9 @@ class SteeredPlan(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Report a robot whose feet have no direction, or that has no stored plans."""
-        robot = context.robot
-        assert robot is not None
-        kinds = [foot_shape(robot, foot)[0] for foot in range(len(robot.feet))]
-        if FootKind.POINT in kinds:
-            yield UnmetRequirement(
-                f"{robot.feet[kinds.index(FootKind.POINT)].name} of {robot.name} is a point, which has no "
-                "direction; commands are relative to the direction of the feet",
-                expected="a robot whose feet have two contact points or more each",
-                found=f"{robot.name} with point feet",
-                fix="robot: bruce, as a key of the graph",
-            )
-            return
-        yield from missing_plans(robot)
+        """Report a robot that has no stored plans."""
+        assert context.robot is not None
+        return missing_plans(context.robot)
 
     def setup(self) -> None:
         followed, feet = self.followed, len(self.robot.feet)
@@ -238,7 +239,12 @@ class SteeredPlan(Block):
             followed.contact, self.scratch.values,
         )  # fmt: skip
         self.rotation = FlightRotation(*(np.zeros(size) for size in (1, 1, 1, 4)))
-        self.counted = np.ones(feet, dtype=np.bool_)
+        self.directions, points = standing_directions(self.robot)
+        self.counted = ~points
+        self.constants.of_points = bool(points.all())
+        reach = level_reach(self.robot.name)
+        self.constants.ahead, self.constants.back = reach.ahead, reach.back
+        self.constants.aside = reach.aside
         self.constants.lead = -1.0 if self.params.lead is None else self.params.lead
         self.constants.follows_motion = self.params.by == "progress"
         self.constants.period = self.period
@@ -269,9 +275,10 @@ class SteeredPlan(Block):
         progress: PlanProgress,
         table: TableRows,
         rotation: FlightRotation,
+        directions: Array2D,
         counted: Flags1D,
         params: Params,
-        constants: ProgressConstants,
+        constants: SteeringConstants,
         scratch: Scratch,
         clock: Clock,
     ) -> None:
@@ -279,7 +286,11 @@ class SteeredPlan(Block):
         middle_of(terms.foot_position, scratch.vector)
         turn_about_vertical(scratch.vector, memory.heading, scratch.middle)
         scratch.middle[:] = scratch.middle + memory.origin
-        heading = memory.heading + mean_heading(terms.foot_rotation, counted)
+        heading = memory.heading + (
+            pattern_turn(directions, scratch.origin, terms.foot_position, scratch.vector)
+            if constants.of_points
+            else mean_heading(terms.foot_rotation, counted)
+        )
         stands = phase.phase == Phase.STAND and now >= params.settle_time
         if stands and not memory.started:
             begin(scratch.middle, heading, memory)
@@ -314,7 +325,7 @@ class SteeredPlan(Block):
         if thrusts and not memory.waits and command.replaces and command.number > memory.taken:
             left = reference.lift_off_time - reference.time
             if memory.shift_time == 0.0 and left >= params.retarget_time:
-                retarget(command, reference, left, params, followed, memory)
+                retarget(command, reference, left, params, constants, followed, memory)
         if memory.shift_time > 0.0:
             shift_landing(reference, memory)
         if memory.jumps > 0:
@@ -393,6 +404,7 @@ def retarget(
     reference: JumpReference,
     left: float,
     params: SteeredPlan.Params,
+    constants: SteeringConstants,
     followed: FollowedPlan,
     memory: SteeringState,
 ) -> None:
@@ -410,9 +422,11 @@ def retarget(
     sine, cosine = sincos(memory.heading)
     u, v = memory.goal[0] - x, memory.goal[1] - y
     wanted_ahead, wanted_aside = cosine * u + sine * v, cosine * v - sine * u
-    ahead = min(max(wanted_ahead, -FARTHEST_BACK - memory.asked[0]), FARTHEST - memory.asked[0])
+    ahead = min(
+        max(wanted_ahead, -constants.back - memory.asked[0]), constants.ahead - memory.asked[0]
+    )
     aside = min(
-        max(wanted_aside, -FARTHEST_ASIDE - memory.asked[1]), FARTHEST_ASIDE - memory.asked[1]
+        max(wanted_aside, -constants.aside - memory.asked[1]), constants.aside - memory.asked[1]
     )
     memory.shift_time = min(left, params.retarget_window)
     flight = reference.touchdown_time - reference.lift_off_time

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Mapping
 from enum import IntEnum
 from math import degrees, radians, sqrt
 
+from ...mathematics.arrays import Array2D
 from ...mathematics.elementary import atan2, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import wrap
+from ...robots.foot_directions import standing_directions
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import parameter
@@ -121,6 +123,7 @@ class CourseScore(Block):
     def setup(self) -> None:
         footing = Footing(self.robot)
         self.balls = footing.ball_feet()
+        self.directions, _ = standing_directions(self.robot)
         criteria = self.params.for_robot(footing)
         assert isinstance(criteria, CourseCriteria)
         self._criteria = criteria
@@ -134,6 +137,7 @@ class CourseScore(Block):
         wbc: WholeBodyCommand,
         record: CourseRecord,
         balls: BallFeet,
+        directions: Array2D,
         params: CourseCriteria,
         constants: StandConstants,
         scratch: CourseEnd,
@@ -147,10 +151,10 @@ class CourseScore(Block):
         if record_fall(truth, record, params, constants):
             scratch.ending = CourseEnding.FELL
         if goal.number == 0:
-            find_place(record)
+            find_place(record, directions)
             record.start[:] = record.middle
             record.start_heading = record.heading
-        record_landings(truth, goal, record, params, constants)
+        record_landings(truth, goal, record, directions, params, constants)
         over = params.jumps > 0 and record.jumps >= params.jumps
         rested = now - record.landed_time >= params.rest_time - 1e-9
         if over and rested and record.judged_time == NEVER:
@@ -208,15 +212,16 @@ class CourseScore(Block):
 
 
 @kernel
-def find_place(record: CourseRecord) -> None:
-    """Find the middle of the feet and their heading."""
+def find_place(record: CourseRecord, directions: Array2D) -> None:
+    """Find the middle of the feet and how they are turned from their ``directions`` as the robot stands."""
     record.middle[:] = 0.0
     x = y = 0.0
     feet = record.foot.shape[0]
     for foot in range(feet):
         record.middle[:] += record.foot[foot] / feet
-        x += record.direction[foot, 0]
-        y += record.direction[foot, 1]
+        u, v = directions[foot, 0], directions[foot, 1]
+        x += u * record.direction[foot, 0] + v * record.direction[foot, 1]
+        y += u * record.direction[foot, 1] - v * record.direction[foot, 0]
     record.heading = atan2(y, x)
 
 
@@ -225,6 +230,7 @@ def record_landings(
     truth: RobotTruth,
     goal: CourseGoal,
     record: CourseRecord,
+    directions: Array2D,
     params: CourseCriteria,
     constants: StandConstants,
 ) -> None:
@@ -245,13 +251,13 @@ def record_landings(
     if record.flies or record.measured or record.landed_time == NEVER:
         return
     if record.now - record.landed_time >= params.measure_time:
-        measure_place(record)
+        measure_place(record, directions)
 
 
 @kernel
-def measure_place(record: CourseRecord) -> None:
+def measure_place(record: CourseRecord, directions: Array2D) -> None:
     """Compare the place of the feet with the target."""
-    find_place(record)
+    find_place(record, directions)
     x, y = record.middle[0] - record.start[0], record.middle[1] - record.start[1]
     sine, cosine = sincos(record.start_heading)
     dx = cosine * x + sine * y - record.target[0]

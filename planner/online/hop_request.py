@@ -9,8 +9,6 @@ from typing import NamedTuple
 from ..task.sequence import PhaseSpec
 from ..task.task import JumpTask, Knots, make_task
 
-RISE = 0.09
-"""Apex of the centre of mass above standing [m]."""
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 STEP_KNOTS = Knots(squat=9, thrust=10, flight=12, landing=10)
 """Those of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
@@ -18,11 +16,6 @@ RISE_SHARE = 0.5
 """How much higher a jump goes for each metre that it lands higher: with a half, flights take equally long."""
 TOE_KNOTS = 4
 """Intervals of the part of the thrust on the toes, which is 40 ms long."""
-REACH = {"ahead": 0.32, "back": 0.10, "aside": 0.30, "turn": 0.87}
-"""The largest distance ahead, back and aside [m] and turn [rad]. Jumps further back with a turn are planned, but
-in the robust trial they land askew."""
-STEP_REACH = {"least": 0.12, "ahead": 0.32, "aside": 0.10, "turn": 0.35, "up": 0.06}
-"""The same for jumps up or down: nearer than ``least`` the edge would lie under the feet."""
 LEVEL = 0.005
 """A difference of height [m] that landing takes without being told of it."""
 
@@ -42,29 +35,68 @@ class HopRequest(NamedTuple):
         return abs(self.up) < LEVEL
 
 
-def within_reach(wanted: HopRequest) -> HopRequest:
-    """The nearest request that a jump can do: in half an ellipse ahead and half of one
-    back, and within the largest turn; up or down in a box ahead."""
-    if not wanted.level:
-        r = STEP_REACH
+class HopReach(NamedTuple):
+    """The largest distance ahead, back and aside [m] and turn [rad] of a robot's jumps on level ground, and the
+    apex of the centre of mass above standing [m] that all of them have."""
+
+    ahead: float
+    back: float
+    aside: float
+    turn: float
+    rise: float
+
+    def nearest(self, wanted: HopRequest) -> HopRequest:
+        """The nearest request that a jump can do: in half an ellipse ahead and half of one back, and within
+        the largest turn."""
+        shorter = max(self._share(wanted), 1.0)
+        turn = _clip(wanted.turn, -self.turn, self.turn)
+        up = wanted.up if wanted.level else 0.0
+        return HopRequest(wanted.ahead / shorter, wanted.aside / shorter, turn, up)
+
+    def share(self, wanted: HopRequest) -> float:
+        """By how much all limits must be multiplied for the request to be at their edge."""
+        return max(self._share(wanted), abs(wanted.turn) / self.turn)
+
+    def _share(self, wanted: HopRequest) -> float:
+        along = self.ahead if wanted.ahead >= 0.0 else self.back
+        return math.hypot(wanted.ahead / along, wanted.aside / self.aside)
+
+    def shortened(self, share: float) -> HopReach:
+        """That share of all limits; the jumps are as high."""
+        ahead, back, aside, turn = (_rounded(share * limit) for limit in self[:4])
+        return HopReach(ahead, back, aside, turn, self.rise)
+
+
+class StepReach(NamedTuple):
+    """The same of jumps up and down, which all go ahead: nearer than ``least`` the edge would lie under the feet."""
+
+    least: float
+    ahead: float
+    aside: float
+    turn: float
+    up: float
+    down: float
+    rise: float
+
+    def nearest(self, wanted: HopRequest) -> HopRequest:
+        """The nearest request in the box of these limits."""
         return HopRequest(
-            _clip(wanted.ahead, r["least"], r["ahead"]), _clip(wanted.aside, -r["aside"], r["aside"]),
-            _clip(wanted.turn, -r["turn"], r["turn"]), _clip(wanted.up, -r["up"], r["up"]),
+            _clip(wanted.ahead, self.least, self.ahead), _clip(wanted.aside, -self.aside, self.aside),
+            _clip(wanted.turn, -self.turn, self.turn), _clip(wanted.up, -self.down, self.up),
         )  # fmt: skip
-    along = REACH["ahead"] if wanted.ahead >= 0.0 else REACH["back"]
-    share = math.hypot(wanted.ahead / along, wanted.aside / REACH["aside"])
-    shorter = max(share, 1.0)
-    turn = _clip(wanted.turn, -REACH["turn"], REACH["turn"])
-    return HopRequest(wanted.ahead / shorter, wanted.aside / shorter, turn, wanted.up)
 
 
 def _clip(value: float, least: float, most: float) -> float:
     return min(max(value, least), most)
 
 
+def _rounded(value: float) -> float:
+    return round(value, 3)
+
+
 @lru_cache(maxsize=4)
-def task_of(wanted: HopRequest, robot: str = "bruce") -> JumpTask:
-    """The task of the requested jump.
+def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
+    """The task of the requested jump of a robot, whose apex is ``rise`` [m] above standing on level ground.
 
     Raises:
         JumpTaskError: there is no such jump.
@@ -74,7 +106,7 @@ def task_of(wanted: HopRequest, robot: str = "bruce") -> JumpTask:
         {
             "name": "hop",
             "robot": robot,
-            "rise": RISE + RISE_SHARE * up,
+            "rise": rise + RISE_SHARE * up,
             "distance_x": wanted.ahead,
             "distance_y": wanted.aside,
             "twist": wanted.turn,

@@ -1,13 +1,18 @@
-"""Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples``.
+"""Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples ROBOT``.
 
 Hops are spread evenly over all requests by a Halton sequence. On level ground half of them go ahead and half
 back. They are solved from the shortest to the longest, each from the nearest of those before it or from nothing. Those up and
 down all go ahead, and are solved in the same way, the first from its neighbour on level ground. Those without a
-valid plan are left out. Either takes five minutes of one core.
+valid plan are left out. Either takes five minutes of one core for a biped.
+
+What is asked for are the limits of BRUCE, times how high the robot's centre of mass stands, unless options such as ``--back 0.3``
+say other ones. The reach of the plans is the largest share of them within which nine of ten requests have a plan.
+``--steps 80`` plans those up and down, too, whose limits are options such as ``--step-ahead 0.5``.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Sequence
 
@@ -18,16 +23,20 @@ from ..checking.validity import check_plan
 from ..solving.solve import solve_jump
 from ..task.files import PlanError
 from ..task.plan import PlannedJump
+from ..task.scaling import HEIGHT, standing_height
 from .hop_plans import samples_path
-from .hop_request import REACH, STEP_REACH, HopRequest, coarse, task_of
-from .plan_samples import SCALES, PlanSamples, samples_of, write_samples
+from .hop_request import HopReach, HopRequest, StepReach, coarse, task_of
+from .plan_samples import SCALES, PlanSamples, read_samples, samples_of, write_samples
 
+REACH = HopReach(ahead=0.32, back=0.10, aside=0.30, turn=0.87, rise=0.09)
+"""BRUCE's. Jumps further back with a turn are planned, but in the robust trial they land askew."""
+STEP_REACH = StepReach(least=0.12, ahead=0.32, aside=0.10, turn=0.35, up=0.06, down=0.06, rise=0.09)
+ENOUGH = 0.9
+"""The share of requests within a reach that have a plan."""
 COUNT = 96
-"""Requests that are tried."""
+"""Requests on level ground that are tried."""
 MARGIN = 1.08
 """How much further than the reach they go, so that requests at its edge lie between them."""
-STEPPED = 80
-"""The same of jumps up and down."""
 BASES = (2, 3, 5, 7)
 STILL = HopRequest(0.0, 0.0, 0.0)
 
@@ -42,55 +51,92 @@ def halton(index: int, base: int) -> float:
     return value
 
 
-def request(index: int) -> HopRequest:
+def request(index: int, reach: HopReach) -> HopRequest:
     """A request of the sequence."""
     distance, direction, turn = (halton(index // 2 + 1, base) for base in BASES[:3])
     radius, angle = MARGIN * math.sqrt(distance), math.pi * (direction - 0.5)
-    along = REACH["ahead"] if index % 2 == 0 else -REACH["back"]
+    along = reach.ahead if index % 2 == 0 else -reach.back
     return HopRequest(
         round(along * radius * math.cos(angle), 4),
-        round(REACH["aside"] * radius * math.sin(angle), 4),
-        round(MARGIN * REACH["turn"] * (2.0 * turn - 1.0), 4),
+        round(reach.aside * radius * math.sin(angle), 4),
+        round(MARGIN * reach.turn * (2.0 * turn - 1.0), 4),
     )
 
 
-def step_request(index: int) -> HopRequest:
+def step_request(index: int, reach: StepReach) -> HopRequest:
     """A request of the sequence of jumps up and down."""
     distance, aside, turn, up = (2.0 * halton(index + 1, base) - 1.0 for base in BASES)
-    r = STEP_REACH
-    middle, half = 0.5 * (r["ahead"] + r["least"]), 0.5 * (r["ahead"] - r["least"])
+    level, height = 0.5 * (reach.up - reach.down), 0.5 * (reach.up + reach.down)
+    middle, half = 0.5 * (reach.ahead + reach.least), 0.5 * (reach.ahead - reach.least)
     return HopRequest(
-        round(middle + MARGIN * half * distance, 4), round(MARGIN * r["aside"] * aside, 4),
-        round(MARGIN * r["turn"] * turn, 4), round(MARGIN * r["up"] * up, 4),
+        round(middle + MARGIN * half * distance, 4), round(MARGIN * reach.aside * aside, 4),
+        round(MARGIN * reach.turn * turn, 4), round(level + MARGIN * height * up, 4),
     )  # fmt: skip
 
 
-def find_samples(robot: RobotDescription, count: int = COUNT) -> PlanSamples:
+def scaled(limits: Sequence[float], robot: RobotDescription) -> list[float]:
+    """Lengths of BRUCE for another robot."""
+    share = standing_height(robot) / HEIGHT
+    return [round(share * length, 3) for length in limits]
+
+
+def reach_for(robot: RobotDescription) -> HopReach:
+    """What is asked of a robot on level ground."""
+    ahead, back, aside, rise = scaled((*REACH[:3], REACH.rise), robot)
+    return HopReach(ahead, back, aside, REACH.turn, rise)
+
+
+def step_reach_for(robot: RobotDescription, rise: float) -> StepReach:
+    """What is asked of it up and down."""
+    least, ahead, aside, up, down = scaled((*STEP_REACH[:3], *STEP_REACH[4:6]), robot)
+    return StepReach(least, ahead, aside, STEP_REACH.turn, up, down, rise)
+
+
+def find_samples(robot: RobotDescription, wanted: HopReach, count: int = COUNT) -> PlanSamples:
     """Plan those on level ground."""
-    return _find(robot, (STILL, *map(request, range(count))), [], [])
+    requests = (STILL, *(request(index, wanted) for index in range(count)))
+    asked, plans = _find(robot, requests, wanted.rise, [], [])
+    return samples_of(robot.name, plans, asked, reached(wanted, requests, asked))
 
 
-def find_steps(robot: RobotDescription, level: PlanSamples, count: int = STEPPED) -> PlanSamples:
+def reached(
+    wanted: HopReach, requests: Sequence[HopRequest], planned: Sequence[HopRequest]
+) -> HopReach:
+    """The largest share of the limits within which enough requests have a plan."""
+    for percent in range(100, 0, -5):
+        share = 0.01 * percent
+        within = [one for one in requests if wanted.share(one) <= MARGIN * share]
+        if sum(one in planned for one in within) >= ENOUGH * len(within):
+            return wanted if percent == 100 else wanted.shortened(share)
+    return wanted.shortened(0.0)
+
+
+def find_steps(
+    robot: RobotDescription, level: PlanSamples, wanted: StepReach, count: int
+) -> PlanSamples:
     """Plan those up and down, the first from its neighbour on level ground."""
     rows = range(len(level.requests))
     near = [HopRequest(*level.requests[row].tolist()) for row in rows]
-    wanted = tuple(one for one in map(step_request, range(count)) if not one.level)
-    return _find(robot, wanted, near, [level.plan(row) for row in rows])
+    requests = (step_request(index, wanted) for index in range(count))
+    asked, plans = _find(
+        robot, [one for one in requests if not one.level], wanted.rise, near, list(map(level.plan, rows))
+    )  # fmt: skip
+    return samples_of(robot.name, plans, asked, wanted)
 
 
 def _find(
-    robot: RobotDescription, requests: Sequence[HopRequest], near: Sequence[HopRequest],
+    robot: RobotDescription, requests: Sequence[HopRequest], rise: float, near: Sequence[HopRequest],
     there: Sequence[PlannedJump],
-) -> PlanSamples:  # fmt: skip
+) -> tuple[list[HopRequest], list[PlannedJump]]:  # fmt: skip
     """Plan all requests, from plans that are there and from each other."""
     asked, plans = [*near], [*there]
     for wanted in sorted(requests, key=lambda one: apart(one, STILL)):
-        found = _plan(wanted, robot, _nearest(wanted, asked, plans))
+        found = _plan(wanted, robot, rise, _nearest(wanted, asked, plans))
         if found is not None:
             asked.append(wanted)
             plans.append(found)
     own = slice(len(near), None)
-    return samples_of(robot.name, plans[own], asked[own])
+    return asked[own], plans[own]
 
 
 def apart(one: HopRequest, other: HopRequest) -> float:
@@ -112,10 +158,10 @@ def _nearest(
 
 
 def _plan(
-    wanted: HopRequest, robot: RobotDescription, near: PlannedJump | None
+    wanted: HopRequest, robot: RobotDescription, rise: float, near: PlannedJump | None
 ) -> PlannedJump | None:
     """A valid plan on the knots of all samples, with all coordinates."""
-    task = coarse(task_of(wanted, robot.name).resolved(robot))
+    task = coarse(task_of(wanted, robot.name, rise).resolved(robot))
     for start in (near, None) if near is not None else (None,):
         try:
             plan = solve_jump(task, robot, warm_start=start, knots=task.knots, quick=True)
@@ -128,8 +174,34 @@ def _plan(
     return None
 
 
+def main() -> None:
+    """Plan the hops of the robot that the command line names."""
+    parser = argparse.ArgumentParser(description="Plans the hops of a robot.")
+    parser.add_argument("robot", nargs="?", default="bruce")
+    parser.add_argument(
+        "--count", type=int, default=COUNT, help="requests on level ground; 0: none"
+    )
+    parser.add_argument("--steps", type=int, default=0, help="requests up and down, such as 80")
+    for limit in HopReach._fields:
+        parser.add_argument(f"--{limit}", type=float, help="m or rad, on level ground")
+    for limit in StepReach._fields:
+        parser.add_argument(f"--step-{limit}", type=float, help="m or rad, up and down")
+    given = vars(parser.parse_args())
+
+    def told(fields: Sequence[str], prefix: str = "") -> dict[str, float]:
+        return {name: given[prefix + name] for name in fields if given[prefix + name] is not None}
+
+    robot = find_robot(given["robot"])
+    if given["count"]:
+        wanted = reach_for(robot)._replace(**told(HopReach._fields))
+        level = find_samples(robot, wanted, given["count"])
+        print(write_samples(samples_path(robot.name), level), level.reach)
+    if given["steps"]:
+        level = read_samples(samples_path(robot.name))
+        own = step_reach_for(robot, level.reach.rise)._replace(**told(StepReach._fields, "step_"))
+        steps = find_steps(robot, level, own, given["steps"])
+        print(write_samples(samples_path(robot.name, steps=True), steps), steps.reach)
+
+
 if __name__ == "__main__":
-    ROBOT = find_robot("bruce")
-    ON_LEVEL = find_samples(ROBOT)
-    print(write_samples(samples_path(ROBOT.name), ON_LEVEL))
-    print(write_samples(samples_path(ROBOT.name, steps=True), find_steps(ROBOT, ON_LEVEL)))
+    main()

@@ -14,7 +14,7 @@ from ..problem.unpacking import can_start, pack, unpack
 from ..task.plan import PlannedJump
 from .correction import Corrector
 from .hop_problems import HopProblems
-from .hop_request import HopRequest, coarse, task_of, within_reach
+from .hop_request import HopRequest, coarse, task_of
 from .plan_samples import PlanSamples
 
 
@@ -41,9 +41,12 @@ class HopPlan:
 
 
 class HopPlanner:
-    """Plans hops of one robot; each plan follows from its request alone."""
+    """Plans hops of one robot; each plan follows from its request alone. Without stored plans up and down (``steps``)
+    all of its jumps are on level ground."""
 
-    def __init__(self, robot: RobotDescription, samples: PlanSamples, steps: PlanSamples) -> None:
+    def __init__(
+        self, robot: RobotDescription, samples: PlanSamples, steps: PlanSamples | None
+    ) -> None:
         self.robot = robot
         self._level, self._steps = samples, steps
         self._problems = HopProblems(robot)
@@ -53,17 +56,20 @@ class HopPlanner:
         """Load compiled functions and make the correctors, so that no later plan has to wait for them."""
         # Feet land in another way after a jump back; a step up has other bounds than one down. Jumps
         # straight ahead have fewer coordinates.
-        for ahead, up in ((0.0, 0.0), (-0.05, 0.0), (0.2, 0.03), (0.2, -0.03)):
+        kinds = [(0.0, 0.0), (-0.05, 0.0)]
+        if self._steps is not None:
+            kinds += [(0.2, 0.03), (0.2, -0.03)]
+        for ahead, up in kinds:
             for aside in (0.0, 0.01):
                 self.plan(HopRequest(ahead, aside, 0.0, up))
 
     def samples(self, wanted: HopRequest) -> PlanSamples:
         """The stored plans of jumps of its kind."""
-        return self._level if wanted.level else self._steps
+        return self._level if wanted.level or self._steps is None else self._steps
 
     def plan(self, wanted: HopRequest) -> HopPlan:
         """The plan of a request, or of what is nearest to it."""
-        within = within_reach(wanted)
+        within = self.samples(wanted).reach.nearest(wanted)
         found, steps, solve_s = self._solve(within)
         if found is None:
             return self._stored(within, PlanOutcome.UNSOLVED, steps, (), solve_s, 0.0)
@@ -95,9 +101,10 @@ class HopPlanner:
     def _solve(self, wanted: HopRequest) -> tuple[PlannedJump | None, int, float]:
         """A plan that has not been checked, the steps and the processor time [s]."""
         started = time.process_time()
-        task = coarse(task_of(wanted, self.robot.name).resolved(self.robot))
+        rise = self.samples(wanted).reach.rise
+        task = coarse(task_of(wanted, self.robot.name, rise).resolved(self.robot))
         straight = not wanted.aside and not wanted.turn
-        coordinates = "sagittal" if straight else "full"
+        coordinates = "" if straight else "full"  # the smallest that the robot has
         problem = self._problems.problem(task, coordinates)
         plan, steps = None, 0
         for near in self._guesses(wanted):
@@ -108,7 +115,7 @@ class HopPlanner:
             steps += found.steps
             if found.solved:
                 plan = PlannedJump(task=task, **unpack(problem, found.values))
-                plan = replace(plan, statistics={"coordinates": coordinates})
+                plan = replace(plan, statistics={"coordinates": problem.coordinates.name})
                 break
         return plan, steps, time.process_time() - started
 

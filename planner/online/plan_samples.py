@@ -22,9 +22,9 @@ from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
-from .hop_request import HopRequest, task_of, within_reach
+from .hop_request import HopReach, HopRequest, StepReach, task_of
 
-FILE_FORMAT = "aloft hop plans 2"
+FILE_FORMAT = "aloft hop plans 3"
 SCALES = np.array([0.1, 0.1, 0.4, 0.05])
 """What difference of each part of a request counts as a distance of 1."""
 NEAR = 0.3
@@ -41,12 +41,14 @@ class PlanSamples:
         requests: (n, 4), one row a plan in the order of ``HopRequest``.
         arrays: those of ``PlannedJump``, each with a first axis of n.
         flights: lift-off and touchdown [s], (n, 2).
+        reach: the limits of the requests that may be asked for.
     """
 
     robot: str
     requests: Array
     arrays: dict[str, NDArray[np.generic]]
     flights: Array
+    reach: HopReach | StepReach
 
     def weights(self, wanted: HopRequest) -> Array:
         """The share of each plan in that of the request, (n,). Feet land in another way after a jump
@@ -68,7 +70,7 @@ class PlanSamples:
         apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
         for row, request in enumerate(self.requests.tolist()):
-            if within_reach(HopRequest(*request)) != HopRequest(*request):
+            if self.reach.nearest(HopRequest(*request)) != HopRequest(*request):
                 square[row] = np.inf
         return int(square.argmin())
 
@@ -93,7 +95,7 @@ class PlanSamples:
         turn /= np.linalg.norm(turn, axis=1)[:, None]
         lift_off, touchdown = _mean(weights, self.flights).tolist()
         return PlannedJump(
-            task=task_of(wanted, self.robot),
+            task=task_of(wanted, self.robot, self.reach.rise),
             lift_off_time=lift_off,
             touchdown_time=touchdown,
             statistics={"coordinates": "full"},
@@ -116,20 +118,30 @@ def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:
 
 
 def samples_of(
-    robot: str, plans: Sequence[PlannedJump], asked: Sequence[HopRequest]
+    robot: str,
+    plans: Sequence[PlannedJump],
+    asked: Sequence[HopRequest],
+    reach: HopReach | StepReach,
 ) -> PlanSamples:
     """The plans of these requests together. Quaternions take the sign with w >= 0."""
     arrays = {name: np.stack([getattr(plan, name) for plan in plans]) for name in ARRAYS}
     turn = arrays["position"][:, :, 3:7]
     turn *= np.where(turn[:, :, 3:] < 0.0, -1.0, 1.0)
     flights = np.array([[plan.lift_off_time, plan.touchdown_time] for plan in plans])
-    return PlanSamples(robot, np.array(asked, dtype=np.float64), arrays, flights)
+    return PlanSamples(robot, np.array(asked, dtype=np.float64), arrays, flights, reach)
 
 
 def write_samples(path: Path, samples: PlanSamples) -> Path:
     """Write the file, in single precision: plans made from it are solved and checked anew."""
     memory = io.BytesIO()
-    header = json.dumps({"format": FILE_FORMAT, "robot": samples.robot, "units": ARRAYS})
+    header = json.dumps(
+        {
+            "format": FILE_FORMAT,
+            "robot": samples.robot,
+            "reach": samples.reach._asdict(),
+            "units": ARRAYS,
+        }
+    )
     stored: dict[str, Any] = {
         name: array if name in KEPT_EXACTLY else array.astype(np.float32)
         for name, array in samples.arrays.items()
@@ -158,7 +170,9 @@ def read_samples(path: Path) -> PlanSamples:
                     f"{path} is of format {header.get('format')!r}, expected {FILE_FORMAT!r}"
                 )
             arrays = {name: file[name] for name in ARRAYS}
-            return PlanSamples(header["robot"], file["requests"], arrays, file["flights"])
+            limits = header["reach"]
+            reach = StepReach(**limits) if "least" in limits else HopReach(**limits)
+            return PlanSamples(header["robot"], file["requests"], arrays, file["flights"], reach)
     except OSError as error:
         raise PlanFileError(f"cannot read {path}: {error.strerror or error}") from error
     except PlanFileError:

@@ -13,6 +13,7 @@ from aloft.blocks.signals.steering import PART_ROWS
 from aloft.planner.library.jump_table import table_rows
 from aloft.planner.online.hop_plans import hop_table, shipped_samples
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import standing_feet
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
@@ -178,9 +179,30 @@ def test_what_cannot_be_done_moves_the_goal_to_what_is_done() -> None:
     assert int(goal.outcome) == PlanOutcome.UNSOLVED
 
 
-def test_feet_without_a_direction_are_refused() -> None:
-    with pytest.raises(BlockError, match="is a point, which has no direction"):
-        BlockBench(SteeredPlan, robot="go2")
+@pytest.mark.parametrize("heading", [0.0, 0.4, -2.0])
+def test_point_feet_give_the_direction_together(heading: float) -> None:
+    robot = find_robot("go2")
+    bench = BlockBench(SteeredPlan, {"settle_time": 0.01}, robot="go2")
+    cosine, sine = math.cos(heading), math.sin(heading)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    feet = standing_feet(robot)
+    # How the links of the calves are turned says nothing.
+    bench.set("terms", foot_position=feet @ turn.T, foot_rotation=np.tile(np.eye(3), (4, 1, 1)))
+    bench.set("phase", phase=Phase.STAND)
+    for _ in range(8):
+        bench.step()
+    bench.set("command", number=1, placed=True, ahead=0.3, aside=0.1, turn=0.0, up=0.0)
+    bench.step()
+    request = bench.get("request")
+    middle = (feet @ turn.T).mean(axis=0)
+    way = turn.T @ ([0.3, 0.1, 0.0] - middle)
+    assert [request.ahead, request.aside] == pytest.approx(way[:2].tolist())
+    assert float(request.turn) == pytest.approx(-heading)
+
+
+def test_a_robot_without_stored_plans_is_refused() -> None:
+    with pytest.raises(BlockError, match="no stored plans of hops for a1"):
+        BlockBench(SteeredPlan, robot="a1")
 
 
 def thrusting(left: float) -> BlockBench[SteeredPlan]:

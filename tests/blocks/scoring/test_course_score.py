@@ -10,6 +10,7 @@ import pytest
 from aloft.blocks.scoring.course_score import CourseScore
 from aloft.blocks.scoring.footing import Footing
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import standing_feet
 from aloft.runtime.testing import BlockBench
 
 ROBOT = find_robot("bruce")
@@ -95,3 +96,20 @@ def test_a_fall_ends_the_run() -> None:
     bench.step()
     assert bench.stop_reason == "the robot fell"
     assert str(bench.block.metrics()["reason"]).startswith("fell at 0.000 s")
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.6, -2.5])
+def test_feet_that_are_points_have_a_heading_together(heading: float) -> None:
+    robot = find_robot("go2")
+    bench = BlockBench(CourseScore, {"jumps": 1}, robot=robot, rate=1 / PERIOD)
+    cosine, sine = math.cos(heading), math.sin(heading)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    points = standing_feet(robot) @ turn.T
+    bench.set(
+        "truth", base_position=[0.0, 0.0, 0.3],
+        base_orientation=[0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading)],
+        contact_position=points, contact_touched=np.ones(4, dtype=np.bool_),
+    )  # fmt: skip
+    bench.step()
+    assert float(bench.block.record.start_heading) == pytest.approx(heading)
+    assert np.asarray(bench.block.record.start) == pytest.approx(points.mean(axis=0)[:2])

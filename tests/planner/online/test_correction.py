@@ -19,7 +19,7 @@ SAMPLES = shipped_samples("bruce")
 
 
 def problem_and_guess(wanted: HopRequest):
-    task = coarse(task_of(wanted).resolved(ROBOT))
+    task = coarse(task_of(wanted, "bruce", SAMPLES.reach.rise).resolved(ROBOT))
     problem = make_problem(task, ROBOT, coordinates="full")
     return problem, pack(problem, SAMPLES.interpolated(wanted))
 

@@ -14,7 +14,7 @@ ARRAYS = ("lower", "upper", "row_lower", "row_upper", "parameters", "steps")
 
 
 def resolved(wanted: HopRequest):
-    return coarse(task_of(wanted).resolved(ROBOT))
+    return coarse(task_of(wanted, "bruce", 0.09).resolved(ROBOT))
 
 
 @pytest.mark.long

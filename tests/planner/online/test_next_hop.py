@@ -50,6 +50,24 @@ def test_where_the_motion_between_plans_leads_to_none_one_near_the_nearest_is_lo
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    "wanted", [HopRequest(0.2, 0.0, 0.0), HopRequest(-0.25, 0.1, 0.4), HopRequest(0.0, -0.2, -0.6)]
+)
+def test_a_robot_with_four_points_for_feet_hops_too(wanted: HopRequest) -> None:
+    robot = find_robot("go2")
+    found = HopPlanner(robot, shipped_samples("go2"), None).plan(wanted)
+    assert (found.outcome, found.done) == (PlanOutcome.PLANNED, wanted)
+    require_valid(found.plan, robot)
+
+
+@pytest.mark.long
+def test_without_plans_up_and_down_all_jumps_are_level() -> None:
+    planner = HopPlanner(ROBOT, shipped_samples("bruce"), None)
+    found = planner.plan(HopRequest(0.2, 0.0, 0.0, 0.05))
+    assert (found.outcome, found.done) == (PlanOutcome.NEAREST, HopRequest(0.2, 0.0, 0.0))
+
+
+@pytest.mark.long
 def test_where_the_solver_does_not_end_a_stored_plan_is_followed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

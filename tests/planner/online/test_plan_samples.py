@@ -9,32 +9,53 @@ import numpy as np
 import pytest
 
 from aloft.planner.online.hop_plans import samples_path, shipped_samples
-from aloft.planner.online.hop_request import REACH, HopRequest, within_reach
+from aloft.planner.online.hop_request import HopReach, HopRequest, StepReach
+from aloft.planner.online.make_samples import reach_for, reached, request
 from aloft.planner.online.plan_samples import read_samples, write_samples
 from aloft.planner.task.plan import ARRAYS, PlanFileError
+from aloft.robots.description import find_robot
 
 SAMPLES = shipped_samples("bruce")
 STEPS = shipped_samples("bruce", steps=True)
+REACH = HopReach(ahead=0.32, back=0.1, aside=0.3, turn=0.87, rise=0.09)
+UP = StepReach(least=0.12, ahead=0.32, aside=0.1, turn=0.35, up=0.06, down=0.04, rise=0.09)
 
 
 def test_a_request_within_reach_is_left_and_another_comes_to_the_edge() -> None:
     near = HopRequest(0.2, 0.1, -0.3)
-    assert within_reach(near) == near
-    far = within_reach(HopRequest(3.0, 0.0, 2.0))
-    assert far == pytest.approx((REACH["ahead"], 0.0, REACH["turn"], 0.0))
-    back = within_reach(HopRequest(-1.0, 1.0, 0.0))
-    assert (back.ahead / REACH["back"]) ** 2 + (back.aside / REACH["aside"]) ** 2 == pytest.approx(
-        1.0
-    )
+    assert REACH.nearest(near) == near
+    far = REACH.nearest(HopRequest(3.0, 0.0, 2.0))
+    assert far == pytest.approx((REACH.ahead, 0.0, REACH.turn, 0.0))
+    back = REACH.nearest(HopRequest(-1.0, 1.0, 0.0))
+    assert (back.ahead / REACH.back) ** 2 + (back.aside / REACH.aside) ** 2 == pytest.approx(1.0)
     assert back.ahead == pytest.approx(-back.aside)
+    level = HopRequest(-0.05, 0.2, 0.0, 0.004)
+    assert level.level and REACH.nearest(level) == level, "landing takes so little without a plan"
 
 
 def test_a_jump_up_goes_ahead_and_not_too_high() -> None:
     near = HopRequest(0.2, 0.05, -0.3, 0.05)
-    assert within_reach(near) == near
-    assert within_reach(HopRequest(-0.2, 0.0, 0.0, -0.2)) == pytest.approx((0.12, 0.0, 0.0, -0.06))
-    level = HopRequest(-0.05, 0.2, 0.0, 0.004)
-    assert level.level and within_reach(level) == level, "landing takes so little without a plan"
+    assert UP.nearest(near) == near
+    assert UP.nearest(HopRequest(-0.2, 0.0, 0.0, -0.2)) == pytest.approx((0.12, 0.0, 0.0, -0.04))
+    assert REACH.nearest(HopRequest(0.2, 0.0, 0.0, 0.2)) == HopRequest(0.2, 0.0, 0.0)
+
+
+def test_reach_is_where_nine_of_ten_requests_have_plans() -> None:
+    requests = [request(index, REACH) for index in range(96)]
+    assert reached(REACH, requests, requests) == REACH
+    near = [one for one in requests if REACH.share(one) < 0.5]
+    found = reached(REACH, requests, near)
+    assert 0.3 < found.ahead / REACH.ahead < 0.6
+    assert found.rise == REACH.rise
+    within = [one for one in requests if found.share(one) <= 1.0]
+    assert sum(one in near for one in within) >= 0.9 * len(within)
+
+
+def test_reach_is_told_by_the_file_and_asked_for_by_size() -> None:
+    assert SAMPLES.reach == REACH == reach_for(find_robot("bruce"))
+    other = find_robot("go2")
+    assert reach_for(other).ahead < REACH.ahead, "it stands lower"
+    assert shipped_samples("go2").reach != reach_for(other), "more was asked for"
 
 
 def test_weights_reproduce_every_linear_function() -> None:
@@ -57,7 +78,7 @@ def test_an_interpolated_motion_lands_about_where_it_should() -> None:
 def test_the_nearest_plan_is_one_within_reach() -> None:
     row = SAMPLES.nearest(HopRequest(-0.3, 0.0, 0.0))
     found = HopRequest(*SAMPLES.requests[row].tolist())
-    assert within_reach(found) == found
+    assert SAMPLES.reach.nearest(found) == found
 
 
 def members(path: Path) -> dict[str, bytes]:
@@ -83,5 +104,5 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(PlanFileError, match="has no plans of hops"):
         read_samples(tmp_path / "text.npz")
     np.savez(tmp_path / "other.npz", header=np.array('{"format": "another"}'))
-    with pytest.raises(PlanFileError, match="is of format 'another', expected 'aloft hop plans 2'"):
+    with pytest.raises(PlanFileError, match="is of format 'another', expected 'aloft hop plans 3'"):
         read_samples(tmp_path / "other.npz")
