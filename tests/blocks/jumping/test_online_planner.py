@@ -57,5 +57,5 @@ def test_a_jump_out_of_reach_is_replaced_by_the_nearest() -> None:
 
 
 def test_a_robot_without_stored_plans_is_refused() -> None:
-    with pytest.raises(BlockError, match="there are no stored plans of hops for go2"):
-        BlockBench(OnlinePlanner, robot="go2", rate=100.0)
+    with pytest.raises(BlockError, match="there are no stored plans of hops for solo12"):
+        BlockBench(OnlinePlanner, robot="solo12", rate=100.0)
