@@ -227,6 +227,7 @@ UNUSED = {
         TERRAIN.fields[0], TERRAIN.heights, -0.3, -0.6, np.zeros(3),
     ),
     "aloft.blocks.control.whole_body_controller.hold_torque": (
+        np.ones(1, np.int64),
         as_record(PhaseState.allocate(find_robot("bruce").dimensions)),
         RigidBodyTerms(np.zeros((16, 16)), np.linspace(-1.0, 1.0, 16), np.ones((4, 3, 16))),
         as_record(WholeBodyCommand.allocate(find_robot("bruce").dimensions)),
