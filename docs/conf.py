@@ -7,14 +7,13 @@ Each version lies in a folder of its own, `site/VERSION`. Those that were built 
 """
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT.parent))
-
-from packaging.version import Version
 
 import aloft
 
@@ -59,7 +58,7 @@ def list_versions(app: Any, failure: Exception | None) -> None:
     folder = Path(app.outdir).parent
     versions = sorted(
         (found.parents[1].name for found in folder.glob("*/docs/index.html")),
-        key=Version,
+        key=lambda name: [int(part) for part in re.findall(r"\d+", name)],
         reverse=True,
     )
     (folder / "versions.js").write_text(f"window.siteVersions = {json.dumps(versions)};\n")

@@ -196,7 +196,10 @@ def test_what_cannot_be_imported(
 
 def test_an_unknown_robot() -> None:
     errors = run_here("robot", "show", "brus", code=2).stderr
-    assert "no robot called 'brus'; there is bruce, a1, anymal_c, bolt, g1, go2, hyq," in errors
+    assert (
+        "no robot called 'brus'; there is bruce, a1, alexander, anymal_c, bolt, g1, go2, hyq,"
+        in errors
+    )
 
 
 def test_faults_for_programs(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def message(tmp_path: Path, text: str, read: Any = read_task) -> str:
         ("take_off_speed: 1\nrise: 0.1",
          "odd.yaml:2:1: give rise or take_off_speed, not both: one follows from the other"),
         ("name: x\n", "odd.yaml:1:1: say how high the jump is: rise, take_off_speed or flight_time"),
-        ("rise: 0.1\nrobot: bruse", "odd.yaml:2:8: robot: no robot called 'bruse'; there is bruce, a1, anymal_c, "),
+        ("rise: 0.1\nrobot: bruse", "odd.yaml:2:8: robot: no robot called 'bruse'; there is bruce, a1, alexander, anymal_c, "),
         ("rise: 0.1\ninitial:\n  right_ancle: 2 deg",
          "odd.yaml:3:16: initial.right_ancle: bruce has no joint right_ancle; the nearest is right"),
         ("rise: 0.1\njumps:\n  - {distance_x: 5 cm}\n  - {flight_time: 2 s}",
