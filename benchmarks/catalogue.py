@@ -15,6 +15,7 @@ import numpy as np
 
 from .agreement import agreement
 from .background import background
+from .changed_targets import changed_targets
 from .courses import courses, go2_courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
@@ -62,6 +63,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "courses": courses,
     "go2_courses": go2_courses,
     "pushed_courses": pushed_courses,
+    "changed_targets": changed_targets,
     "stones": stones,
     "staircase": staircase,
     "go2_staircase": go2_staircase,
@@ -71,7 +73,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "go2_courses",
-    "pushed_courses", "stones", "staircase", "go2_staircase", "every_robot",
+    "pushed_courses", "changed_targets", "stones", "staircase", "go2_staircase", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
@@ -88,6 +90,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "courses",
         "go2_courses",
         "pushed_courses",
+        "changed_targets",
         "stones",
         "staircase",
         "go2_staircase",

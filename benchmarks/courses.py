@@ -132,13 +132,14 @@ def run_course(
 
 
 def run_seed(
-    seed: int, graph: str, behind: Sequence[str], sets: Mapping[str, Any]
+    seed: int, graph: str, behind: Sequence[str], sets: Mapping[str, Any], *, sensor: bool = True
 ) -> dict[str, Any]:
-    """The metrics of a run of a graph that steers, with its ``seed``, in the robust trial."""
+    """The metrics of a run of a graph that steers, with its ``seed``, in the robust trial; ``sensor``: it has one of the place."""
     graphs = shipped_folder()
+    seeds = {"robot.seed": seed, "capture.seed": seed} if sensor else {"robot.seed": seed}
     found = load_cell(
         graphs / graph, [graphs / "trials/robust.yaml"],
-        {"robot.seed": seed, "capture.seed": seed, **sets}, graphs / "bench.yaml",
+        {**seeds, **sets}, graphs / "bench.yaml",
         [graphs / name for name in behind],
     ).run(log=False)  # fmt: skip
     own = {"seed": seed, "success": found.success, "reason": found.reason}

@@ -192,12 +192,30 @@ composite_inertias(TREE, IN_MOTION.motion, IN_MOTION.composite)
 STEERED = {
     "goal": [0.1, 0.02], "goal_heading": 0.1, "level": 0.0, "before": [0.0, 0.01],
     "before_heading": 0.0, "before_level": 0.0, "heading": 0.2, "asked": [0.1, 0.01, 0.1, 0.0],
-    "shift": [0.01, 0.02, 0.0], "shift_time": 0.1, "taken": 3,
+    "taken": 3, "changed": 0, "nearest": 0,
 }  # fmt: skip
 STEERED_JUMP = {
     "time": 1.2, "lift_off_time": 1.0, "touchdown_time": 1.3, "com": [0.1, 0.0, 0.4],
     "com_velocity": [0.3, 0.0, 0.1], "com_acceleration": [0.0, 0.0, -9.8],
-    "foot_position": NORMAL((2, 3)), "foot_velocity": NORMAL((2, 3)),
+    "foot_position": NORMAL((2, 3)), "foot_velocity": NORMAL((2, 3)), "foot_yaw": [0.1, -0.1], "phase": 3,
+    "orientation": [0.0, 0.1, 0.0, 0.99], "angular_velocity": NORMAL(3), "angular_acceleration": NORMAL(3),
+    "angular_momentum": NORMAL(3), "angular_momentum_rate": NORMAL(3),
+}  # fmt: skip
+MOVED = {
+    "moves": 1, "landing": [0.04, -0.01, 0.02, 0.1], "thrown": [0.04, -0.01, 0.02, 0.1],
+    "thrust_began": [0.8, 0.8, 0.8, 0.8], "place": 0.01 * NORMAL(4), "rate": 0.1 * NORMAL(4),
+    "acceleration": NORMAL(4), "final_rate": NORMAL(4), "swing_began": 1.0,
+    "swing": 0.01 * NORMAL(4), "swing_rate": 0.1 * NORMAL(4),
+}  # fmt: skip
+RETARGETED = {
+    "retarget_time": 0.1, "retarget_window": 0.2, "retarget_acceleration": 3.0, "retarget_limit": 0.05,
+    "retarget_braking": 1.0, "retarget_spin": 20.0, "retarget_height": 0.03, "retarget_turn": 0.3,
+    "foothold_time": 0.05, "foothold_limit": 0.03, "foothold_turn": 0.2,
+}  # fmt: skip
+TURNED_ROBOT = {"centroidal_matrix": NORMAL((6, 16)), "base_rotation": np.eye(3)}
+MOTION_ROOM = {
+    "quaternion": np.zeros(4), "axis": np.zeros(3), "spin": np.zeros(3), "middle": np.zeros(3),
+    "middle_rate": np.zeros(3),
 }  # fmt: skip
 TURNING = PushedTurns(
     np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
@@ -486,20 +504,31 @@ UNUSED |= {
     for each in vars(elementwise).values()
     if is_kernel(each) and each.__module__ == elementwise.__name__
 }
-UNUSED["aloft.blocks.jumping.steered_plan.shift_landing"] = records(STEERED_JUMP, STEERED)
+UNUSED["aloft.blocks.jumping.moved_landing.move_landing"] = (
+    *records(STEERED_JUMP, TURNED_ROBOT, MOVED, MOTION_ROOM),
+)
+UNUSED["aloft.blocks.jumping.moved_landing.turn_body"] = (
+    0.1, 0.5, 2.0, *records(STEERED_JUMP, TURNED_ROBOT, MOTION_ROOM),
+)  # fmt: skip
+UNUSED["aloft.blocks.jumping.moved_landing.turn_feet"] = (
+    *records(STEERED_JUMP, MOVED, MOTION_ROOM),
+)
+UNUSED["aloft.blocks.jumping.moved_landing.thrust_motion"] = *records(MOVED), 1, 1.0, 0.95
+UNUSED["aloft.blocks.jumping.moved_landing.fastest_change"] = 0.5, 3.0, 0.15
+UNUSED["aloft.blocks.jumping.moved_landing.throw"] = (
+    *records(MOVED), 0, 0.04, *records({**STEERED_JUMP, "time": 0.85}, RETARGETED), 0.05,
+)  # fmt: skip
+UNUSED["aloft.blocks.jumping.moved_landing.place_feet"] = *records(MOVED), 1, 0.05, 0.03
+UNUSED["aloft.blocks.jumping.moved_landing.begin_swing"] = records(MOVED, STEERED_JUMP)
+UNUSED["aloft.blocks.jumping.moved_landing.swing_motion"] = (
+    *records(MOVED), 2, *records(STEERED_JUMP), 1.0,
+)  # fmt: skip
 UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
     *records(
         {"placed": False, "ahead": 0.12, "aside": -0.01, "turn": 0.1, "up": 0.0, "number": 4},
-        STEERED_JUMP,
-    ),
-    0.15,
-    *records(
-        {
-            "retarget_window": 0.2, "retarget_acceleration": 3.0, "retarget_limit": 0.05,
-            "retarget_braking": 1.0,
-        },
-        {"ahead": 0.32, "back": 0.1, "aside": 0.3},
-        {"outcome": 0}, STEERED,
+        {"phase": 3}, STEERED_JUMP, RETARGETED,
+        {"ahead": 0.32, "back": 0.1, "aside": 0.3, "turn": 0.8},
+        {"outcome": 0}, STEERED, MOVED,
     ),
 )  # fmt: skip
 UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)

@@ -113,10 +113,38 @@ def follow_plan(
     constants: ProgressConstants,
 ) -> None:
     """Read the plan at the time ``now`` [s] of the run, and keep it in time with the robot."""
+    time = read_plan(now, delay, reference, progress, table, constants)
+    keep_in_time(time, terms, reference, progress, rotation, params, constants)
+
+
+@kernel
+def read_plan(
+    now: float,
+    delay: DelayEstimate,
+    reference: JumpReference,
+    progress: PlanProgress,
+    table: TableRows,
+    constants: ProgressConstants,
+) -> float:
+    """Read the plan at the time ``now`` [s] of the run; returns its time."""
     lead = delay.delay if constants.lead < 0.0 else constants.lead
     early = min(delay.ahead, lead)
     time = now - progress.late + early
     read_table(table, time, lead - early, constants.period, reference)
+    return time
+
+
+@kernel
+def keep_in_time(
+    time: float,
+    terms: DynamicsTerms,
+    reference: JumpReference,
+    progress: PlanProgress,
+    rotation: FlightRotation,
+    params: ProgressParameters,
+    constants: ProgressConstants,
+) -> None:
+    """Hasten or delay the plan, which is ``reference`` at ``time`` [s], as the robot is ahead of it or behind."""
     if constants.follows_motion:
         follow_thrust(time, terms, reference, progress, params, constants)
         follow_fall(time, terms, reference, progress, params, constants)

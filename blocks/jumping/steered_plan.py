@@ -8,7 +8,6 @@ import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
 from ...mathematics.elementary import hypot, sincos
-from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
 from ...planner.library.jump_table import (
@@ -22,7 +21,15 @@ from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
 from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
 from ...robots.foot_directions import standing_directions
-from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
+from ...runtime.language.block import (
+    Block,
+    Context,
+    Input,
+    Metric,
+    Output,
+    State,
+    UnmetRequirement,
+)
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -40,7 +47,27 @@ from ..signals import (
     PlanRequest,
 )
 from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
-from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, follow_plan
+from .moved_landing import (
+    AHEAD,
+    ASIDE,
+    TURN,
+    UP,
+    MotionScratch,
+    MovedLanding,
+    RetargetParameters,
+    begin_swing,
+    middle_of,
+    move_landing,
+    place_feet,
+    throw,
+)
+from .plan_progress import (
+    PlanProgress,
+    ProgressConstants,
+    ProgressParameters,
+    keep_in_time,
+    read_plan,
+)
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
@@ -48,8 +75,6 @@ DIRECTED = 0.05
 """A jump is one ahead or back from that distance on [m]."""
 MOST_BIAS = 0.02
 """The largest error of place [m] that is taken for the robot's own, and not for a push."""
-HARDEST = 1.875
-"""The largest rate of ``minimum_jerk``."""
 SAME_TURN = 0.02
 """A difference of heading [rad] that is none."""
 BEHIND = 10.0
@@ -95,11 +120,9 @@ class SteeringState(Signal):
     requests = Field(dtype="int64", text="requests so far")
     asked = Field(4, text="the last request: ahead, aside [m], turn [rad] and up [m]")
     jumps = Field(dtype="int64", text="plans begun so far")
+    changed = Field(dtype="int64", text="commands that moved the landing of a jump under way")
+    nearest = Field(dtype="int64", text="those of them that only the nearest was done of")
     waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
-    shift = Field(3, unit="m", text="what the jump under way goes too short, in its frame")
-    shift_time = Field(
-        unit="s", text="how long before lift-off that begins to be changed; zero: nothing is"
-    )
 
 
 class SteeringConstants(ProgressConstants):
@@ -108,6 +131,7 @@ class SteeringConstants(ProgressConstants):
     ahead = Field(unit="m", text="the farthest jump ahead")
     back = Field(unit="m", text="the farthest back")
     aside = Field(unit="m", text="the farthest to a side")
+    turn = Field(unit="rad", text="the largest turn")
     of_points = Field(dtype="bool", text="no foot has a direction of its own")
 
 
@@ -123,15 +147,19 @@ class SteeredPlan(Block):
     ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
     that cannot be done goes to the nearest place that can; from then on the goal is there.
 
-    A command that ``replaces`` still moves the landing of the jump under way, until ``retarget_time`` before lift-off. Over the
-    last T_p of the thrust, at most ``retarget_window``, the plan's centre of mass gains the velocity that moves the
-    touchdown by d (``lengthen``), and feet follow it in flight. It accelerates by at most a = ``retarget_acceleration``,
-    or ``retarget_braking`` backwards, so
+    A command that ``replaces`` still moves the landing of the jump under way (``moved_landing``), as often as it likes. Until ``retarget_time`` before lift-off
+    place, height and heading move: over what is left of the thrust, T_p, at most ``retarget_window``, the body gains
+    the velocity, or the rate of turn, that moves its touchdown by d, and the feet follow in flight. With x and v
+    what earlier commands have changed so far, and a like them,
 
-        |d| <= a T_p (T_f + T_p / 2) / 1.875,
+        v_d = (d - x - T_p v / 2 - T_p^2 a / 12) / (T_f + T_p / 2)
 
-    ahead and aside, and within ``retarget_limit``. What goes beyond that or beyond the reach, and changes of turn and height, are left out: the goal is the nearest place, and
-    ``goal.outcome`` is NEAREST. A jump is moved once; a command that comes later waits for the next jump.
+    is reached at lift-off by a cubic in time, which stays below ``retarget_acceleration``, backwards ``retarget_braking``, and in turning
+    ``retarget_spin``; in all a landing moves by at most ``retarget_limit``, ``retarget_height`` and ``retarget_turn``. In flight, until
+    ``foothold_time`` before touchdown, only the feet can move: by at most ``foothold_limit`` and ``foothold_turn`` from
+    where the body needs them. What goes beyond that or beyond the reach is left out: the goal is the nearest place, and
+    ``goal.outcome`` is NEAREST. A command that comes between the two waits for the flight, and one that comes later for the
+    next jump.
 
     Reference and ``terms`` are in the frame of the jump, which ``frame`` tells ``StartFrame``: its origin is the middle of the
     feet before the jump, with x ahead. It moves when a plan begins. Ahead is where the feet point, or, for feet that are points,
@@ -150,7 +178,7 @@ class SteeredPlan(Block):
     be by all commands, relative to where they stood when the run began.
     """
 
-    class Params(ProgressParameters):
+    class Params(ProgressParameters, RetargetParameters):
         lead: float | None = parameter(
             None, unit="s", ge=0.0, le=0.02,
             text="delay from sensing to torque that is compensated; none: the one at `delay`",
@@ -165,38 +193,18 @@ class SteeredPlan(Block):
             0.3, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
         )
 
-        retarget_time: float = parameter(
-            0.1, unit="s", ge=0.02, le=1.0,
-            text="how long before lift-off the landing of a jump may still be moved",
-        )  # fmt: skip
-        retarget_window: float = parameter(
-            0.3, unit="s", gt=0.0, le=1.0, text="how long before lift-off that begins, at most"
-        )
-        retarget_acceleration: float = parameter(
-            3.0, unit="m/s^2", ge=0.0, le=20.0,
-            text="of the centre of mass for it, ahead and aside at most",
-        )  # fmt: skip
-        retarget_braking: float = parameter(
-            1.0, unit="m/s^2", ge=0.0, le=20.0,
-            text="the same backwards; at the end of a thrust there are only the toes to brake with",
-        )  # fmt: skip
-        retarget_limit: float = parameter(
-            0.05,
-            unit="m",
-            ge=0.0,
-            le=0.3,
-            text="how far a landing is moved ahead and aside at most",
-        )
         learning: float = parameter(
             0.5, ge=0.0, le=1.0,
             text="share of the last landing's error of place that later jumps are aimed against",
         )  # fmt: skip
 
-    class Scratch(Signal):
+    class Scratch(MotionScratch):
         """Room for a step."""
 
         values = Field("plan_width", text="columns of an instant")
-        middle = Field(3, unit="m", frame="world", text="of the feet, in the estimator's world")
+        place = Field(
+            3, unit="m", frame="world", text="middle of the feet, in the estimator's world"
+        )
         vector = Field(3, unit="m", text="the same in the jump's frame")
         origin = Field(
             3, unit="m", text="zeros, where the middle of the feet is as the robot stands"
@@ -219,6 +227,7 @@ class SteeredPlan(Block):
     followed = State(FollowedPlan, text="the plan that is followed")
     memory = State(SteeringState, text="the goal, and what was asked for")
     progress = State(PlanProgress, text="how late the plan is")
+    moved = State(MovedLanding, text="where the jump under way lands instead")
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
@@ -244,7 +253,7 @@ class SteeredPlan(Block):
         self.constants.of_points = bool(points.all())
         reach = level_reach(self.robot.name)
         self.constants.ahead, self.constants.back = reach.ahead, reach.back
-        self.constants.aside = reach.aside
+        self.constants.aside, self.constants.turn = reach.aside, reach.turn
         self.constants.lead = -1.0 if self.params.lead is None else self.params.lead
         self.constants.follows_motion = self.params.by == "progress"
         self.constants.period = self.period
@@ -273,6 +282,7 @@ class SteeredPlan(Block):
         followed: FollowedPlan,
         memory: SteeringState,
         progress: PlanProgress,
+        moved: MovedLanding,
         table: TableRows,
         rotation: FlightRotation,
         directions: Array2D,
@@ -284,8 +294,8 @@ class SteeredPlan(Block):
     ) -> None:
         now = clock.base_period * clock.tick
         middle_of(terms.foot_position, scratch.vector)
-        turn_about_vertical(scratch.vector, memory.heading, scratch.middle)
-        scratch.middle[:] = scratch.middle + memory.origin
+        turn_about_vertical(scratch.vector, memory.heading, scratch.place)
+        scratch.place[:] = scratch.place + memory.origin
         heading = memory.heading + (
             pattern_turn(directions, scratch.origin, terms.foot_position, scratch.vector)
             if constants.of_points
@@ -293,7 +303,7 @@ class SteeredPlan(Block):
         )
         stands = phase.phase == Phase.STAND and now >= params.settle_time
         if stands and not memory.started:
-            begin(scratch.middle, heading, memory)
+            begin(scratch.place, heading, memory)
         if memory.waits:
             receive(part, memory.requests, received)
         landed = phase.phase == Phase.LANDING and phase.time_since_touchdown >= params.ask_time
@@ -301,33 +311,30 @@ class SteeredPlan(Block):
         free = not memory.waits or command.replaces
         if (stands or landed or rests) and free and command.number > memory.taken:
             if not memory.waits and memory.jumps > 0:
-                learn(scratch.middle, heading, params.learning, memory)
-            ask(command, scratch.middle, heading, memory)
+                learn(scratch.place, heading, params.learning, memory)
+            ask(command, scratch.place, heading, memory)
             received.parts = 0
             received.whole = False
         rested = stands or (rests and phase.time_in_phase >= params.rest_time)
         if memory.waits and received.whole and rested:
             follow(received, followed, memory)
+            moved.moves = 0
             followed.began = now
-            memory.origin[:] = scratch.middle
+            memory.origin[:] = scratch.place
             memory.heading = heading
             integrate_rows(table)
             if followed.outcome != PlanOutcome.PLANNED:
-                memory.goal[:] = scratch.middle[:2]
+                memory.goal[:] = scratch.place[:2]
                 memory.goal_heading = heading
                 memory.level = memory.before_level
                 land_at(followed.done, memory)
             progress.late = 0.0
-        follow_plan(
-            now - followed.began, terms, delay, reference, progress, table, rotation, params, constants
-        )  # fmt: skip
-        thrusts = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
-        if thrusts and not memory.waits and command.replaces and command.number > memory.taken:
-            left = reference.lift_off_time - reference.time
-            if memory.shift_time == 0.0 and left >= params.retarget_time:
-                retarget(command, reference, left, params, constants, followed, memory)
-        if memory.shift_time > 0.0:
-            shift_landing(reference, memory)
+        time = read_plan(now - followed.began, delay, reference, progress, table, constants)
+        if not memory.waits and command.replaces and command.number > memory.taken:
+            retarget(command, phase, reference, params, constants, followed, memory, moved)
+        if moved.moves > 0:
+            move_landing(reference, terms, moved, scratch)
+        keep_in_time(time, terms, reference, progress, rotation, params, constants)
         if memory.jumps > 0:
             reference.time += followed.began
             reference.lift_off_time += followed.began
@@ -337,13 +344,12 @@ class SteeredPlan(Block):
         tell_request(memory, request)
         tell_goal(memory, followed.outcome, goal)
 
-
-@kernel
-def middle_of(points: Array2D, out: Array1D) -> None:
-    """The mean of points (n, 3)."""
-    out[:] = 0.0
-    for i in range(points.shape[0]):
-        out[:] += points[i] / points.shape[0]
+    def metrics(self) -> Mapping[str, Metric]:
+        """How many targets changed after their jump had begun, and of how many the nearest was done."""
+        return {
+            "targets_changed": int(self.memory.changed),
+            "targets_not_reached": int(self.memory.nearest),
+        }
 
 
 @kernel
@@ -401,14 +407,23 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
 @kernel
 def retarget(
     command: JumpCommand,
+    phase: PhaseState,
     reference: JumpReference,
-    left: float,
     params: SteeredPlan.Params,
     constants: SteeringConstants,
     followed: FollowedPlan,
     memory: SteeringState,
+    moved: MovedLanding,
 ) -> None:
-    """Move the landing of the jump under way, ``left`` [s] before lift-off, as near to the command's place as that goes."""
+    """Move the landing of the jump under way as near to the command's place as that still goes."""
+    left = reference.lift_off_time - reference.time
+    thrusts = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
+    thrusts = thrusts and left >= params.retarget_time
+    falls = reference.touchdown_time - reference.time
+    flies = phase.phase == Phase.FLIGHT and reference.phase == Phase.FLIGHT
+    flies = flies and falls >= params.foothold_time
+    if not thrusts and not flies:
+        return
     x, y, heading, level = memory.goal[0], memory.goal[1], memory.goal_heading, memory.level
     memory.goal[:] = memory.before
     memory.goal_heading, memory.level = memory.before_heading, memory.before_level
@@ -417,56 +432,47 @@ def retarget(
         memory.goal_heading, memory.level = command.turn, command.up
     else:
         move(memory, command.ahead, command.aside, command.turn, command.up)
-    whole = abs(wrap(memory.goal_heading - heading)) < SAME_TURN
-    whole = whole and abs(memory.level - level) < LEVEL
+    if moved.moves == 0:
+        moved.landing[:] = 0.0
+        moved.thrown[:] = 0.0
     sine, cosine = sincos(memory.heading)
     u, v = memory.goal[0] - x, memory.goal[1] - y
-    wanted_ahead, wanted_aside = cosine * u + sine * v, cosine * v - sine * u
-    ahead = min(
-        max(wanted_ahead, -constants.back - memory.asked[0]), constants.ahead - memory.asked[0]
-    )
-    aside = min(
-        max(wanted_aside, -constants.aside - memory.asked[1]), constants.aside - memory.asked[1]
-    )
-    memory.shift_time = min(left, params.retarget_window)
-    flight = reference.touchdown_time - reference.lift_off_time
-    gained = memory.shift_time / HARDEST * (flight + 0.5 * memory.shift_time)
-    most = min(params.retarget_acceleration * gained, params.retarget_limit)
-    ahead = min(max(ahead, -min(params.retarget_braking * gained, most)), most)
-    aside = min(max(aside, -most), most)
-    memory.shift[0], memory.shift[1], memory.shift[2] = -ahead, -aside, 0.0
-    memory.goal[0], memory.goal[1] = (
-        x + cosine * ahead - sine * aside,
-        y + sine * ahead + cosine * aside,
-    )
-    memory.goal_heading, memory.level = heading, level
+    ahead = moved.landing[AHEAD] + cosine * u + sine * v
+    aside = moved.landing[ASIDE] + cosine * v - sine * u
+    up = moved.landing[UP] + memory.level - level
+    turn = moved.landing[TURN] + wrap(memory.goal_heading - heading)
+    before_ahead, before_aside = moved.landing[AHEAD], moved.landing[ASIDE]
+    before_up, before_turn = moved.landing[UP], moved.landing[TURN]
+    asked = memory.asked
+    within_ahead = min(max(ahead, -constants.back - asked[0]), constants.ahead - asked[0])
+    within_aside = min(max(aside, -constants.aside - asked[1]), constants.aside - asked[1])
+    within_turn = min(max(turn, -constants.turn - asked[2]), constants.turn - asked[2])
+    if thrusts:
+        most = params.retarget_limit
+        throw(moved, AHEAD, within_ahead, reference, params, most)
+        throw(moved, ASIDE, within_aside, reference, params, most)
+        throw(moved, UP, up, reference, params, params.retarget_height)
+        throw(moved, TURN, within_turn, reference, params, params.retarget_turn)
+    else:
+        begin_swing(moved, reference)
+        most = params.foothold_limit
+        place_feet(moved, AHEAD, within_ahead, most)
+        place_feet(moved, ASIDE, within_aside, most)
+        place_feet(moved, TURN, within_turn, params.foothold_turn)
+    moved.moves += 1
+    u, v = moved.landing[AHEAD] - before_ahead, moved.landing[ASIDE] - before_aside
+    memory.goal[0], memory.goal[1] = x + cosine * u - sine * v, y + sine * u + cosine * v
+    memory.goal_heading = heading + moved.landing[TURN] - before_turn
+    memory.level = level + moved.landing[UP] - before_up
     memory.taken = command.number
-    if not whole or hypot(wanted_ahead - ahead, wanted_aside - aside) > LEVEL:
+    off_place = hypot(ahead - moved.landing[AHEAD], aside - moved.landing[ASIDE])
+    reached = off_place <= LEVEL and abs(up - moved.landing[UP]) <= LEVEL
+    memory.changed += 1
+    if not reached or abs(turn - moved.landing[TURN]) > SAME_TURN:
+        memory.nearest += 1
         followed.outcome = PlanOutcome.NEAREST
-
-
-@kernel
-def shift_landing(reference: JumpReference, memory: SteeringState) -> None:
-    """Move the plan at this instant, so that it lands elsewhere: its centre of mass before and its feet behind lift-off."""
-    since = reference.time - reference.lift_off_time
-    flight = reference.touchdown_time - reference.lift_off_time
-    share = 1.0 + since / memory.shift_time
-    if share <= 0.0:
-        return
-    lengthen(
-        memory.shift, 1.0, 1.0, flight, memory.shift_time, share,
-        reference.com, reference.com_velocity, reference.com_acceleration,
-    )  # fmt: skip
-    flown = min(max(since, 0.0), flight)
-    grown, rate, _ = minimum_jerk(flown / flight)
-    for axis in range(2):
-        speed = -memory.shift[axis] / (flight + 0.5 * memory.shift_time)
-        reference.com[axis] += speed * flown
-        if since > flight:
-            reference.com_velocity[axis] -= speed
-        for foot in range(reference.foot_position.shape[0]):
-            reference.foot_position[foot, axis] -= memory.shift[axis] * grown
-            reference.foot_velocity[foot, axis] -= memory.shift[axis] * rate / flight
+    elif followed.outcome == PlanOutcome.NEAREST:
+        followed.outcome = PlanOutcome.PLANNED
 
 
 @kernel
@@ -541,7 +547,6 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
     followed.outcome = received.outcome
     followed.done[:] = received.done
     memory.waits = False
-    memory.shift_time = 0.0
     memory.jumps += 1
 
 

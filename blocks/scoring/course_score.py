@@ -51,7 +51,11 @@ class CourseRecord(StandRecord):
     jumps = Field(dtype="int64", text="landings whose place has been measured")
     target = Field(2, unit="m", text="where that landing should be")
     target_heading = Field(unit="rad", text="the heading there")
+    off = Field(2, unit="m", text="way from the target, last landing")
     place_error = Field(unit="m", text="distance from the target, last landing")
+    length_errors = Field(
+        unit="m", text="sum of how far these ways differ from one landing to the next"
+    )
     worst_place_error = Field(unit="m", text="the largest so far")
     place_errors = Field(unit="m", text="their sum")
     worst_turn_error = Field(unit="rad", text="the largest error of heading so far")
@@ -176,6 +180,7 @@ class CourseScore(Block):
         values = judgement_metrics(r, failure) | {"jumps": int(r.jumps)}
         if r.jumps > 0:
             values |= {
+                "mean_length_error_m": float(r.length_errors / r.jumps),
                 "mean_place_error_m": float(r.place_errors / r.jumps),
                 "worst_place_error_m": float(r.worst_place_error),
                 "last_place_error_m": float(r.place_error),
@@ -246,6 +251,7 @@ def record_landings(
         if record.unloaded >= params.flight_confirmation and not record.flies:
             record.flies = True
             record.measured = True
+        if record.flies:  # until it lands its goal may change
             record.target[:] = goal.position
             record.target_heading = goal.heading
     if record.flies or record.measured or record.landed_time == NEVER:
@@ -263,6 +269,9 @@ def measure_place(record: CourseRecord, directions: Array2D) -> None:
     dx = cosine * x + sine * y - record.target[0]
     dy = cosine * y - sine * x - record.target[1]
     turn = record.heading - record.start_heading - record.target_heading
+    u, v = dx - record.off[0], dy - record.off[1]
+    record.off[0], record.off[1] = dx, dy
+    record.length_errors += sqrt(u * u + v * v)
     record.place_error = sqrt(dx * dx + dy * dy)
     record.place_errors += record.place_error
     record.worst_place_error = max(record.worst_place_error, record.place_error)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 import aloft
+from aloft.benchmarks.changed_targets import BEFORE, KINDS, LIFT_OFF, two_levels
 from aloft.benchmarks.courses import JUMPS, course
 from aloft.benchmarks.stones import STAIRCASE, STEP, STEPS, passed
 from aloft.planner.library.library import shipped_folder
@@ -39,3 +41,27 @@ def test_who_touches_a_stone_with_anything_but_the_feet_has_not_passed() -> None
     assert not passed(good)
     assert not passed({**good, "forbidden_contacts": 1}, STEPS)
     assert not passed({**good, "reason": "fell at 3 s"}, STEPS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_changed_targets_are_those_of_their_seed(kind: str) -> None:
+    def drawn(seed: int) -> list[dict[str, object]]:
+        return KINDS[kind](np.random.default_rng(seed))
+
+    first, *changes = drawn(7)
+    assert drawn(7) == [first, *changes] != drawn(8)
+    assert "replaces" not in first and len(changes) == (3 if kind == "several" else 1)
+    for change in changes:
+        assert change["replaces"]
+        before = LIFT_OFF - change["at"]
+        if kind == "in flight":
+            assert before < 0.0
+        elif kind != "several":
+            assert BEFORE[0] - 1e-3 <= before <= BEFORE[1] + 1e-3
+
+
+def test_the_ground_of_a_height_that_changes_has_its_edge_between_the_feet() -> None:
+    boxes = two_levels(0.2, -0.03)["boxes"]
+    assert boxes[0]["x"][1] < 0.1 == boxes[1]["x"][0]
+    assert (boxes[0]["top"], boxes[1]["top"]) == (0.0, -0.03)
+    assert all(box["bottom"] < -0.03 for box in boxes)

@@ -251,10 +251,10 @@ def test_a_landing_moves_until_100_ms_before_lift_off() -> None:
 @pytest.mark.parametrize(
     ("asked", "done"),
     [
-        ({"ahead": 0.30}, [0.20, 0.0]),  # the limit
-        ({"ahead": 0.05}, [0.15 - 0.0195, 0.0]),  # the braking that is left
-        ({"ahead": 0.15, "turn": 0.5}, [0.15, 0.0]),
-        ({"ahead": 0.15, "up": 0.04}, [0.15, 0.0]),
+        ({"ahead": 0.30}, [0.20, 0.0, 0.0, 0.0]),  # the limit
+        ({"ahead": 0.05}, [0.15 - 0.0244, 0.0, 0.0, 0.0]),  # the braking that is left
+        ({"ahead": 0.15, "turn": 0.5}, [0.15, 0.0, 0.35, 0.0]),
+        ({"ahead": 0.15, "up": -0.04}, [0.15, 0.0, 0.0, -0.03]),
     ],
 )
 def test_of_what_is_impossible_the_nearest_is_done_and_said(
@@ -265,9 +265,73 @@ def test_of_what_is_impossible_the_nearest_is_done_and_said(
     bench.step()
     goal = bench.get("goal")
     assert int(goal.outcome) == PlanOutcome.NEAREST
-    assert np.asarray(goal.position) == pytest.approx(done, abs=5e-3)
-    assert float(goal.heading) == pytest.approx(0.0)
-    assert float(goal.height) == pytest.approx(0.0)
+    assert bench.block.metrics() == {"targets_changed": 1, "targets_not_reached": 1}
+    found = [*np.asarray(goal.position), float(goal.heading), float(goal.height)]
+    assert found == pytest.approx(done, abs=5e-3)
+
+
+def test_a_turn_and_a_height_change_before_lift_off() -> None:
+    unmoved = touchdown_of(thrusting(0.2))
+    bench = thrusting(0.2)
+    bench.set("terms", centroidal_matrix=np.eye(6, 16) * 0.1, base_rotation=np.eye(3))
+    bench.set("command", number=2, ahead=0.15, turn=0.2, up=0.02, replaces=True)
+    bench.step()
+    assert int(bench.get("goal").outcome) == PlanOutcome.PLANNED
+    com, feet = touchdown_of(bench)
+    reference = bench.get("reference")
+    turned, still = feet - feet.mean(axis=0), unmoved[1] - unmoved[1].mean(axis=0)
+    cosine, sine = math.cos(0.2), math.sin(0.2)
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    assert com - unmoved[0] == pytest.approx([0.0, 0.0, 0.02], abs=1e-3)
+    assert feet.mean(axis=0) - unmoved[1].mean(axis=0) == pytest.approx([0.0, 0.0, 0.02], abs=1e-3)
+    assert turned == pytest.approx(still @ turn.T, abs=1e-3)
+    assert np.asarray(reference.foot_yaw) == pytest.approx(0.2, abs=1e-3)
+    assert float(np.asarray(reference.orientation)[2]) == pytest.approx(math.sin(0.1), abs=0.01)
+    assert float(np.asarray(reference.angular_momentum)[2]) > 0.05
+
+
+def test_a_landing_moves_more_than_once_without_a_jerk() -> None:
+    bench = thrusting(0.25)
+    reference, goal = bench.get("reference"), bench.get("goal")
+    unmoved = touchdown_of(thrusting(0.25))
+    speeds = []
+    for number, (left, aside) in enumerate(((0.25, 0.04), (0.18, -0.02), (0.12, 0.02)), start=2):
+        while reference.lift_off_time - reference.time > left:
+            bench.set("phase", phase=Phase(int(reference.phase)))
+            bench.step()
+            speeds.append(np.array(reference.com_velocity)[1])
+        bench.set("command", number=number, ahead=0.15, aside=aside, replaces=True)
+        bench.step()
+        assert np.asarray(goal.position) == pytest.approx([0.15, aside])
+    moved = touchdown_of(bench)
+    assert (moved[0] - unmoved[0])[1] == pytest.approx(0.02, abs=1e-3)
+    assert (moved[1] - unmoved[1])[:, 1] == pytest.approx(0.02, abs=1e-3)
+    assert max(np.abs(np.diff(speeds))) < 0.012, "of its 3 m/s^2 in 2 ms, and the plan's"
+
+
+def test_in_flight_the_feet_move_and_the_centre_of_mass_does_not() -> None:
+    def flying() -> BlockBench[SteeredPlan]:
+        bench = thrusting(0.0)
+        reference = bench.get("reference")
+        for _ in range(30):
+            bench.set("phase", phase=Phase(int(reference.phase)))
+            bench.step()
+        assert int(reference.phase) == Phase.FLIGHT
+        return bench
+
+    unmoved = touchdown_of(flying())
+    bench = flying()
+    goal = bench.get("goal")
+    bench.set("command", number=2, ahead=0.18, turn=0.1, up=0.02, replaces=True)
+    bench.step()
+    assert int(goal.outcome) == PlanOutcome.NEAREST
+    assert [*np.asarray(goal.position), float(goal.heading)] == pytest.approx([0.17, 0.0, 0.1])
+    assert float(goal.height) == 0.0, "in flight it cannot rise"
+    com, feet = touchdown_of(bench)
+    assert com == pytest.approx(unmoved[0])
+    middle = (feet - unmoved[1]).mean(axis=0)
+    assert middle == pytest.approx([0.02, 0.0, 0.0], abs=1e-3)
+    assert np.asarray(bench.get("reference").foot_yaw) == pytest.approx(0.1, abs=1e-3)
 
 
 def test_a_later_command_waits_for_the_next_jump() -> None:
