@@ -257,8 +257,8 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
     if rows:
         out.print(table(f"motors, profile {about['profile']}", columns, rows))
     if about["thrusters"]:
-        columns = ("thruster", "link", "at m", "axis", ">to N", ">moment N m/N", ">lag s")
-        out.print(table("thrusters", columns, [_thruster_row(each) for each in about["thrusters"]]))
+        names = ("thruster", "link", "at m", "axis", ">to N", ">moment N m/N", ">lag s")
+        out.print(table("thrusters", names, [_thruster_row(each) for each in about["thrusters"]]))
     if about["feet"]:
         feet = [(f["foot"], f["kind"], f["link"], ", ".join(f["contacts"])) for f in about["feet"]]
         out.print(table("feet", ("foot", "kind", "link", "contact points"), feet))

@@ -300,7 +300,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         )
         motor.set_to_motor()
     add_rotors(spec, robot, variation)
-    add_thrusters(spec, robot, variation)
+    add_thrusters(spec, bodies, robot, variation)
 
 
 def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:

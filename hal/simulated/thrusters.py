@@ -7,7 +7,8 @@ actuators of thrusters come behind those of the joints' motors.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -93,17 +94,17 @@ class SimulatedThrusters:
         return signal_call(read_thrust, self._data.ctrl[first:], self._data.act, place, state)
 
 
-def add_thrusters(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:
-    """Add a site and an actuator for every thruster; the bodies and the joints' motors are there."""
+def add_thrusters(
+    spec: MjSpec, bodies: Mapping[str, Any], robot: RobotDescription, variation: Variation
+) -> None:
+    """Add a site and an actuator for every thruster; the ``bodies`` of the links and the joints' motors are there."""
     import mujoco
-
-    from .mujoco_model import body_name
 
     links = [link.name for link in robot.links]
     for k, (name, thruster) in enumerate(robot.thrusters.items()):
         longer = variation.factor(variation.link_length, links.index(thruster.link))
         site = f"thruster/{name}"
-        spec.body(body_name(thruster.link)).add_site(
+        bodies[thruster.link].add_site(
             name=site, pos=longer * np.array(thruster.position), quat=_from_z(thruster.axis)
         )
         share = variation.factor(variation.thrust, k)
