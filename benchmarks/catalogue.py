@@ -23,6 +23,7 @@ from .export import export
 from .falsification import falsification
 from .frontier import frontier
 from .general_blocks import general_blocks
+from .hopping_on import hopping_on
 from .jumps.identification import identification
 from .jumps.jumps import jumps
 from .jumps.known_effects import known_effects
@@ -64,6 +65,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "go2_courses": go2_courses,
     "pushed_courses": pushed_courses,
     "changed_targets": changed_targets,
+    "hopping_on": hopping_on,
     "stones": stones,
     "staircase": staircase,
     "go2_staircase": go2_staircase,
@@ -73,7 +75,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "go2_courses",
-    "pushed_courses", "changed_targets", "stones", "staircase", "go2_staircase", "every_robot",
+    "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
@@ -91,6 +93,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "go2_courses",
         "pushed_courses",
         "changed_targets",
+        "hopping_on",
         "stones",
         "staircase",
         "go2_staircase",

@@ -26,7 +26,7 @@ from aloft.mathematics.whole_body_motion import (
     turn_memory,
 )
 from aloft.mathematics.whole_body_qp import RigidBodyTerms
-from aloft.planner.library.jump_table import FlightRotation
+from aloft.planner.library.jump_table import FlightRotation, TableRows, fed_forward
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.kinematics import body_tree
@@ -529,6 +529,35 @@ UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
         {"phase": 3}, STEERED_JUMP, RETARGETED,
         {"ahead": 0.32, "back": 0.1, "aside": 0.3, "turn": 0.8},
         {"outcome": 0}, STEERED, MOVED,
+    ),
+)  # fmt: skip
+WIDTH = len(fed_forward(2, 10))
+ROWS_OF_SPEEDS = TableRows(
+    np.concatenate([np.linspace(0.0, 3.2, 9), np.linspace(8.0, 11.2, 9)]), NORMAL((18, WIDTH)),
+    NORMAL((18, WIDTH)), fed_forward(2, 10), np.array([0.4, 2.8]),
+    np.array([[0.8, 1.05, 1.31], [1.44, 1.56, 1.82], [1.95, 2.07, 2.34], [2.46, 2.59, 2.85]]),
+    np.array([1.31, 1.82, 2.34, 2.85]), np.zeros(4, np.bool_), np.ones((18, 4), np.bool_), np.zeros(WIDTH),
+)  # fmt: skip
+HOPPING = {
+    "jump": 2, "landed": 3, "skipped": 0.5, "place": 0.3, "before": 0.05, "way": 0.1,
+}  # fmt: skip
+UNUSED["aloft.blocks.jumping.speed_plan.hat"] = np.array([0.0, 0.1, 0.2]), 1, 0.07
+UNUSED["aloft.blocks.jumping.speed_plan.land"] = (
+    0.12, 0.05, 30, ROWS_OF_SPEEDS, *records(HOPPING),
+)  # fmt: skip
+UNUSED["aloft.blocks.jumping.speed_plan.mix_rows"] = (
+    1.9, 0.002, 0.002, ROWS_OF_SPEEDS, np.array([0.0, 8.0]), np.array([0.0, 0.1]),
+    *records(
+        HOPPING,
+        {
+            "com": np.zeros(3), "com_velocity": np.zeros(3), "com_acceleration": np.zeros(3),
+            "orientation": np.zeros(4), "angular_velocity": np.zeros(3), "angular_acceleration": np.zeros(3),
+            "angular_momentum": np.zeros(3), "angular_momentum_rate": np.zeros(3),
+            "foot_position": np.zeros((2, 3)), "foot_velocity": np.zeros((2, 3)), "foot_yaw": np.zeros(2),
+            "foot_pitch": np.zeros(2), "joint_position": np.zeros(10), "joint_velocity": np.zeros(10),
+            "joint_acceleration": np.zeros(10), "joint_torque": np.zeros(10),
+        },
+        {"mixed": np.zeros(WIDTH), "added": np.zeros(2), "raised": np.zeros(2)},
     ),
 )  # fmt: skip
 UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)

@@ -129,7 +129,7 @@ def read_plan(
     """Read the plan at the time ``now`` [s] of the run; returns its time."""
     lead = delay.delay if constants.lead < 0.0 else constants.lead
     early = min(delay.ahead, lead)
-    time = now - progress.late + early
+    time: float = now - progress.late + early
     read_table(table, time, lead - early, constants.period, reference)
     return time
 

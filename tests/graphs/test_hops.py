@@ -25,6 +25,20 @@ def test_ten_jumps_each_in_its_place() -> None:
     assert phases[-1] == Phase.RECOVER
 
 
+@pytest.mark.long
+def test_the_speed_changes_while_it_hops_on() -> None:
+    """In the standard trial; how often it succeeds is a benchmark's matter (aloft bench hopping_on)."""
+    twists = [{"ahead": 0.3}, {"at": 2.0, "ahead": 0.0}, {"at": 3.0, "ahead": 0.4}]
+    sets = {"robot.seed": 0, "plan.jumps": 8, "score.jumps": 8, "speed.twists": twists}
+    run = aloft.load(GRAPHS / "hop_on.yaml", sets).run()
+    assert run.success, run.reason
+    assert run.metrics["jumps"] == 8
+    assert run.metrics["mean_length_error_m"] < 0.01
+    places, numbers = run.signal("plan.goal.position")[:, 0], run.signal("plan.goal.number")
+    ways = np.diff([0.0] + [places[numbers == n][-1] for n in range(1, 9)]) / 0.512
+    assert ways == pytest.approx([0.3, 0.3, 0.3, 0.1, 0.0, 0.2, 0.4, 0.4], abs=1e-3)
+
+
 def test_onto_a_platform_and_off_it_again(tmp_path: Path) -> None:
     """In the robust trial, without standing still on the platform."""
     path = tmp_path / "robust.yaml"
