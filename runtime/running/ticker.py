@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
@@ -24,8 +24,11 @@ from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
-from .sinks import Note
+from .sinks import Note, Sink
 from .timing import Program
+
+if TYPE_CHECKING:
+    from .run_control import RunControl
 
 
 class Ticker:
@@ -45,6 +48,9 @@ class Ticker:
         overruns_by_block: for each block, the number of deadlines that passed while it ran, and
             of results that were late.
         policy: how the run is paced.
+        sinks: all sinks of the run.
+        control: what may pause the run, if anything.
+        paused: whether ``advance`` ends at once; only the control thread sets it, between two ticks.
     """
 
     def __init__(
@@ -68,6 +74,9 @@ class Ticker:
         self._finite = FiniteCheck(bound.memory.bus) if finite_check else None
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
+        self.sinks: Sequence[Sink] = ()
+        self.control: RunControl | None = None
+        self.paused = False
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
         """The different programs, and for each tick of the hyperperiod the program it runs."""
@@ -144,7 +153,7 @@ class Ticker:
         """Run up to ``ticks`` ticks, or without a limit until stopped. Returns how many were run.
 
         The blocks must have been started by the caller. The run ends early when a block or a
-        signal (SIGINT, SIGTERM) asks it to stop.
+        signal (SIGINT, SIGTERM) asks it to stop, or when it is paused.
 
         Raises:
             RunError: a block failed, a value is not finite or the overrun policy says stop.
@@ -164,6 +173,8 @@ class Ticker:
                     call = parameters.answer
                     parameters.answer(tick)
                     self.refresh_chains()
+                    if self.paused:
+                        break
                 if wait is not None:
                     call = wait
                     late = wait(tick)
