@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
@@ -27,8 +27,19 @@ from .pacing import RobotDriven, TimeSource, make_pacer
 from .sinks import Note, Sink
 from .timing import Program
 
-if TYPE_CHECKING:
-    from .run_control import RunControl
+
+class Pauses(Protocol):
+    """What may pause a run between two ticks; see ``run_control``."""
+
+    def begin(self, ticks: int | None, interrupted: Callable[[], bool]) -> None:
+        """All blocks have started, and there are so many ticks to run."""
+
+    def may_go_on(self) -> bool:
+        """Hold the run while it is paused. Returns whether there are ticks to run."""
+
+    @property
+    def ticks(self) -> int | None:
+        """How many ticks to run next."""
 
 
 class Ticker:
@@ -75,7 +86,7 @@ class Ticker:
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
         self.sinks: Sequence[Sink] = ()
-        self.control: RunControl | None = None
+        self.control: Pauses | None = None
         self.paused = False
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
