@@ -151,6 +151,7 @@ class SpeedPlan(Block):
         self.constants.lead = -1.0 if self.params.lead is None else self.params.lead
         self.constants.follows_motion = self.params.by == "progress"
         self.constants.period = self.period
+        self.constants.foot_of_point[:] = self.robot.foot_of_contact()
         self.constants.hop_time = p.flight_time + p.contact_time
 
     def _table_of(self, way: float) -> JumpTable:
