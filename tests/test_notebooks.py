@@ -53,7 +53,8 @@ def test_a_section_without_a_file_is_told(script: ModuleType) -> None:
 
 
 NAMES = (
-    "mass", "cart_pole", "swing_up", "arm", "hop", "ball", "mass_two", "push", "ros2", "fmu", "urdf", "jump",
+    "mass", "cart_pole", "swing_up", "arm", "quadrotor", "hop", "ball", "mass_two", "push", "ros2", "fmu", "urdf",
+    "jump",
 )  # fmt: skip
 
 
