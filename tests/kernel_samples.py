@@ -539,8 +539,11 @@ ROWS_OF_SPEEDS = TableRows(
     np.array([1.31, 1.82, 2.34, 2.85]), np.zeros(4, np.bool_), np.ones((18, 4), np.bool_), np.zeros(WIDTH),
 )  # fmt: skip
 HOPPING = {
-    "jump": 2, "landed": 3, "skipped": 0.5, "place": 0.3, "before": 0.05, "way": 0.1,
+    "jump": 2, "landed": 3, "skipped": 0.5, "place": 0.3, "before": 0.05, "way": 0.1, "goal": 0.4, "begun": 4,
 }  # fmt: skip
+UNUSED["aloft.blocks.jumping.speed_plan.tell_goal"] = records(
+    HOPPING, {"position": np.zeros(2), "heading": 0.0, "height": 0.0, "number": 0, "outcome": 0}
+)
 UNUSED["aloft.blocks.jumping.speed_plan.hat"] = np.array([0.0, 0.1, 0.2]), 1, 0.07
 UNUSED["aloft.blocks.jumping.speed_plan.land"] = (
     0.12, 0.05, 30, ROWS_OF_SPEEDS, *records(HOPPING),

@@ -54,6 +54,8 @@ class SpeedMemory(Signal):
     place = Field(unit="m", text="where the planned feet stand, ahead of where they began")
     before = Field(unit="m", text="the length of the jump before")
     way = Field(unit="m", text="the length of the jump under way")
+    goal = Field(unit="m", text="where the last jump that has lifted off should land")
+    begun = Field(dtype="int64", text="how many have")
 
 
 class HoppingConstants(ProgressConstants):
@@ -208,9 +210,9 @@ class SpeedPlan(Block):
         )
         write_marks(table, now, reference)
         if memory.jump < ROW and now >= table.jumps[memory.jump, 1]:
-            goal.position[0], goal.position[1] = memory.place + memory.way, 0.0
-            goal.number = memory.landed + 1
-            goal.outcome = PlanOutcome.PLANNED
+            memory.goal = memory.place + memory.way
+            memory.begun = memory.landed + 1
+        tell_goal(memory, goal)
         reference.time += memory.skipped
         reference.lift_off_time += memory.skipped
         reference.touchdown_time += memory.skipped
@@ -246,6 +248,15 @@ def land(wanted: float, change: float, jumps: int, table: TableRows, memory: Spe
         memory.skipped += table.jumps[CYCLE, 2] - table.jumps[CYCLE - 1, 2]
     else:
         memory.jump += 1
+
+
+@kernel
+def tell_goal(memory: SpeedMemory, goal: CourseGoal) -> None:
+    """Where the feet should be."""
+    goal.position[0], goal.position[1] = memory.goal, 0.0
+    goal.heading, goal.height = 0.0, 0.0
+    goal.number = memory.begun
+    goal.outcome = PlanOutcome.PLANNED if memory.begun else PlanOutcome.NONE
 
 
 @kernel
