@@ -295,6 +295,18 @@ def every_robot_table(rows: Sequence[Row]) -> str:
     )
 
 
+def mutated_robots_table(rows: Sequence[Row]) -> str:
+    """One row a kind of mistake: how often it was made, and what became of it."""
+    return table(
+        ("what was made wrong", "cases", "what became of it"),
+        (
+            (row["name"], f"{row['value']:.0f}", row["note"])
+            for row in rows
+            if row["value"] is not None
+        ),
+    )
+
+
 def short_tasks_table(summary: Row) -> str:
     """How many tasks met their goal, the rows of ``README_TASKS``, and those of all that did not.
 
