@@ -50,6 +50,8 @@ GALLERY = (
     ("cart_pole", "projects/cart_pole/balance.yaml", "render", "RECORDING", "--at", "4.3", "--distance", "3.5"),
     ("swing_up", "projects/cart_pole/swing_up.yaml", "plot", "RECORDING", "robot.joints.position"),
     ("arm", "projects/arm/reach.yaml", "render", "RECORDING", "--at", "1.5"),
+    ("quadrotor", "projects/quadrotor/flight.yaml", "plot", "RECORDING", "robot.truth.base_position[2]",
+     "robot.truth.base_angular_velocity[0]", "robot.thrusters.thrust"),
     ("hop", "gallery/hop.yaml", "plot", "RECORDING", "robot.joints.position", "phase.state.index"),
     ("ball", "gallery/ball.yaml", "plot", "RECORDING", "ball_height.y", "ball_place.y", "cup_place.y"),
     ("mass_two", "gallery/mass_two.yaml", "graph", "GRAPH"),
