@@ -34,7 +34,6 @@ from result_tables import (
     frontier_table,
     ground_table,
     impulse_table,
-    mutated_robots_table,
     quarter_table,
     ratio_table,
     real_table,
@@ -267,8 +266,9 @@ def write_every_robot(file: Path) -> None:
 
 def write_mutated_robots(file: Path) -> None:
     """What becomes of real descriptions with one thing made wrong."""
-    rows = mutated_robots_table(read_json(file)["rows"])
-    refresh(DOCS / "robots_results.md", "mutated robots", rows)
+    rows = [row for row in read_json(file)["rows"] if row["value"] is not None]
+    text = every_robot_table(rows, "what was made wrong", "cases")
+    refresh(DOCS / "robots_results.md", "mutated robots", text)
 
 
 def write_effects(file: Path) -> None:

@@ -284,25 +284,13 @@ def tasks_table(summary: Row) -> str:
     return table(TASKS_HEAD, map(_task, summary["rows"]))
 
 
-def every_robot_table(rows: Sequence[Row]) -> str:
-    """One row a file: its joints, and what became of it."""
+def every_robot_table(rows: Sequence[Row], what: str = "file", unit: str = "joints") -> str:
+    """One row a file or kind of mistake: its joints or cases, and what became of it."""
     return table(
-        ("file", "joints", "what became of it"),
+        (what, unit, "what became of it"),
         (
             (row["name"], "" if row["value"] is None else f"{row['value']:.0f}", row["note"])
             for row in rows
-        ),
-    )
-
-
-def mutated_robots_table(rows: Sequence[Row]) -> str:
-    """One row a kind of mistake: how often it was made, and what became of it."""
-    return table(
-        ("what was made wrong", "cases", "what became of it"),
-        (
-            (row["name"], f"{row['value']:.0f}", row["note"])
-            for row in rows
-            if row["value"] is not None
         ),
     )
 
