@@ -256,6 +256,9 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
                ">rotor kg m^2", ">friction N m", ">damping N m s")  # fmt: skip
     if rows:
         out.print(table(f"motors, profile {about['profile']}", columns, rows))
+    if about["thrusters"]:
+        names = ("thruster", "link", "at m", "axis", ">to N", ">moment N m/N", ">lag s")
+        out.print(table("thrusters", names, [_thruster_row(each) for each in about["thrusters"]]))
     if about["feet"]:
         feet = [(f["foot"], f["kind"], f["link"], ", ".join(f["contacts"])) for f in about["feet"]]
         out.print(table("feet", ("foot", "kind", "link", "contact points"), feet))
@@ -273,6 +276,14 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
 def _of_joints(row: dict[str, Any]) -> str:
     """The joints that a motor moves, where its name does not say it."""
     return "" if row["joints"] == [row["motor"]] else f" ({', '.join(row['joints'])})"
+
+
+def _thruster_row(each: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        each["thruster"], each["link"],
+        *(" ".join(f"{x:.4g}" for x in each[key]) for key in ("position", "axis")),
+        *(f"{each[key]:.4g}" for key in ("max_thrust", "torque_ratio", "time_constant")),
+    )  # fmt: skip
 
 
 def _link_row(link: dict[str, Any]) -> tuple[str, ...]:

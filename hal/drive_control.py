@@ -99,7 +99,8 @@ class MotorModel(Parameters):
                     expected="a factor from 0.5 to 2", found=f"{value:g}",
                     fix="the measured torque constant divided by the nominal one",
                 )  # fmt: skip
-            if not any(fnmatchcase(name, pattern) for name in robot.transmission.motors):
+            named = isinstance(given, dict)
+            if named and not any(fnmatchcase(name, pattern) for name in robot.transmission.motors):
                 yield UnmetRequirement(
                     f"{robot.name} has no motor {pattern}", parameter="motor_model",
                     expected=", ".join(robot.transmission.motors), found=pattern,

@@ -52,6 +52,7 @@ class Purpose(IntEnum):
     LINK_LENGTH = 30
     STATIC_FRICTION = 31
     COGGING = 32
+    THRUST = 33
 
 
 RUNNING = (

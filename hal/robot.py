@@ -16,6 +16,8 @@ from ..blocks.signals import (
     JointCommand,
     JointState,
     RobotHealth,
+    ThrustCommand,
+    ThrusterState,
 )
 from ..blocks.signals.robot import HEALTHY
 from ..mathematics.arrays import Indices1D
@@ -122,13 +124,17 @@ class Robot(Block, ABC):
         sensors = mounted_sensors(robot, folder)
         sensors = () if all(sensor.name in cls.outputs for sensor in sensors) else sensors
         absent = {} if robot is None else cls._absent_outputs(robot)
-        if not sensors and all(cls.outputs[name].absent == why for name, why in absent.items()):
+        thrusters = {} if robot is None or "thrust" in cls.inputs else cls.ports_of_thrusters(robot)
+        told = all(cls.outputs[name].absent == why for name, why in absent.items())
+        if not sensors and not thrusters and told:
             return cls
-        key = (cls, *((sensor.name, type(sensor)) for sensor in sensors), *absent.items())
+        key = (
+            cls, *((sensor.name, type(sensor)) for sensor in sensors), *absent.items(), *thrusters
+        )  # fmt: skip
         if key not in _CLASSES:
             ports = cls.ports_of(sensors) if sensors else {}
             for name in ports:
-                if hasattr(cls, name) or not name.isidentifier():
+                if hasattr(cls, name) or name in thrusters or not name.isidentifier():
                     raise BlockError(
                         f"sensor {name}: the output of a robot cannot be called {name!r}; give it "
                         "another name in the robot's description"
@@ -136,7 +142,7 @@ class Robot(Block, ABC):
             for name, reason in absent.items():
                 output = cls.outputs[name]
                 ports[name] = Output(output.signal, text=output.text, absent=reason)
-            body = {"__doc__": cls.__doc__, "__module__": cls.__module__, **ports}
+            body = {"__doc__": cls.__doc__, "__module__": cls.__module__, **thrusters, **ports}
             _CLASSES[key] = type(cls.__name__, (cls,), body)
         return _CLASSES[key]
 
@@ -150,6 +156,28 @@ class Robot(Block, ABC):
             )
             for sensor in sensors
         }
+
+    @classmethod
+    def ports_of_thrusters(cls, robot: RobotDescription) -> dict[str, Port[Any]]:
+        """The ports for thrusters, by name; none where it has none, or this driver does not serve them.
+
+        A driver that does serves ``thrust_ports``."""
+        return {}
+
+    @staticmethod
+    def thrust_ports(robot: RobotDescription) -> dict[str, Port[Any]]:
+        """The input and the output of a robot with thrusters. Without joints it needs no joint command."""
+        if not robot.thrusters:
+            return {}
+        ports: dict[str, Port[Any]] = {
+            "thrust": Input(ThrustCommand, text="what the thrusters are to give"),
+            "thrusters": Output(ThrusterState, text="what they give, at the start of the tick"),
+        }
+        if not robot.joints:
+            active = {"mode": int(CommandMode.ACTIVE)}
+            text = "whether the thrusters follow, as there are no joints: see CommandMode"
+            ports["command"] = Input(JointCommand, default=active, text=text)
+        return ports
 
     def mounted(self) -> dict[str, Signal]:
         """The outputs of the mounted sensors, by name."""

@@ -64,6 +64,18 @@ def report(read: ReadRobot) -> dict[str, Any]:
         "profile": robot.motors.profile,
         "profiles": list(robot.profiles),
         "motors": _motors(robot),
+        "thrusters": [
+            {
+                "thruster": name,
+                "link": each.link,
+                "position": list(each.position),
+                "axis": list(each.axis),
+                "max_thrust": each.max_thrust,
+                "torque_ratio": each.torque_ratio,
+                "time_constant": each.time_constant,
+            }
+            for name, each in robot.thrusters.items()
+        ],
         "feet": [
             {
                 "foot": foot.name,
@@ -90,14 +102,14 @@ def missing(read: ReadRobot) -> list[str]:
     """What a description lacks or assumes, each with what to write."""
     robot = read.description
     found = list(read.notes)
-    if robot.base_joint != "fixed" and not robot.feet:
+    if robot.base_joint != "fixed" and not robot.feet and not robot.thrusters:
         found.append(
             "there are no feet, so the robot can be simulated but not stand or jump; write them "
             "under feet: [{name: NAME, at: LINK, radius: METRES}], or let aloft robot import guess"
         )
-    if not np.any(robot.motors.rotor_inertia):
+    if robot.joints and not np.any(robot.motors.rotor_inertia):
         found.append("rotor inertia is zero; write rotor_inertia under profiles")
-    if not np.any(robot.motors.friction) and not np.any(robot.motors.damping):
+    if robot.joints and not np.any(robot.motors.friction) and not np.any(robot.motors.damping):
         found.append("joints have no friction; write friction and damping under profiles")
     bare = [link.name for link in robot.links if not link.shapes]
     if len(bare) == len(robot.links):

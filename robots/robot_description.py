@@ -197,6 +197,23 @@ class ContactPoint(Part):
     radius: float
 
 
+class Thruster(Part):
+    """A rotor with blades, a fan or a nozzle that pushes its ``link`` at ``position`` [m, link frame] along
+    ``axis``, with up to ``max_thrust`` [N] and never backwards.
+
+    ``torque_ratio`` [m] is the moment on the link about ``axis`` for each newton of thrust: the drag of blades that
+    turn about the axis by the right hand is a negative one. Thrust follows what is asked for with ``time_constant``
+    [s], as a first-order lag.
+    """
+
+    link: str
+    position: Vector3 = (0.0, 0.0, 0.0)
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    max_thrust: float
+    torque_ratio: float = 0.0
+    time_constant: float = 0.0
+
+
 class MotorRating(Part):
     """The values of one motor, at the gearbox output, that differ from those of its profile.
 
@@ -355,7 +372,7 @@ class RobotDescription(Part):
     at work: the planner leaves them out, and the controller holds them.
     """
 
-    later = ("base_joint", "profile", "sensors", "held")
+    later = ("base_joint", "profile", "sensors", "held", "thrusters")
     seen_only = ("looks",)
     simulated_only = ("supply",)
 
@@ -379,6 +396,8 @@ class RobotDescription(Part):
     """Angles [rad] by name of joints that stand still while the robot is at work."""
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
+    thrusters: Mapping[str, Thruster] = {}
+    """What drives the robot without joints, such as the rotors of a quadrotor, by name."""
     supply: PowerSupply | None = None
     """What feeds the motors; ``None``: nobody has said it."""
     looks: Mapping[str, Appearance] = {}
@@ -392,6 +411,7 @@ class RobotDescription(Part):
             "n_velocities": len(self.joints) + self.base_velocities,
             "n_contacts": len(self.contacts),
             "n_feet": len(self.feet),
+            "n_thrusters": len(self.thrusters),
         }
 
     @property
@@ -462,7 +482,8 @@ class RobotDescription(Part):
     @cached_property
     def joint_to_motor(self) -> NDArray[np.float64]:
         """Motor velocity = this (n_joints, n_joints) times joint velocity."""
-        return np.array(self.transmission.joint_to_motor, dtype=np.float64)
+        rows = self.transmission.joint_to_motor
+        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.joints))
 
     @cached_property
     def torque_to_motor(self) -> NDArray[np.float64]:

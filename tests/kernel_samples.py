@@ -503,3 +503,16 @@ UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
     ),
 )  # fmt: skip
 UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)
+
+SENT = {"active": 1, "pending": 2, "due": np.arange(5), "mode": np.array([1, 1, 1, 0, 2])}
+UNUSED |= {
+    "aloft.hal.simulated.thrusters.send_thrust": records(
+        {"thrust": NORMAL(4)}, SENT, {"thrust": NORMAL((5, 4))}
+    ),
+    "aloft.hal.simulated.thrusters.give_thrust": (
+        *records(SENT, {"thrust": 3.0 * NORMAL((5, 4))}), np.full(4, 2.0), np.zeros(4),
+    ),
+    "aloft.hal.simulated.thrusters.read_thrust": (
+        NORMAL(3), NORMAL(2), np.array([0, -1, 1]), *records({"thrust": np.zeros(3)}),
+    ),
+}  # fmt: skip

@@ -44,6 +44,8 @@ from .robot import (
     JointState,
     RobotHealth,
     RobotTruth,
+    ThrustCommand,
+    ThrusterState,
 )
 from .steering import (
     BodyTwist,
@@ -94,6 +96,8 @@ __all__ = [
     "SeenStones",
     "SwitchFault",
     "SwitchHealth",
+    "ThrustCommand",
+    "ThrusterState",
     "WholeBodyCommand",
     "WholeBodyTarget",
 ]

@@ -145,6 +145,18 @@ class JointCommand(Signal):
     damping = Field("n_joints", unit="N m s/rad", text="joint feedback gain on velocity")
 
 
+class ThrustCommand(Signal):
+    """What the thrusters of a robot are to give, in the order of its description."""
+
+    thrust = Field("n_thrusters", unit="N", text="thrust asked of each")
+
+
+class ThrusterState(Signal):
+    """What the thrusters of a robot give, in the order of its description."""
+
+    thrust = Field("n_thrusters", unit="N", text="thrust of each")
+
+
 class ExternalForce(Signal):
     """An external force on the robot."""
 

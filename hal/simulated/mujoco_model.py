@@ -16,8 +16,8 @@ damping ratio are given, so robots of any mass sink in by the same fraction of a
 
 Names in the model: links, joints and contact points are called as in the description. A contact
 point is a geom and a site; if it is a foot's only point the site is at the centre of its ball. A
-link called ``world`` is the body ``link/world``. Motors are ``motor/<joint>``, named points are
-sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
+link called ``world`` is the body ``link/world``. Motors are ``motor/<joint>``, thrusters are actuators
+and sites ``thruster/<name>``, named points are sites ``point/<name>``, and the sensors are ``com``, ``com_velocity``,
 ``angular_momentum``, ``accelerometer``, ``contacts`` (how many contacts there are at all),
 ``sole/<link>`` (on uneven ground, how many contacts a sole and its points have with it),
 ``load/<contact point>`` (how many with the ground, and their net force on it). A sensor that the
@@ -40,6 +40,7 @@ from ...runtime.language.terrain import Ground, HeightField, Terrain
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .simulated_robot import SimulatorParameters
+from .thrusters import add_thrusters
 from .unsupported import shared_motors, unsupported_motor
 from .variation import Variation
 
@@ -249,11 +250,13 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
             bits["contype"] = 1 << limb[name]
             bits["conaffinity"] |= (1 << limb[name]) - 1
         for k, shape in enumerate(link.shapes):
+            ends = [longer * x for x in (*shape.start, *shape.end)]
+            place: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": ends}
+            if shape.start == shape.end:
+                place = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "pos": ends[:3]}
             body.add_geom(
-                name=f"{name}/{k}", type=mujoco.mjtGeom.mjGEOM_CAPSULE, mass=0.0,
-                size=[shape.radius, 0, 0],
-                fromto=[longer * x for x in (*shape.start, *shape.end)],
-                **bits, **_surface(variation),
+                name=f"{name}/{k}", mass=0.0, size=[shape.radius, 0, 0],
+                **place, **bits, **_surface(variation),
             )  # fmt: skip
         for foot in robot.feet:
             if foot.link != name:
@@ -267,11 +270,11 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
                     size=[contact.radius, 0, 0], pos=centre, **bits, **_sole(variation),
                 )  # fmt: skip
                 is_ball = contact.name in balls
-                place = centre if is_ball else longer * np.array(contact.position)
-                body.add_site(name=contact.name, pos=place)
-        for point, (owner, place) in robot.points.items():
+                at = centre if is_ball else longer * np.array(contact.position)
+                body.add_site(name=contact.name, pos=at)
+        for point, (owner, at) in robot.points.items():
             if owner == name:
-                body.add_site(name=f"point/{point}", pos=longer * np.array(place))
+                body.add_site(name=f"point/{point}", pos=longer * np.array(at))
 
     add_link(robot.base, spec.worldbody, (0.0, 0.0, 0.0))
     BASES[robot.base_joint].add_joints(bodies[robot.base])
@@ -297,6 +300,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
         )
         motor.set_to_motor()
     add_rotors(spec, robot, variation)
+    add_thrusters(spec, bodies, robot, variation)
 
 
 def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:

@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.signals import ThrustCommand, ThrusterState
 from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Context, Metric, State, UnmetRequirement
+from ...runtime.language.block import Context, Metric, Port, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
 from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
 from .state import DriveState, TickRecord, integration_elements
+from .thrusters import SimulatedThrusters, ThrustQueue
 from .unsupported import uneven_contacts, unsupported_motor
 
 
@@ -41,6 +43,10 @@ class MujocoRobot(SimulatedRobot):
 
     Command modes: ``OFF`` gives no torque, ``ACTIVE`` feedforward plus joint feedback, ``DAMPING``
     the damping ``drive_damping`` on every joint, whatever the command's gains are.
+
+    Thrusters of the description get an input ``thrust``, which arrives with the joint command of its tick, and
+    the output ``thrusters``. Thrust is limited to what the description says and follows with its lag; in all modes but
+    ``ACTIVE`` nothing is asked of them, so a robot in flight falls when a run ends.
 
     Start: the robot stands in its description's pose (torso turned by a drawn
     ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
@@ -74,6 +80,9 @@ class MujocoRobot(SimulatedRobot):
     drives = State(DriveState, text="commands in the drives and on their way")
     feedback = State(FeedbackState, text="the goals of the drives' own loops")
     record = State(TickRecord, text="what happened in the physics steps of the last tick")
+    thrust: ThrustCommand
+    thrusters: ThrusterState
+    thrust_queue: ThrustQueue
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
@@ -155,6 +164,13 @@ class MujocoRobot(SimulatedRobot):
             )
 
     @classmethod
+    def ports_of_thrusters(cls, robot: RobotDescription) -> dict[str, Port[Any]]:
+        """The ports of thrusters, and what is on its way to them."""
+        ports = cls.thrust_ports(robot)
+        queue = State(ThrustQueue, text="thrust that goes with the commands in the drives")
+        return {**ports, "thrust_queue": queue} if ports else {}
+
+    @classmethod
     def nominal_delay(cls, params: Parameters) -> float:
         """The latency that is simulated."""
         assert isinstance(params, SimulatorParameters)
@@ -205,12 +221,19 @@ class MujocoRobot(SimulatedRobot):
             exchange = round(params.bus_period / params.timestep)
             feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
         drives = self._drives = SimulatedDrives(robot, damping, self.drives, self.record, feedback)
+        thrusters, following = None, list[Call]()
+        if robot.thrusters:
+            thrusters = SimulatedThrusters(
+                robot, plant.model, plant.data, self.drives, self.thrust_queue
+            )
+            following.append(thrusters.following())
         self._reading = CallSequence([
             *plant.reading(self.imu, self.joints),
             *plant.reading_switches(self.contacts.closed),
             *plant.sensors.reading_mounted(self.mounted()),
             *plant.truth.reporting(self.truth), self.reporting(),
             *plant.reporting_drives(self.health),
+            *([thrusters.reading(self.thrusters)] if thrusters else []),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
@@ -219,10 +242,11 @@ class MujocoRobot(SimulatedRobot):
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
             drives.sending(self.command, self.physics.step, latency),
+            *([thrusters.sending(self.thrust)] if thrusters else []),
         ])  # fmt: skip
-        self._settling = plant.simulating(drives, 1)
-        self._ticking = plant.simulating(drives, steps, self.push)
-        self._damped = plant.simulating(drives, steps)
+        self._settling = plant.simulating(drives, 1, thrusters=following)
+        self._ticking = plant.simulating(drives, steps, self.push, following)
+        self._damped = plant.simulating(drives, steps, thrusters=following)
 
     @property
     def calls(self) -> Mapping[str, Sequence[Call]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -332,6 +332,7 @@ class Plant:
             data, base, self._robot, self._params.build_scene(self._robot), self.record
         )
         sensors, physics = self.sensors, self.physics
+        self._torque = data.ctrl[: len(self._robot.joints)]  # those of thrusters follow
         force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
         self._rate = base.angular_velocity
         self._sensing: list[Call] = []
@@ -347,7 +348,7 @@ class Plant:
             self.sensed = self.gears.position, self.gears.velocity
         self._turning = self.sensed[1]  # at what speed the motors turn, as joints
         if self.drives.has_encoders:
-            self._seeing.append(self.drives.sensing(*self.sensed, data.ctrl))
+            self._seeing.append(self.drives.sensing(*self.sensed, self._torque))
             self.sensed = physics.encoder_position, physics.encoder_velocity
         self._note = signal_call(
             record_step, self.physics.step, StepSensors(load, soles, force, contacts, self.position),
@@ -454,19 +455,21 @@ class Plant:
                 self.step1.run()
 
     def simulating(
-        self, drives: JointTorques, steps: int, push: ExternalForce | None = None
-    ) -> CallSequence:
+        self, drives: JointTorques, steps: int, push: ExternalForce | None = None,
+        thrusters: Sequence[Call] = (),
+    ) -> CallSequence:  # fmt: skip
         """Calls that simulate physics steps; afterwards all derived quantities are up to date.
 
         ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
-        pulls, too: it is put on when the robot stands.
+        pulls, too: it is put on when the robot stands. ``thrusters`` are what those do in every step.
         """
-        step, torque, turning = self.physics.step, self.data.ctrl, self._turning
+        step, torque, turning = self.physics.step, self._torque, self._turning
         feeds = [each for each in (self.windings, self.battery) if each is not None]
         one: list[Call] = [
             self._encoding,
             *(each.limiting(drives.limits) for each in feeds),
             drives.torque_call(step, self._encoder, self.sensed[1], turning, torque),
+            *thrusters,
         ]
         if self.windings is not None:
             one.append(self.windings.heating(drives.limits))

@@ -96,6 +96,9 @@ class SimulatorParameters(DriveGains):
     mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
     mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
     joint_friction: float = parameter(1.0, ge=0, text="factor on the motors' friction and damping")
+    thrust_spread: float = parameter(
+        0.0, ge=0, lt=1, text="spread of a factor on thrust and moment of every thruster"
+    )
     base_com_offset: list[float] = parameter(
         [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
     )

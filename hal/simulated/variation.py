@@ -25,8 +25,8 @@ class Variation:
     contacts, ``mass`` a factor on every mass and inertia, ``base_com_offset`` [m, base frame] that of the
     base link's CoM, and ``joint_friction`` a factor on friction and damping of the motors. The others
     have an element for each link (``link_mass``, ``link_inertia`` and ``link_length``, factors, and ``link_com`` [m, link
-    frame]), joint (``friction_of_joint`` and ``static_friction``, factors) or motor (``rotor_inertia``, a factor); empty: all
-    nominal. ``imu`` is where the IMU is. ``rotor_share`` is the share of the
+    frame]), joint (``friction_of_joint`` and ``static_friction``, factors), motor (``rotor_inertia``, a factor) or thruster
+    (``thrust``, a factor); empty: all nominal. ``imu`` is where the IMU is. ``rotor_share`` is the share of the
     rotors' inertia that the bodies carry; gears that yield have the rest. ``sole`` is the time constant [s]
     and the damping ratio of the contact points' contacts, ``gravity`` [m/s^2] is seen from the floor.
     """
@@ -47,16 +47,18 @@ class Variation:
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     link_length: tuple[float, ...] = ()
     static_friction: tuple[float, ...] = ()
+    thrust: tuple[float, ...] = ()
 
     def factor(self, of: tuple[float, ...], k: int) -> float:
-        """The factor of a link, joint or motor."""
+        """The factor of a link, joint, motor or thruster."""
         return of[k] if of else 1.0
 
     def metrics(self) -> dict[str, float]:
         """The extremes of what differs from link to link and from joint to joint, where it does."""
         found: dict[str, float] = {}
         for name, values in (
-            ("link_length", self.link_length), ("static_friction", self.static_friction)
+            ("link_length", self.link_length), ("static_friction", self.static_friction),
+            ("thrust", self.thrust),
         ):  # fmt: skip
             if values:
                 found |= {f"robot_least_{name}": min(values), f"robot_largest_{name}": max(values)}
@@ -136,4 +138,5 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         None if params.soles is None else (params.soles.time_constant, params.soles.damping_ratio),
         _gravity(params), factors(Purpose.LINK_LENGTH, links.length_spread, len(robot.links)),
         _static_friction(joints, params.seed, n),
+        factors(Purpose.THRUST, params.thrust_spread, len(robot.thrusters)),
     )  # fmt: skip

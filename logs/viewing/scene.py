@@ -232,6 +232,36 @@ def foot_outline(part: ScenePart, foot: int, color: int) -> object:
     return rr.LineStrips3D([strip], colors=[color], radii=[0.0015 * part.scale])
 
 
+class ThrustPart(ScenePart):
+    """``thrust``: an arrow for the force of every thruster on its link."""
+
+    def write_static(self) -> None:
+        """Write the colour."""
+        import rerun as rr
+
+        if self.ports.thrust is not None:
+            width = ARROW_RADIUS * self.scale
+            self.log("thrust", rr.Arrows3D.from_fields(colors=[self.colors.support], radii=[width]))
+
+    def write(self, moments: Moments) -> None:
+        """Write the forces where they act."""
+        import rerun as rr
+
+        if self.ports.thrust is None or not len(moments):
+            return
+        thrust, poses = moments[self.ports.thrust], moments.poses(self.robot, self.ports.pose)
+        places, forces = [], []
+        for k, thruster in enumerate(self.robot.thrusters.values()):
+            position, rotation = poses.of(thruster.link)
+            places.append(position + rotation @ np.array(thruster.position))
+            forces.append(thrust[:, k, None] * (rotation @ np.array(thruster.axis)))
+        vectors = force_arrows(self.robot, np.stack(forces, axis=1))
+        arrows = rr.Arrows3D.columns(
+            origins=np.stack(places, axis=1).reshape(-1, 3), vectors=vectors.reshape(-1, 3)
+        )
+        self.send("thrust", moments, arrows.partition(np.full(len(moments), len(places))))
+
+
 class PushPart(ScenePart):
     """``push``: an arrow at the robot's named point, of length zero except during the push."""
 
@@ -364,6 +394,7 @@ PARTS = (
     PlanPart,
     FootTargetPart,
     PushPart,
+    ThrustPart,
     SensorPart,
 )
 

@@ -40,12 +40,13 @@ PLAN = Role("JumpReference", ("com", "foot_position", "foot_yaw"))
 FEET = Role("FootTarget", ("position:n_feet", "rotation:n_feet"))
 PUSH = Role("ExternalForce", ("force", "point"))
 IMU = Role("ImuReading", ("angular_velocity", "specific_force"))
-ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU)
+THRUST = Role("ThrusterState", ("thrust:n_thrusters",))
+ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IMU, THRUST)
 OTHERS = (
     "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
     "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
     "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
-    "SwitchHealth", "WholeBodyTarget",
+    "SwitchHealth", "ThrustCommand", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
 
@@ -87,6 +88,7 @@ class ScenePorts:
         ground_height: height of the ground below each contact point [m].
         plan: a port with the planned ``com``, ``foot_position`` and ``foot_yaw``.
         feet: a port with the feet's target ``position`` and ``rotation``, seen from the base.
+        thrust: the thrust [N] of every thruster, (n_thrusters,).
         push: a port with a ``force`` from outside and the ``point`` it acts at.
         friction: the friction coefficient of the block that commands the forces.
     """
@@ -99,6 +101,7 @@ class ScenePorts:
     ground_height: str | None = None
     plan: str | None = None
     feet: str | None = None
+    thrust: str | None = None
     push: str | None = None
     friction: float | None = None
 
@@ -166,6 +169,7 @@ def scene_ports(header: Header) -> ScenePorts | None:
     has_com = truth if truth is not None and "com" in ports[truth] else terms
     position, force = _contacts(ports, terms, command) if robot.contacts else (None, None)
     ground = port_of(ports, GROUND) if robot.contacts else None
+    thrust = port_of(ports, THRUST)
     return ScenePorts(
         pose=pose,
         estimate=estimate if truth and base else None,
@@ -175,6 +179,7 @@ def scene_ports(header: Header) -> ScenePorts | None:
         ground_height=f"{ground}.ground_height" if ground else None,
         plan=port_of(ports, PLAN) if robot.feet else None,
         feet=port_of(ports, FEET) if robot.feet else None,
+        thrust=f"{thrust}.thrust" if thrust and robot.thrusters else None,
         push=port_of(ports, PUSH),
         friction=_number(header, f"{block_of(command)}.friction") if command else None,
     )

@@ -203,6 +203,38 @@ class Overlay:
                     found[name] = [frame.link, frame.point(place)]
         return found
 
+    def thrusters(self, built: LinkTree, model: RawModel) -> dict[str, Any]:
+        """Thrusters as in a full description: those of the file, with what the YAML changes, and the YAML's
+        own, each on a link of the description or in the frame of a body of the file."""
+        found: dict[str, Any] = {
+            name: {
+                "link": raw.body, "position": raw.position.tolist(), "axis": raw.axis.tolist(),
+                "max_thrust": raw.max_thrust, "torque_ratio": raw.torque_ratio,
+                "time_constant": raw.time_constant,
+            }
+            for name, raw in model.thrusters.items()
+        }  # fmt: skip
+        for name, value in self.mapping("thrusters").items():
+            known = found.get(name, {})
+            found[name] = {**known, **value} if isinstance(value, Mapping) else value
+        links = [link["name"] for link in built.links]
+        for name, value in found.items():
+            at = value.get("link") if isinstance(value, Mapping) else None
+            if at is None or (at in links and at not in built.frames):
+                continue
+            frame = self.frame(("thrusters", name, "link"), at, built)
+            place = self._point(
+                ("thrusters", name, "position"), value.get("position", [0.0, 0.0, 0.0])
+            )
+            axis = self._point(("thrusters", name, "axis"), value.get("axis", [0.0, 0.0, 1.0]))
+            if frame is not None and place is not None and axis is not None:
+                turned = frame.rotation @ np.array(axis)
+                found[name] = {
+                    **value, "link": frame.link, "position": frame.point(place),
+                    "axis": tidy(turned, 12),
+                }  # fmt: skip
+        return found
+
 
 def _filled(profile: Mapping[str, Any], rated: Mapping[str, Any]) -> dict[str, Any]:
     """A profile with the file's values where it has none.
@@ -401,6 +433,8 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     for key in ("profile", "sensors", "standing", "held", "supply", "looks"):
         if key in added:
             data[key] = added[key]
+    if thrusters := overlay.thrusters(built, model):
+        data["thrusters"] = thrusters
     _stand_within_limits(data)
     return Imported(data, overlay.faults, notes, model, built)
 

@@ -80,6 +80,19 @@ class RawJoint:
 
 
 @dataclass(frozen=True)
+class RawThruster:
+    """An actuator that pushes a ``body`` at ``position`` [m] along ``axis``, both in the body's frame; see
+    ``Thruster``."""
+
+    body: str
+    position: Array
+    axis: Array
+    max_thrust: float
+    torque_ratio: float
+    time_constant: float
+
+
+@dataclass(frozen=True)
 class RawBody:
     """A body of the file: ``rotation`` and ``position`` [m] in the world at the zero of all joints,
     its own ``inertial``, ``capsules`` and ``look`` in its own frame, and the joints that carry it."""
@@ -106,6 +119,7 @@ class RawModel:
             on it.
         names_world: whether the file itself has a link for the world, as it must in MJCF.
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
+        thrusters: actuators that push at a place, by name.
         mimics: joints that the file ties to another one, or leaves no range.
         notes: what could not be taken over, one sentence each.
     """
@@ -119,3 +133,4 @@ class RawModel:
     pose: Mapping[str, float] = field(default_factory=dict)
     mimics: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    thrusters: Mapping[str, RawThruster] = field(default_factory=dict)

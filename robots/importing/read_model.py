@@ -20,7 +20,7 @@ from ...mathematics.arrays import Array
 from . import capsules as fit
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
-from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, full_tensor
+from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, RawThruster, full_tensor
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, find_file, urdf_joints
 
 
@@ -97,11 +97,11 @@ def read_model(path: Path) -> RawModel:
             looks.get(names[k], NOTHING_SEEN) if file.is_urdf else _look(model, k, meshes),
         )
     name = spec.modelname or path.stem
-    pose = _key_frame(model)
+    pose, thrusters = _key_frame(model), _thrusters(model, notes)
     names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
         name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics + still,
-        tuple(dict.fromkeys(notes)),
+        tuple(dict.fromkeys(notes)), thrusters,
     )  # fmt: skip
 
 
@@ -273,6 +273,53 @@ def _motor_torque(model: Any, j: int) -> float:
         found += torque
     if model.jnt_actfrclimited[j] and found != 0.0:
         return float(np.fmin(found, np.max(np.abs(model.jnt_actfrcrange[j]))))
+    return found
+
+
+def _thrusters(model: Any, notes: list[str]) -> dict[str, RawThruster]:
+    """The MJCF actuators on sites that push along a direction, with a moment about it."""
+    import mujoco
+
+    found = {}
+    for k in range(model.nactuator):
+        site, reference = (int(each) for each in model.actuator_trnid[k])
+        if int(model.actuator_trntype[k]) != int(mujoco.mjtTrn.mjTRN_SITE):
+            continue
+        name = model.actuator(k).name or f"thruster_{k + 1}"
+        gear = np.array(model.actuator_gear[k]) * float(model.actuator_gainprm[k][0])
+        force, moment = float(np.linalg.norm(gear[:3])), gear[3:]
+        axis = gear[:3] / (force or 1.0)
+        ratio = float(moment @ axis) / (force or 1.0)
+        why = ""
+        if force == 0.0 or reference >= 0:
+            why = "it gives no force along a direction of its site"
+        elif np.abs(moment - ratio * force * axis).max() > 1e-9 * force:
+            why = "its moment is not about its force"
+        elif int(model.actuator_biastype[k]) != int(mujoco.mjtBias.mjBIAS_NONE):
+            why = "its force depends on more than its control"
+        elif model.actuator_forcelimited[k]:
+            most = (
+                float(model.actuator_forcerange[k][1]) * force / abs(model.actuator_gainprm[k][0])
+            )
+        elif model.actuator_ctrllimited[k]:
+            most = float(model.actuator_ctrlrange[k][1]) * force
+        else:
+            why = "it has neither ctrlrange nor forcerange"
+        if why:
+            notes.append(f"actuator {name} is left out: {why}; write it under thrusters")
+            continue
+        filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
+        lag = (
+            float(model.actuator_dynprm[k][0]) if int(model.actuator_dyntype[k]) in filters else 0.0
+        )
+        if model.actuator_ctrllimited[k] and model.actuator_ctrlrange[k][0] < 0.0:
+            notes.append(f"actuator {name} pushes both ways in the file, and only forwards here")
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.site_quat[site])
+        body = model.body(int(model.site_bodyid[site])).name
+        found[name] = RawThruster(
+            body, np.array(model.site_pos[site]), turn.reshape(3, 3) @ axis, most, ratio, lag
+        )
     return found
 
 

@@ -1,4 +1,4 @@
-"""Checks of the transmission and of what the motors can do."""
+"""Checks of the transmission, and of what motors and thrusters can do."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from ...files.problems import listing
-from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Transmission
-from .faults import Draft, Path, nearest, number, read
+from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Thruster, Transmission
+from .faults import Draft, Path, nearest, number, read, vector
+from .structure import check_axis
 
 LARGEST_CONDITION = 1e8
 """The largest condition number of a transmission; beyond it motor torques are rounding errors."""
@@ -180,3 +181,39 @@ def _check_rating(
             f"corner_speed below {number(free)} {units['rad/s']}", number(corner),
             f"corner_speed: {number(0.6 * free)}",
         )  # fmt: skip
+
+
+def check_thrusters(draft: Draft) -> None:
+    """Report thrusters on unknown links, without direction, or that give nothing."""
+    links = draft.names("links")
+    for name, value in draft.entries("thrusters"):
+        path: Path = ("thrusters", name)
+        thruster, owner = read(Thruster, value), f"thruster {name}"
+        if thruster is None:
+            continue
+        if thruster.link not in links:
+            draft.unknown((*path, "link"), f"the link of {owner}", thruster.link, "link", links)
+        if not all(map(math.isfinite, thruster.position)):
+            draft.add(
+                (*path, "position"), f"{owner} is nowhere", "three finite numbers of m",
+                vector(thruster.position),
+            )  # fmt: skip
+        check_axis(draft, (*path, "axis"), owner, thruster.axis)
+        most = thruster.max_thrust
+        if not (math.isfinite(most) and most > 0.0):
+            draft.add(
+                (*path, "max_thrust"), f"{owner} has a max_thrust of {number(most)}",
+                "a positive number of N", number(most),
+                f"max_thrust: {number(-most)}, and the axis reversed" if most < 0.0 else "",
+            )  # fmt: skip
+        if not math.isfinite(thruster.torque_ratio):
+            draft.add(
+                (*path, "torque_ratio"), f"{owner} has no torque_ratio", "a finite number of m",
+                number(thruster.torque_ratio),
+            )  # fmt: skip
+        lag = thruster.time_constant
+        if not (math.isfinite(lag) and lag >= 0.0):
+            draft.add(
+                (*path, "time_constant"), f"{owner} has a time_constant of {number(lag)}",
+                "a finite number of s from 0", number(lag),
+            )  # fmt: skip

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from ...files.problems import listing
 from ...files.validation import explain, names_at
 from ..robot_description import RobotDescription
-from .actuation import check_actuation
+from .actuation import check_actuation, check_thrusters
 from .faults import Draft, Path, RobotFault, nearest
 from .stance import check_feet, check_poses
 from .structure import check_bodies, check_joints, check_looks, check_names, check_tree
@@ -33,6 +33,7 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     check_joints(draft)
     check_tree(draft)
     check_actuation(draft)
+    check_thrusters(draft)
     check_feet(draft)
     check_poses(draft)
     check_looks(draft)
@@ -91,7 +92,7 @@ def where(data: Any, path: Path) -> str:
     """What stands at a path, in words: ``link shank``, ``profile koala``, ``the robot``."""
     words: list[str] = []
     singular = {"links": "link", "joints": "joint", "feet": "foot", "contacts": "contact",
-                "shapes": "shape", "profiles": "profile"}  # fmt: skip
+                "shapes": "shape", "profiles": "profile", "thrusters": "thruster"}  # fmt: skip
     for depth, key in enumerate(path):
         holder, data = data, _inside(data, key)
         kind = singular.get(str(path[depth - 1])) if depth else None

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...files.problems import listing
-from ..robot_description import Appearance, Box, Joint, Link, Mesh
+from ..robot_description import Appearance, Box, Joint, Link, Mesh, Vector3
 from .faults import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
@@ -165,23 +165,21 @@ def check_joints(draft: Draft) -> None:
                 (*path, "origin"), f"joint {joint.name} is nowhere",
                 "three finite numbers of m", vector(joint.origin),
             )  # fmt: skip
-        _check_axis(draft, (*path, "axis"), joint)
+        check_axis(draft, (*path, "axis"), f"joint {joint.name}", joint.axis)
         if joint.limits is not None:
             _check_limits(draft, (*path, "limits"), joint.name, *joint.limits)
 
 
-def _check_axis(draft: Draft, path: Path, joint: Joint) -> None:
-    length = math.hypot(*joint.axis)
-    found, expected = vector(joint.axis), "a vector of length 1"
+def check_axis(draft: Draft, path: Path, owner: str, axis: Vector3) -> None:
+    """Report an axis that is no unit vector."""
+    length = math.hypot(*axis)
+    found, expected = vector(axis), "a vector of length 1"
     if not math.isfinite(length) or length < 1e-9:
-        draft.add(
-            path, f"the axis of joint {joint.name} is no direction", expected, found,
-            "axis: [0, 0, 1]",
-        )  # fmt: skip
+        draft.add(path, f"the axis of {owner} is no direction", expected, found, "axis: [0, 0, 1]")
     elif abs(length - 1.0) > UNIT:
-        unit = vector(round(value / length, 9) for value in joint.axis)
+        unit = vector(round(value / length, 9) for value in axis)
         draft.add(
-            path, f"the axis of joint {joint.name} has length {number(length)}", expected, found,
+            path, f"the axis of {owner} has length {number(length)}", expected, found,
             f"axis: {unit}",
         )  # fmt: skip
 

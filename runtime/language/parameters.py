@@ -62,6 +62,13 @@ def is_live(info: FieldInfo) -> bool:
     return isinstance(extra, dict) and bool(extra.get("live", False))
 
 
+def takes_none(info: FieldInfo) -> bool:
+    """Whether ``none`` stands for YAML's null: the parameter may be left out, and no word is called so."""
+    kinds = get_args(info.annotation)
+    words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
+    return type(None) in kinds and str not in kinds and "none" not in words
+
+
 def _convert(value: Any, unit: str) -> Any:
     """``value`` with every text that starts with a number replaced by the number in ``unit``."""
     if isinstance(value, str):
@@ -99,11 +106,13 @@ class Parameters(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_quantities(cls, data: Any) -> Any:
+    def _read_values(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
         converted = dict(data)
         for name, info in cls.model_fields.items():
+            if converted.get(name) == "none" and takes_none(info):
+                converted[name] = None
             unit = unit_of(info)
             if name in converted and unit:
                 try:

@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import ConfigDict
 
 from ..language.block import Block
+from ..language.parameters import takes_none
 from ..language.registry import all_blocks
 from ..transports.registry import endpoint_pattern
 from .reading.graph_file import UNDERSCORED, CommonKeys, GraphSections, GraphValues, SubgraphKeys
@@ -83,6 +84,8 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
         options = [schema, _REFERENCE, _EXPORTED]
         if schema.pop("unit", "") or key in in_unit:
             options += _quantity(schema)
+        if takes_none(block_type.Params.model_fields[key]):
+            options.append({"const": "none"})
         properties[key] = {"anyOf": options, "description": description}
     summary = (block_type.__doc__ or "").strip().partition("\n")[0]
     return {

@@ -98,3 +98,27 @@ ARM = f"""<robot name="arm">
   </joint>
 </robot>
 """
+
+DRONE = """<mujoco model="drone">
+  <compiler angle="degree"/>
+  <default><motor ctrlrange="0 6"/></default>
+  <worldbody>
+    <body name="frame" pos="0 0 0.1" euler="0 0 90">
+      <freejoint/>
+      <geom type="box" size=".1 .1 .02" mass="1"/>
+      <site name="left" pos="0 0.2 0.05"/>
+      <body name="arm" pos="0 -0.2 0">
+        <geom type="box" size=".02 .02 .02" mass="0.1"/>
+        <site name="right" pos="0 0 0.05" euler="0 90 0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="a" site="left" gear="0 0 2 0 0 -0.04"/>
+    <general name="b" site="right" gear="-1 0 0 0.01 0 0" dyntype="filterexact" dynprm="0.03"
+             gainprm="1.5" ctrlrange="-1 4"/>
+    <motor name="c" site="left" gear="0 0 0 1 0 0"/>
+    <motor name="d" site="left" gear="0 0 1 1 0 0"/>
+  </actuator>
+</mujoco>
+"""

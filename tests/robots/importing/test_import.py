@@ -13,7 +13,7 @@ import yaml
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.robots.description import RobotDescription, find_robot, read
 
-from .model_files import ARM, CART_POLE, INERTIAL, ONE_LEG, PLANAR, SPHERICAL_HIP
+from .model_files import ARM, CART_POLE, DRONE, INERTIAL, ONE_LEG, PLANAR, SPHERICAL_HIP
 
 
 def robot_of(folder: Path, content: str, added: dict[str, Any] | None = None) -> RobotDescription:
@@ -217,3 +217,33 @@ def test_rotors_are_estimated_from_torque_and_speed(tmp_path: Path) -> None:
         assert robot.motors.rotor_inertia[0] == 0.01
         assert robot.motors.rotor_inertia[1] == told.get("rotor_inertia", 0.0)
         assert not [note for note in read(tmp_path / "robot.urdf").notes if "estimated" in note]
+
+
+def test_actuators_of_sites_are_thrusters(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(DRONE)
+    found = read(tmp_path / "robot.xml")
+    a, b = found.description.thrusters.values()
+    assert list(found.description.thrusters) == ["a", "b"]
+    assert a.link == b.link == "frame" and a.position == (0.0, 0.2, 0.05)
+    assert (a.max_thrust, a.torque_ratio, a.time_constant) == (12.0, -0.02, 0.0)
+    assert b.position == pytest.approx((0.0, -0.2, 0.05)) and b.axis == pytest.approx((0, 0, 1))
+    assert (b.max_thrust, b.torque_ratio, b.time_constant) == pytest.approx((6.0, -0.01, 0.03))
+    assert [note for note in found.notes if note.startswith("actuator")] == [
+        "actuator b pushes both ways in the file, and only forwards here",
+        "actuator c is left out: it gives no force along a direction of its site; write it under thrusters",
+        "actuator d is left out: its moment is not about its force; write it under thrusters",
+    ]
+
+
+def test_the_yaml_adds_to_the_thrusters_of_the_file(tmp_path: Path) -> None:
+    added = {
+        "thrusters": {"a": {"time_constant": 0.02}, "c": {"link": "arm", "max_thrust": 3.0}},
+        "points": {"tip": ["arm", [0, 0, 0]]},
+    }
+    robot = robot_of(tmp_path, DRONE, added)
+    assert robot.thrusters["a"].time_constant == 0.02 and robot.thrusters["a"].max_thrust == 12.0
+    assert robot.thrusters["c"].link == "frame" and robot.thrusters["c"].position == (
+        0.0,
+        -0.2,
+        0.0,
+    )

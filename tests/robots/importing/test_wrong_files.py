@@ -123,7 +123,7 @@ YAMLS = [
     ("feets: []", [
         "x.yaml:1:8: the robot has no key 'feets'",
         ("    expected   file, weld, name, text, base, base_joint, links, joints, feet, contacts, "
-        "transmission, profiles, profile, sensors, standing, held, points, supply, looks"),
+        "transmission, profiles, profile, sensors, standing, held, points, thrusters, supply, looks"),
         "    found      'feets'",
         "    fix        feet: []",
     ]),

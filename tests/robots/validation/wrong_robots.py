@@ -174,4 +174,52 @@ WRONG_BODIES: list[tuple[list[Change], list[str]]] = [
             "    found      1 rows",
         ],
     ),
+    (
+        [
+            (
+                ("thrusters",),
+                {
+                    "fan": {"link": "bdy", "axis": [0, 0, 2], "max_thrust": -3},
+                    "jet": {
+                        "link": "body",
+                        "position": [0, NAN, 0],
+                        "max_thrust": 3,
+                        "time_constant": -1,
+                    },
+                },
+            )
+        ],
+        [
+            "hopper.yaml:91:11: the link of thruster fan is 'bdy', and there is no such link",
+            "    expected   body, thigh, shank",
+            "    found      'bdy'",
+            "    fix        body",
+            "hopper.yaml:93:5: the axis of thruster fan has length 2",
+            "    expected   a vector of length 1",
+            "    found      [0, 0, 2]",
+            "    fix        axis: [0, 0, 1]",
+            "hopper.yaml:96:17: thruster fan has a max_thrust of -3",
+            "    expected   a positive number of N",
+            "    found      -3",
+            "    fix        max_thrust: 3, and the axis reversed",
+            "hopper.yaml:100:5: thruster jet is nowhere",
+            "    expected   three finite numbers of m",
+            "    found      [0, nan, 0]",
+            "hopper.yaml:104:20: thruster jet has a time_constant of -1",
+            "    expected   a finite number of s from 0",
+            "    found      -1",
+        ],
+    ),
+    (
+        [(("thrusters",), {"fan": {"link": "body", "thrust": 3}})],
+        [
+            "hopper.yaml:91:5: thruster fan lacks 'max_thrust'",
+            "    expected   a value for 'max_thrust'",
+            "    found      nothing",
+            "hopper.yaml:92:13: thruster fan has no key 'thrust'",
+            "    expected   link, position, axis, max_thrust, torque_ratio, time_constant",
+            "    found      'thrust'",
+            "    fix        max_thrust: 3",
+        ],
+    ),
 ]

@@ -65,7 +65,7 @@ WRONG_STANCES: list[tuple[list[Change], list[str]]] = [
         [(("jionts",), 2)],
         [
             "hopper.yaml:89:9: the robot has no key 'jionts'",
-            "    expected   name, text, base, base_joint, links, joints, feet, contacts, transmission, profiles, profile, sensors, standing, held, points, supply, looks",
+            "    expected   name, text, base, base_joint, links, joints, feet, contacts, transmission, profiles, profile, sensors, standing, held, points, thrusters, supply, looks",
             "    found      'jionts'",
             "    fix        joints: 2",
         ],

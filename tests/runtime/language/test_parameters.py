@@ -1,5 +1,7 @@
 """Parameters: bounds, unknown keys and quantities with units."""
 
+from typing import Literal
+
 import pytest
 from pydantic import ValidationError
 
@@ -63,3 +65,17 @@ def test_live_parameters_are_marked() -> None:
 def test_the_schema_carries_text_and_unit() -> None:
     schema = Push.model_json_schema()["properties"]["force"]
     assert schema["description"] == "size" and schema["unit"] == "N" and schema["minimum"] == 0
+
+
+class Ground(Parameters):
+    friction: list[float] | None = parameter([0.5, 1.0], text="drawn from", unit="1")
+    law: Literal["none", "pyramid"] | None = parameter(None, text="a word called so is the word")
+    name: str | None = parameter(None, text="so is a text")
+    depth: float = parameter(1.0, text="always a number")
+
+
+def test_none_stands_for_null() -> None:
+    ground = Ground.model_validate({"friction": "none", "law": "none", "name": "none"})
+    assert (ground.friction, ground.law, ground.name) == (None, "none", "none")
+    with pytest.raises(ValidationError, match="depth"):
+        Ground.model_validate({"depth": "none"})
