@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from ...mathematics.arrays import Array1D, Rows3, Vector3
+from ...mathematics.arrays import Array1D, Flags1D, Vector3
 from ...mathematics.elementary import atan2, sincos
 from ...mathematics.interpolation import lengthen, minimum_jerk
 from ...mathematics.kernel import kernel
@@ -19,7 +19,10 @@ from ...mathematics.rotations import (
     multiply,
     pattern_turn,
     turn_about_vertical,
+    wrap,
+    yaw,
 )
+from ...mathematics.stance_feet import find_stance_feet, mean_place
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ThreeNumbers, live_parameter
@@ -55,6 +58,7 @@ class BalanceConstants(Signal):
     heading_source = Field(dtype="int64", values=HeadingSource, text="what tells the heading")
     counted = Field("n_feet", dtype="bool", text="whether each foot counts in the heading")
     nominal_mass = Field(unit="kg", text="mass by the description")
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
 
 
 class BalanceScratch(Signal):
@@ -63,6 +67,9 @@ class BalanceScratch(Signal):
     turn = Field(4, text="quaternion of a heading")
     quaternion = Field(4, text="a quaternion")
     vector = Field(3, text="a vector")
+    stands = Field("n_feet", dtype="bool", text="the feet that the plan is taken relative to")
+    counted = Field("n_feet", dtype="bool", text="those of them that have a heading")
+    pattern = Field(("n_feet", 3), unit="m", frame="world", text="their planned places")
     middle = Field(3, unit="m", frame="world", text="mean of the feet's places")
     planned_middle = Field(3, unit="m", frame="world", text="mean of their planned places")
 
@@ -113,7 +120,8 @@ class BalanceTarget(Block):
     It serves any number of feet. Their middle is the mean of the sole centres, and their heading
     is the mean of the headings of the line and flat feet. Point feet have no heading of their own:
     that of several point feet is the rotation, by least squares, of the pattern in which they stand
-    from the planned pattern; that of a single one is the heading of the base.
+    from the planned pattern; that of a single one is the heading of the base. Before lift-off the feet are
+    those that carry load in the plan.
 
     Before the last touchdown the target's positions and heading are the plan's, shifted and rotated
     with the measured feet. The plan is relative to the feet, so a drift of the estimated position
@@ -171,6 +179,7 @@ class BalanceTarget(Block):
         self.constants.heading_source = HeadingSource.FEET if heads.any() else source
         self.constants.counted[:] = heads if heads.any() else True
         self.constants.nominal_mass = robot.total_mass
+        self.constants.foot_of_point[:] = robot.foot_of_contact()
 
     @kernel
     @staticmethod
@@ -185,10 +194,11 @@ class BalanceTarget(Block):
         params: BalanceParameters,
         period: float,
     ) -> None:
-        middle_point(terms.foot_position, scratch.middle)
-        middle_point(reference.foot_position, scratch.planned_middle)
-        planned = planned_heading(reference, constants)
-        heading = measured_heading(reference, terms, planned, constants, scratch)
+        count = choose_feet(reference, phase, constants, scratch)
+        mean_place(terms.foot_position, scratch.stands, count, scratch.middle)
+        mean_place(reference.foot_position, scratch.stands, count, scratch.planned_middle)
+        planned = planned_heading(reference, scratch.counted)
+        heading = measured_heading(reference, terms, planned, count, constants, scratch)
         if not memory.started or reference.time < 0.0:  # the plan has not begun
             memory.standing_height = reference.com[2]
             memory.heading = heading - planned
@@ -211,13 +221,37 @@ class BalanceTarget(Block):
 
 
 @kernel
-def planned_heading(reference: JumpReference, constants: BalanceConstants) -> float:
+def choose_feet(
+    reference: JumpReference,
+    phase: PhaseState,
+    constants: BalanceConstants,
+    scratch: BalanceScratch,
+) -> int:
+    """Find the feet that the plan is taken relative to, and those whose heading counts; returns how many the former are.
+
+    Before lift-off they are those that carry load in the plan, later all of them.
+    """
+    count: int = scratch.stands.shape[0]
+    scratch.stands[:] = True
+    if phase.phase < Phase.FLIGHT:
+        count = find_stance_feet(reference.contact, constants.foot_of_point, scratch.stands)
+    headed = 0
+    for foot in range(scratch.stands.shape[0]):
+        scratch.counted[foot] = constants.counted[foot] and scratch.stands[foot]
+        headed += 1 if scratch.counted[foot] else 0
+    if headed == 0:
+        scratch.counted[:] = constants.counted
+    return count
+
+
+@kernel
+def planned_heading(reference: JumpReference, counted: Flags1D) -> float:
     """The mean of the planned headings [rad] of the feet that count."""
     count, planned = 0, 0.0
-    for foot in range(constants.counted.shape[0]):
-        count += 1 if constants.counted[foot] else 0
-    for foot in range(constants.counted.shape[0]):
-        if constants.counted[foot]:
+    for foot in range(counted.shape[0]):
+        count += 1 if counted[foot] else 0
+    for foot in range(counted.shape[0]):
+        if counted[foot]:
             planned += reference.foot_yaw[foot] / count
     return planned
 
@@ -227,16 +261,25 @@ def measured_heading(
     reference: JumpReference,
     terms: DynamicsTerms,
     planned: float,
+    count: int,
     constants: BalanceConstants,
     scratch: BalanceScratch,
 ) -> float:
-    """The feet's heading [rad], by their own directions or by the pattern they stand in."""
+    """The feet's heading [rad], by their own directions or by the pattern they stand in. The pattern of a single one
+    has none: then it is by how much the base is turned from the plan."""
     if constants.heading_source == HeadingSource.FEET:
-        return mean_heading(terms.foot_rotation, constants.counted)
+        return mean_heading(terms.foot_rotation, scratch.counted)
     if constants.heading_source == HeadingSource.BASE:
         return atan2(terms.base_rotation[1, 0], terms.base_rotation[0, 0])
+    if count == 1:
+        base = atan2(terms.base_rotation[1, 0], terms.base_rotation[0, 0])
+        return planned + wrap(base - yaw(reference.orientation))
+    for foot in range(scratch.stands.shape[0]):  # a foot in the middle has no say
+        scratch.pattern[foot, :] = scratch.planned_middle
+        if scratch.stands[foot]:
+            scratch.pattern[foot, :] = reference.foot_position[foot]
     return planned + pattern_turn(
-        reference.foot_position, scratch.planned_middle, terms.foot_position, scratch.middle
+        scratch.pattern, scratch.planned_middle, terms.foot_position, scratch.middle
     )
 
 
@@ -368,14 +411,6 @@ def balance(
     integrate_trim(scratch.vector, gain, params.trim_limit, trim)
     exponential(trim, quaternion)
     multiply(scratch.turn, quaternion, target.orientation)
-
-
-@kernel
-def middle_point(points: Rows3, out: Vector3) -> None:
-    """The mean of points (n, 3)."""
-    out[:] = 0.0
-    for i in range(points.shape[0]):
-        out[:] += points[i] / points.shape[0]
 
 
 @kernel

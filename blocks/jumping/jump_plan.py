@@ -298,6 +298,7 @@ class JumpPlan(Block):
         constants.follows_motion = measured and p.by == "progress"
         constants.follows_turn = rotation is not None
         constants.period = self.period
+        constants.foot_of_point[:] = self.robot.foot_of_contact()
         if turning is not None:
             constants.gain, constants.aim = turning.gain, turning.aim
             constants.early, constants.late = turning.early, turning.late

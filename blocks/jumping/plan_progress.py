@@ -98,6 +98,7 @@ class ProgressConstants(Signal):
     late = Field(unit="s", text="``Turning.late``")
     aim = Field(unit="rad", text="``Turning.aim``")
     period = Field(unit="s", text="of the block")
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
 
 
 @kernel
@@ -176,9 +177,9 @@ def follow_thrust(
         progress.before = progress.late
         return
     error = speed_error(
-        terms.com[2] - mean_height(terms.foot_position),
+        terms.com[2] - mean_height(terms.foot_position, reference, constants),
         terms.com_velocity[2],
-        reference.com[2] - mean_height(reference.foot_position),
+        reference.com[2] - mean_height(reference.foot_position, reference, constants),
         reference.com_velocity[2],
     )
     push, before = reference.com_acceleration[2], progress.before
@@ -219,12 +220,27 @@ def time_to_fall(height: float, speed: float) -> float:
 
 
 @kernel
-def mean_height(position: Array2D) -> float:
-    """The mean height [m] of positions (n, 3)."""
-    total = 0.0
-    for i in range(position.shape[0]):
-        total += position[i, 2]
+def mean_height(position: Array2D, reference: JumpReference, constants: ProgressConstants) -> float:
+    """The mean height [m] of positions of feet (n, 3), of those that carry load in the plan; of all where none does."""
+    total, count = 0.0, 0
+    for foot in range(position.shape[0]):
+        if carries(reference, constants, foot):
+            total += position[foot, 2]
+            count += 1
+    if count:
+        return total / count
+    for foot in range(position.shape[0]):
+        total += position[foot, 2]
     return total / len(position)
+
+
+@kernel
+def carries(reference: JumpReference, constants: ProgressConstants, foot: int) -> bool:
+    """Whether a foot carries load in the plan."""
+    for point in range(reference.contact.shape[0]):
+        if reference.contact[point] and constants.foot_of_point[point] == foot:
+            return True
+    return False
 
 
 @kernel

@@ -248,6 +248,7 @@ class SteeredPlan(Block):
         self.constants.lead = -1.0 if self.params.lead is None else self.params.lead
         self.constants.follows_motion = self.params.by == "progress"
         self.constants.period = self.period
+        self.constants.foot_of_point[:] = self.robot.foot_of_contact()
 
     def start(self) -> None:
         """The robot stands until the first plan begins."""

@@ -111,15 +111,13 @@ def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
     Raises:
         JumpTaskError: a phase on the ground names no contact point.
     """
-    names = [contact.name for contact in robot.contacts]
     spans, found, knot, place = task.spans(), list[ProblemPhase](), 0, 0
     for number, span in enumerate(spans):
-        phase, on_ground = PHASES[span.phase], span.on_ground(names)
+        phase, on_ground = PHASES[span.phase], span.on_ground(robot)
         flies = phase is Phase.FLIGHT
         if not flies and not on_ground:
             raise JumpTaskError(
-                f"phases.{number}.contacts: no contact point of {robot.name} is named like "
-                f"{span.contacts!r}; there is {', '.join(names)}, or all"
+                f"phase {number + 1}, {span.phase}: no contact point of {robot.name} is on the ground"
             )
         if task.impact and found and found[-1].flies:
             found.append(

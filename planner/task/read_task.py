@@ -23,6 +23,7 @@ from ...robots.kinematics import (
     standing_contacts,
     standing_heights,
 )
+from .contact_groups import contact_points, wrong_groups
 from .files import JumpTaskError, read_placed
 from .margins import unknown_joints
 from .sequence import Hop, StanceLocation, edge_of
@@ -134,6 +135,7 @@ def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradictio
     """Everything about the task that cannot be, in the order of its parameters."""
     return [
         *_unknown_names(task, robot),
+        *_contact_phases(task, robot),
         *_flight(task, robot),
         *_edge(task, robot),
         *_slopes(task),
@@ -175,6 +177,32 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
             yield (
                 f"margins.landing_limits.{name}",
                 f"{robot.name} has no joint {name}; the nearest is {near}",
+            )
+
+
+def _contact_phases(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
+    """Contact points that feet leave and land on in turn, or that phases name, are the robot's; some always push."""
+    groups = [
+        (f"{key}.{name}", name)
+        for key in ("take_off", "touchdown")
+        for name in getattr(task, key) or ()
+    ]
+    for number, span in enumerate(task.phases or ()):
+        groups.append((f"phases.{number}.contacts", span.contacts))
+        groups.append((f"phases.{number}.raised", span.raised or ()))
+    wrong = list(wrong_groups(robot, groups)) if robot.contacts else []
+    yield from wrong
+    for key in ("take_off", "touchdown"):
+        named = contact_points(robot, getattr(task, key) or ())
+        if named and task.formulation != "full":
+            yield (
+                key,
+                f"formulation {task.formulation} lifts all feet at once; use formulation: full",
+            )
+        if named and not wrong and len(named) == len(robot.contacts):
+            yield (
+                key,
+                f"names all contact points of {robot.name}; leave out those that leave last, or land first",
             )
 
 

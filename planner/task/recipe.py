@@ -23,7 +23,7 @@ chosen: other parameters have their defaults, with full use of the motors and fe
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -102,6 +102,8 @@ class RecipeInputs(Protocol):
     squat_time: float | None
     thrust_time: float | None
     contact_time: float | None
+    take_off: Mapping[str, float] | None
+    touchdown: Mapping[str, float] | None
     margins: Margins | None
     weights: Any
     knots: Any
@@ -187,6 +189,8 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     contact = _contact_time(task, slow)
     if rows and "contact_time" not in said:
         yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
+    if task.take_off or task.touchdown:
+        return
     toes = toe_name_token(robot)
     if toes and task.thrust_time is not None and not (rows and contact is None):
         whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)

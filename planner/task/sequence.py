@@ -34,7 +34,9 @@ from pydantic import model_validator
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
+from .contact_groups import ALL, contact_points
 
 FREE = "free"
 Slope = tuple[float, float]
@@ -117,17 +119,21 @@ class PhaseSpec(FreeTimes):
     knots: int | None = parameter(
         None, ge=2, le=400, text="number of intervals; None: that of the task's knots"
     )
-    contacts: str = parameter(
+    contacts: str | tuple[str, ...] = parameter(
         "all",
-        text="contact points on the ground: all, or those whose names contain this, such as toe",
+        text="contact points on the ground: all, those whose names contain this, such as toe, those on a side of the "
+        "robot (fore, hind, left, right), or a list of these",
+    )
+    raised: tuple[str, ...] | None = parameter(
+        None, text="those of them that are off the ground all the same, likewise"
     )
 
-    def on_ground(self, names: Sequence[str]) -> tuple[int, ...]:
+    def on_ground(self, robot: RobotDescription) -> tuple[int, ...]:
         """The indices of the contact points that carry load."""
         if self.phase == "flight":
             return ()
-        return tuple(k for k, name in enumerate(names) if self.contacts in ("all", name)
-                     or self.contacts in name)  # fmt: skip
+        off = contact_points(robot, self.raised or ())
+        return tuple(k for k in contact_points(robot, self.contacts) if k not in off)
 
 
 def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
@@ -140,7 +146,7 @@ def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
     found = sum(span.phase == "flight" for span in spans)
     if found != flights:
         return f"there are {found} flights among the phases but {flights} jumps"
-    if spans[0].contacts != "all" or spans[-1].contacts != "all":
+    if any(span.contacts != ALL or span.raised for span in (spans[0], spans[-1])):
         return "the robot stands on all contact points in the first and in the last phase"
     return ""
 

@@ -20,6 +20,7 @@ from ...files.problems import nearest
 from ...files.validation import describe, names_at
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
+from .contact_groups import in_turn, wrong_times
 from .files import JumpTaskError, PlacedFile
 from .margins import Margins
 from .recipe import choices, chosen_fields
@@ -169,6 +170,15 @@ class JumpTask(FreeTimes):
     phases: tuple[PhaseSpec, ...] | None = parameter(
         None, text="the sequence of contacts; None: squat, thrust, flight, landing, on all contacts"
     )
+    take_off: Mapping[str, float] | None = parameter(
+        None, unit="s",
+        text="how long before the flight contact points leave the ground, by a name as in contacts of phases: "
+        "{fore: 80 ms}; None: all at once",
+    )  # fmt: skip
+    touchdown: Mapping[str, float] | None = parameter(
+        None, unit="s",
+        text="how long after the flight contact points come down, likewise: {hind: 60 ms}; None: all at once",
+    )  # fmt: skip
     touchdown_lean: float | None = parameter(
         None, unit="rad", ge=0.0, le=1.5,
         text="largest lean of the torso forwards or backwards at touchdown; None: any",
@@ -249,6 +259,16 @@ class JumpTask(FreeTimes):
                     f"{which}a rise of {hop.rise:g} m cannot reach ground that is {up:g} m higher; "
                     f"ask for a rise above {up:g} m"
                 )
+        for name, phase in (("take_off", "thrust"), ("touchdown", "landing")):
+            lifted, whole = getattr(self, name), f"{phase}_time"
+            if lifted is None:
+                continue
+            if self.phases is not None:
+                raise ValueError(f"give {name}, or phases, which say the same and more, not both")
+            given = getattr(self, whole) if whole in self.model_fields_set else None
+            wrong = wrong_times(lifted, given, phase)
+            if wrong:
+                raise ValueError(f"{name}: {wrong}")
         wrong = check_spans(self.spans(), len(self.hops()))
         if wrong:
             raise ValueError(wrong)
@@ -307,6 +327,7 @@ class JumpTask(FreeTimes):
             for _ in hops[:-1]:
                 found += [PhaseSpec(phase="flight"), *between]
             found += [PhaseSpec(phase="flight"), PhaseSpec(phase="landing", time=self.landing_time)]
+            found = self._in_turn(found)
         else:
             found = list(self.phases)
         flights = iter(hop.flight_time for hop in hops)
@@ -317,6 +338,19 @@ class JumpTask(FreeTimes):
             count = span.knots or int(getattr(knots, span.phase))
             filled.append(span.model_copy(update={"time": time, "knots": count}))
         return tuple(filled)
+
+    def _in_turn(self, spans: list[PhaseSpec]) -> list[PhaseSpec]:
+        """The phases with those before and behind a flight in parts, where feet leave or land in turn."""
+        found = list[PhaseSpec]()
+        for span in spans:
+            lifted = {"thrust": self.take_off, "landing": self.touchdown}.get(span.phase)
+            if not lifted:
+                found.append(span)
+                continue
+            whole = {"phase": span.phase, "time": span.time}
+            knots, landing = int(getattr(self.knots, span.phase)), span.phase == "landing"
+            found += [PhaseSpec(**part) for part in in_turn(whole, lifted, knots, landing=landing)]
+        return found
 
     def start_joints(self, robot: RobotDescription) -> dict[str, float]:
         """Joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""

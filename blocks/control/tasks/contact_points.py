@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array1D, Indices1D
+from ....mathematics.arrays import Indices1D
 from ....mathematics.kernel import kernel
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
@@ -49,19 +49,24 @@ class ContactGains(Parameters):
     rolling_damping: float = parameter(
         60.0, unit="1/s", ge=0.0, text="velocity gain of that ankle towards the plan"
     )
+    raised_weight: float = parameter(
+        10.0,
+        ge=0.0,
+        text="weight of the joints of a leg whose foot has left the ground, per rad/s^2",
+    )
 
 
-class Ankles(NamedTuple):
-    """The joints with which feet roll over their toes.
+class LiftingLegs(NamedTuple):
+    """The joints that move feet, or parts of them, that leave the ground before lift-off.
 
-    ``foot`` (n_contacts,) is the foot of each point. ``place`` (n_feet,) is the index of each foot's
-    joint in the generalised velocity, -1 for none, and ``acceleration`` (n_feet,) its desired
-    acceleration [rad/s^2].
+    ``foot`` (n_contacts,) is the foot of each point. ``ankle`` (n_feet,) is the index in the generalised
+    velocity of the joint with which each foot rolls over its toes, -1 for none. ``joint`` (3 n_contacts,) is
+    that of a joint of the leg for each row of the task, -1 for none.
     """
 
     foot: Indices1D
-    place: Indices1D
-    acceleration: Array1D
+    ankle: Indices1D
+    joint: Indices1D
 
 
 class ContactPoints(Task):
@@ -69,10 +74,11 @@ class ContactPoints(Task):
 
     Points that are not in stance while others are go to the ground, at the mean height of the
     points in stance: a task of zero acceleration would never close a gap, and the program would
-    rely on the force of a heel that hovers. In THRUST such points are lifting off. Those of a foot
-    with an ankle are free to rise, as the heels do while the toes still push, and are damped across
-    their foot, while the ankle follows the plan with feedforward and feedback. The points of a foot
-    without an ankle (see ``rolling_joint``) only have their velocity damped.
+    rely on the force of a heel that hovers. In THRUST such points are lifting off. While others of their foot
+    still push, as toes do while the heels rise, they are free to rise and are damped across their foot, and the
+    ankle (see ``rolling_joint``) follows the plan with feedforward and feedback; the points of a foot
+    without one have their velocity damped. Where no point of a foot is in stance
+    any more, the joints of its leg do, as many of the last ones as the foot's points have rows.
 
     Points of a foot that takes a step have the acceleration that ``PhaseState`` gives them.
     """
@@ -84,13 +90,17 @@ class ContactPoints(Task):
         return 3 * len(robot.contacts)
 
     def setup(self) -> None:
-        robot = self.robot
-        joints = [rolling_joint(robot, foot) for foot in range(len(robot.feet))]
-        places = [-1 if joint is None else robot.base_velocities + joint for joint in joints]
-        self.ankles = Ankles(
-            np.array(robot.foot_of_contact(), np.int64), np.array(places, np.int64),
-            np.zeros(len(joints)),
-        )  # fmt: skip
+        robot, owners = self.robot, np.array(self.robot.foot_of_contact(), np.int64)
+        ankles, joints = np.full(len(robot.feet), -1), np.full(3 * len(owners), -1)
+        for foot in range(len(robot.feet)):
+            ankle = rolling_joint(robot, foot)
+            if ankle is not None:
+                ankles[foot] = robot.base_velocities + ankle
+            rows = np.flatnonzero(np.repeat(owners == foot, 3))
+            chain = chain_to(robot, robot.feet[foot].link)
+            moving = [k for k in chain if robot.joints[k].name not in robot.held][-len(rows) :]
+            joints[rows[: len(moving)]] = robot.base_velocities + np.array(moving, np.int64)
+        self.legs = LiftingLegs(owners, ankles.astype(np.int64), joints.astype(np.int64))
 
     @kernel
     @staticmethod
@@ -99,15 +109,14 @@ class ContactPoints(Task):
         target: WholeBodyTarget,
         phase: PhaseState,
         joints: JointState,
-        ankles: Ankles,
+        legs: LiftingLegs,
         params: ContactGains,
         rows: TaskRows,
     ) -> None:
         contact_rows(terms, phase, params, rows)
         step_rows(terms, phase, params, rows)
         if phase.phase == Phase.THRUST:
-            ankle_accelerations(terms, target, joints, params, ankles)
-            lifting_rows(terms, phase, ankles, params, rows)
+            lifting_rows(terms, target, joints, phase, legs, params, rows)
 
 
 def rolling_joint(robot: RobotDescription, foot: int) -> int | None:
@@ -175,43 +184,68 @@ def step_rows(
 
 
 @kernel
-def ankle_accelerations(
+def planned_acceleration(
+    velocity: int,
     terms: DynamicsTerms,
     target: WholeBodyTarget,
     joints: JointState,
     params: ContactGains,
-    ankles: Ankles,
-) -> None:
-    """Compute the acceleration that keeps every ankle on the plan: feedforward and feedback."""
-    first = terms.velocity.shape[0] - joints.position.shape[0]
-    for foot in range(ankles.place.shape[0]):
-        place = ankles.place[foot]
-        if place >= 0:
-            joint = place - first
-            ankles.acceleration[foot] = (
-                target.joint_acceleration[joint]
-                + params.rolling_stiffness * (target.joint_position[joint] - joints.position[joint])
-                + params.rolling_damping * (target.joint_velocity[joint] - terms.velocity[place])
-            )
+) -> float:
+    """The acceleration that keeps a joint, by its index in the generalised ``velocity``, on the plan: feedforward and
+    feedback."""
+    joint = velocity - (terms.velocity.shape[0] - joints.position.shape[0])
+    found: float = (
+        target.joint_acceleration[joint]
+        + params.rolling_stiffness * (target.joint_position[joint] - joints.position[joint])
+        + params.rolling_damping * (target.joint_velocity[joint] - terms.velocity[velocity])
+    )
+    return found
+
+
+@kernel
+def stands(phase: PhaseState, foot_of_point: Indices1D, foot: int) -> bool:
+    """Whether a point of a foot is in stance."""
+    count = 0
+    for i in range(foot_of_point.shape[0]):
+        count += 1 if foot_of_point[i] == foot and phase.stance[i] else 0
+    return count > 0
 
 
 @kernel
 def lifting_rows(
-    terms: DynamicsTerms, phase: PhaseState, ankles: Ankles, params: ContactGains, rows: TaskRows
+    terms: DynamicsTerms,
+    target: WholeBodyTarget,
+    joints: JointState,
+    phase: PhaseState,
+    legs: LiftingLegs,
+    params: ContactGains,
+    rows: TaskRows,
 ) -> None:
     """Replace the rows of ``contact_rows`` for points that leave the ground before lift-off.
 
-    These points are free to rise. Their velocity across the foot is damped, so that the foot rolls
-    over its other points and does not rotate about the vertical. A row for the ankle controls how
-    fast it rolls, because the motion of the centre of mass and the torso does not determine that.
-    Points of a foot without an ankle have all of their velocity damped.
+    While another point of their foot is in stance these points are free to rise. Their velocity across the foot is
+    damped, so that the foot rolls over its other points and does not rotate about the vertical. A row for the ankle
+    controls how fast it rolls, because the motion of the centre of mass and the torso does not determine that. Where
+    no point of the foot is in stance, all joints of the leg follow the plan.
     """
     damping = params.swing_damping
     for i in range(phase.stance.shape[0]):
         if phase.stance[i]:
             continue
-        foot = ankles.foot[i]
-        row, desired, ankle = 3 * i, 0.0, ankles.place[foot]
+        foot = legs.foot[i]
+        row, desired, ankle = 3 * i, 0.0, legs.ankle[foot]
+        if not stands(phase, legs.foot, foot):
+            for k in range(3):
+                joint = legs.joint[row + k]
+                rows.jacobian[row + k, :] = 0.0
+                rows.weights[row + k] = 0.0
+                if joint >= 0:
+                    rows.jacobian[row + k, joint] = 1.0
+                    rows.weights[row + k] = params.raised_weight
+                    rows.desired[row + k] = planned_acceleration(
+                        joint, terms, target, joints, params
+                    )
+            continue
         if ankle < 0:
             rows.desired[row + 2] = (
                 -damping * terms.contact_velocity[i, 2] - terms.contact_drift[i, 2]
@@ -226,7 +260,7 @@ def lifting_rows(
         rows.desired[row] = desired
         rows.jacobian[row + 1, :] = 0.0
         rows.jacobian[row + 1, ankle] = 1.0
-        rows.desired[row + 1] = ankles.acceleration[foot]
+        rows.desired[row + 1] = planned_acceleration(ankle, terms, target, joints, params)
         rows.weights[row] = params.swing_weight
         rows.weights[row + 1] = params.rolling_weight
         rows.weights[row + 2] = 0.0

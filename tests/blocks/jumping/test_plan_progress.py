@@ -32,7 +32,8 @@ SIZES = find_robot("bruce").dimensions
 
 
 def constants(**values):
-    written = ProgressConstants.allocate()
+    written = ProgressConstants.allocate(SIZES)
+    written.foot_of_point[:] = find_robot("bruce").foot_of_contact()
     for name, value in {"period": PERIOD, **values}.items():
         setattr(written, name, value)
     return written

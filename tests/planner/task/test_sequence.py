@@ -72,7 +72,7 @@ def test_times_may_be_free(name: str) -> None:
 
 
 def test_a_sequence_of_contacts() -> None:
-    names = [contact.name for contact in find_robot("bruce").contacts]
+    robot = find_robot("bruce")
     spans = task(
         rise=0.1, flight_time=0.3, phases=[
             {"phase": "thrust"},
@@ -83,8 +83,8 @@ def test_a_sequence_of_contacts() -> None:
     ).spans()  # fmt: skip
     assert [span.time for span in spans] == [None, 0.05, 0.3, 0.4]
     assert [span.knots for span in spans] == [16, 5, 28, 14]
-    assert spans[1].on_ground(names) == (0, 2)
-    assert spans[2].on_ground(names) == ()
+    assert spans[1].on_ground(robot) == (0, 2)
+    assert spans[2].on_ground(robot) == ()
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from aloft.blocks.control.tasks.contact_points import (
-    Ankles,
     ContactGains,
-    ankle_accelerations,
+    LiftingLegs,
     contact_rows,
     lifting_rows,
+    planned_acceleration,
     rolling_joint,
     step_rows,
 )
@@ -71,16 +71,28 @@ def test_points_without_load_fall_to_the_mean_height_of_the_others():
     assert out.desired[[6, 7]] == pytest.approx(-40.0 * velocity[2, :2])
 
 
+def planned(at):
+    """Target and joints at random, and the accelerations that keep the joints on the plan."""
+    angle, rate, feedforward, position = RANDOM.normal(size=(4, 10))
+    at.velocity = RANDOM.normal(size=N)
+    target = SimpleNamespace(
+        joint_position=angle, joint_velocity=rate, joint_acceleration=feedforward
+    )
+    expected = feedforward + 1000.0 * (angle - position) + 60.0 * (rate - at.velocity[6:])
+    return target, SimpleNamespace(position=position), expected
+
+
 def test_points_that_lift_are_free_but_across_their_foot():
     out, at = rows(1.0), points(drift=RANDOM.normal(size=(4, 3)))
     at.foot_rotation = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], np.eye(3)])
-    ankles = Ankles(np.array([0, 0, 1, 1]), np.array([10, 15]), np.array([-3.0, 7.0]))
-    lifting_rows(at, stands(True, False, True, False), ankles, gains(), out)
+    legs = LiftingLegs(np.array([0, 0, 1, 1]), np.array([10, 15]), np.full(12, -1))
+    target, joints, bends = planned(at)
+    lifting_rows(at, target, joints, stands(True, False, True, False), legs, gains(), out)
     velocity, drift = at.contact_velocity, at.contact_drift
     assert out.weights.tolist() == [1.0] * 3 + [10.0, 0.5, 0.0] + [1.0] * 3 + [10.0, 0.5, 0.0]
     assert out.jacobian[4].tolist() == np.eye(N)[10].tolist()
     assert out.jacobian[10].tolist() == np.eye(N)[15].tolist()
-    assert out.desired[[4, 10]].tolist() == [-3.0, 7.0]
+    assert out.desired[[4, 10]] == pytest.approx(bends[[4, 9]])
     assert out.jacobian[3] == pytest.approx(-JACOBIAN[1, 0])  # the left foot's y is the world's -x
     assert out.desired[3] == pytest.approx(40.0 * velocity[1, 0] + drift[1, 0])
     assert out.jacobian[9] == pytest.approx(JACOBIAN[3, 1])
@@ -89,32 +101,37 @@ def test_points_that_lift_are_free_but_across_their_foot():
     assert (out.desired[[0, 1, 2, 6, 7, 8]] == 1.0).all()
 
 
-def test_points_of_a_foot_without_an_ankle_are_damped_as_they_lift():
+def test_points_of_a_foot_without_an_ankle_are_damped_while_others_of_it_stand():
     out, at = rows(), points(drift=RANDOM.normal(size=(4, 3)))
     at.foot_rotation = np.tile(np.eye(3), (4, 1, 1))
     stance = stands(True, True, True, False)
     contact_rows(at, stance, gains(), out)
-    ankles = Ankles(np.arange(4), np.full(4, -1), np.zeros(4))
-    lifting_rows(at, stance, ankles, gains(), out)
+    legs = LiftingLegs(np.array([0, 0, 1, 1]), np.full(2, -1), np.full(12, -1))
+    lifting_rows(at, *planned(at)[:2], stance, legs, gains(), out)
     assert (out.jacobian[9:] == JACOBIAN[3]).all()
     assert out.desired[9:] == pytest.approx(-40.0 * at.contact_velocity[3] - at.contact_drift[3])
     assert (out.weights[9:] == 10.0).all()
 
 
-def test_an_ankle_follows_the_plan_and_a_foot_without_one_is_left_out():
-    angle, rate, feedforward = RANDOM.normal(size=(3, 10))
-    target = SimpleNamespace(
-        joint_position=angle, joint_velocity=rate, joint_acceleration=feedforward
-    )
-    position, velocity = RANDOM.normal(size=10), RANDOM.normal(size=16)
-    ankles = Ankles(np.array([0, 1]), np.array([10, -1]), np.array([0.0, 5.0]))
-    ankle_accelerations(
-        SimpleNamespace(velocity=velocity), target, SimpleNamespace(position=position), gains(),
-        ankles,
-    )  # fmt: skip
-    expected = feedforward[4] + 1000.0 * (angle[4] - position[4])
-    expected += 60.0 * (rate[4] - velocity[10])
-    assert ankles.acceleration == pytest.approx([expected, 5.0])
+def test_the_leg_of_a_foot_that_has_left_the_ground_follows_the_plan():
+    """In as many joints as its points have rows; the rest of them ask for nothing."""
+    out, at = rows(), points()
+    stance = stands(True, True, False, False)
+    contact_rows(at, stance, gains(), out)
+    moved = np.array([-1] * 6 + [11, 12, 13, 14, -1, -1])
+    legs = LiftingLegs(np.array([0, 0, 1, 1]), np.array([10, 15]), moved)
+    target, joints, bends = planned(at)
+    lifting_rows(at, target, joints, stance, legs, gains(raised_weight=3.0), out)
+    assert (out.jacobian[6:10] == np.eye(N)[11:15]).all()
+    assert out.desired[6:10] == pytest.approx(bends[5:9])
+    assert out.weights.tolist() == [1e3] * 6 + [3.0] * 4 + [0.0] * 2
+
+
+def test_a_joint_follows_the_plan_by_feedforward_and_feedback():
+    at = points()
+    target, joints, bends = planned(at)
+    found = planned_acceleration(10, at, target, joints, gains())
+    assert found == pytest.approx(bends[4])
 
 
 def test_points_of_a_step_get_their_acceleration():
