@@ -193,9 +193,8 @@ def signal_coordinates(
 
 def _of_field(bound: BoundGraph, recorded: RecordedField, selection: Selection) -> Coordinates:
     robot = bound.graph.robot
-    rows: tuple[str, ...] = ()
-    if robot is not None and recorded.dimensions and recorded.dimensions[0] == "n_joints":
-        rows = tuple(joint.name for joint in robot.joints)
+    named = robot.element_names if robot is not None else {}
+    rows = named.get(str(recorded.dimensions[0]), ()) if recorded.dimensions else ()
     chosen = select(Selection("", selection.indices), recorded.shape, rows).reshape(-1)
     names, units, order = _names(recorded, robot), _units(recorded, robot), _order(recorded)
     if len(chosen) < recorded.size:

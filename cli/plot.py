@@ -68,11 +68,11 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     kept &= run.time <= end if end is not None else True
     if not kept.any():
         raise AloftError(f"nothing was recorded between {start} s and {end} s")
-    joints = tuple(joint.name for joint in run.header.robot.joints) if run.header.robot else ()
+    named = run.header.robot.element_names if run.header.robot else {}
     panels = []
     for each in found:
         field = known[each]
-        names = joints if field.dimensions and field.dimensions[0] == "n_joints" else ()
+        names = named.get(str(field.dimensions[0]), ()) if field.dimensions else ()
         try:
             places = select(Selection("", selection.indices), field.shape, names).reshape(-1)
         except ValueError as error:

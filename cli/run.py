@@ -80,6 +80,14 @@ class ObservationOptions:
             "by its graph's name anyway. 'none': not at all."
         ),
     ] = ""
+    paused: Annotated[
+        bool,
+        typer.Option(
+            "--paused",
+            help="Begin paused and wait at the end, for the page of `aloft graph --live`, where the "
+            "run goes on and back.",
+        ),
+    ] = False
 
 
 @dataclass(frozen=True)
@@ -188,7 +196,12 @@ def run(
 
                     loaded = MachineRun(loaded.checked, parts.machine, parts.keys)
                     name = f"{name}-{parts.machine}"
-                endpoint = open_endpoint(loaded, observation.params, name)
+                endpoint = open_endpoint(
+                    loaded, observation.params, name, paused=observation.paused
+                )
+                if observation.paused:
+                    page = f"`aloft graph --live --run {observation.params or name}`"
+                    typer.echo(f"the run begins paused; {page} shows where it goes on", err=True)
                 messages: list[str] = []
                 viewer = open_viewer(observation.rerun, messages)
                 default = Path("recordings") / f"{name}.rrd"
@@ -227,6 +240,12 @@ def check_combination(
         raise AloftError("--record is for one run; with --seeds nothing is recorded")
     if seeds and observation.rerun is not Live.NONE:
         raise AloftError("--rerun is for one run; with --seeds nothing is shown")
+    if observation.paused and (seeds or parts.machine or parts.local):
+        raise AloftError(
+            "--paused is for one run in one process, without --seeds, --machine and --local"
+        )
+    if observation.paused and observation.params == "none":
+        raise AloftError("--paused needs the page; --params none lets nobody reach the run")
     if (parts.machine or parts.local) and (seeds or (parts.machine and parts.local)):
         raise AloftError("choose one of --machine, --local and --seeds")
     if parts.keys is not None and not (parts.machine or parts.local):
@@ -283,16 +302,18 @@ def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
         viewer.stop()
 
 
-def open_endpoint(graph: RunnableGraph, name: str, default: str) -> ParameterEndpoint | None:
+def open_endpoint(
+    graph: RunnableGraph, name: str, default: str, *, paused: bool = False
+) -> ParameterEndpoint | None:
     """Open the endpoint at which ``aloft params`` reaches the run. Unless it was asked for, it may fail."""
     from .shared import running_graphs
 
-    if name == "none" or not (name or graph.checked.clock.kind != "free"):
+    if name == "none" or not (name or paused or graph.checked.clock.kind != "free"):
         return None
     try:
-        return running_graphs.open_endpoint(name or default)
+        return running_graphs.open_endpoint(name or default, paused=paused)
     except AloftError as error:
-        if name:
+        if name or paused:
             raise
         print_warning(f"`aloft params` cannot reach this run: {error}")
         return None

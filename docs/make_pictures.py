@@ -1,7 +1,7 @@
 """Makes the pictures of the README: ``python docs/make_pictures.py`` from the root.
 
 That of the viewer needs software Vulkan (Debian's mesa-vulkan-drivers), or a graphics card; that of
-the page of a running graph needs Chromium. ``python docs/make_pictures.py live`` makes that alone, ``gallery``
+the page of a running graph needs Chromium. ``python docs/make_pictures.py live`` makes those alone, ``gallery``
 those of docs/gallery.md, ``pages`` those of other pages.
 """
 
@@ -50,6 +50,8 @@ GALLERY = (
     ("cart_pole", "projects/cart_pole/balance.yaml", "render", "RECORDING", "--at", "4.3", "--distance", "3.5"),
     ("swing_up", "projects/cart_pole/swing_up.yaml", "plot", "RECORDING", "robot.joints.position"),
     ("arm", "projects/arm/reach.yaml", "render", "RECORDING", "--at", "1.5"),
+    ("quadrotor", "projects/quadrotor/flight.yaml", "plot", "RECORDING", "robot.truth.base_position[2]",
+     "robot.truth.base_angular_velocity[0]", "robot.thrusters.thrust"),
     ("hop", "gallery/hop.yaml", "plot", "RECORDING", "robot.joints.position", "phase.state.index"),
     ("ball", "gallery/ball.yaml", "plot", "RECORDING", "ball_height.y", "ball_place.y", "cup_place.y"),
     ("mass_two", "gallery/mass_two.yaml", "graph", "GRAPH"),
@@ -176,6 +178,7 @@ def main() -> None:
     (FOLDER / "graph.svg").write_text(svg(drawing, "the graph of graphs/jump.yaml"))
 
     save_live_page(FOLDER / "live.png")
+    save_live_page(FOLDER / "live_paused.png", paused_at=600)
     wrong = Path("wrong.yaml")
     wrong.write_text(MISTAKES)
     try:
@@ -188,19 +191,27 @@ def main() -> None:
         wrong.unlink()
 
 
-def save_live_page(picture: Path) -> None:
-    """A photograph of the page of a graph while it runs, with its parameters."""
+def save_live_page(picture: Path, paused_at: int | None = None) -> None:
+    """A photograph of the page of a graph while it runs, with its parameters, or while it is paused before
+    the tick ``paused_at``, from which it has gone back a little."""
     program = shutil.which("chromium") or shutil.which("google-chrome")
     if program is None:
         print(f"warning: {picture} is the old one: there is no Chromium")
         return
     name = "live-picture"
     # at the pace of the clock, so that it still runs when the page is there
-    words = ["run", str(HOPS), "--no-record", "--params", name, "--set", "clock.kind=paced"]
+    words = ["run", str(HOPS), "--no-record", "--params", name]
+    words += ["--set", "clock.kind=paced"] if paused_at is None else ["--paused"]
     command = [sys.executable, "-m", "aloft", *words]
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        server = LiveServer(_live(name), Path("hops-tuned.yaml"), "parameters")
+        live = _live(name)
+        if paused_at is not None:
+            _stand(live)
+            live.control("go on", paused_at + 50)
+            _stand(live)
+            live.control("back", paused_at)
+        server = LiveServer(live, Path("hops-tuned.yaml"), "parameters")
         threading.Thread(target=server.serve_forever, daemon=True).start()
         with server, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
             subprocess.run(
@@ -213,6 +224,13 @@ def save_live_page(picture: Path) -> None:
     finally:
         run.terminate()
         run.wait()
+
+
+def _stand(live: LiveRun) -> None:
+    """Wait until the run is paused."""
+    end = time.monotonic() + PATIENCE
+    while live.now()["state"] != "paused" and time.monotonic() < end:
+        time.sleep(0.1)
 
 
 def _live(name: str) -> LiveRun:
@@ -234,5 +252,6 @@ if __name__ == "__main__":
         save_drawn(PAGES, FOLDER)
     elif sys.argv[1:] == ["live"]:
         save_live_page(FOLDER / "live.png")
+        save_live_page(FOLDER / "live_paused.png", paused_at=600)
     else:
         main()

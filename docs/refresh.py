@@ -34,6 +34,7 @@ from result_tables import (
     frontier_table,
     ground_table,
     impulse_table,
+    mutated_robots_table,
     quarter_table,
     ratio_table,
     real_table,
@@ -264,6 +265,12 @@ def write_every_robot(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
 
 
+def write_mutated_robots(file: Path) -> None:
+    """What becomes of real descriptions with one thing made wrong."""
+    rows = mutated_robots_table(read_json(file)["rows"])
+    refresh(DOCS / "robots_results.md", "mutated robots", rows)
+
+
 def write_effects(file: Path) -> None:
     """What each effect of a real robot does to a jump."""
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
@@ -344,6 +351,9 @@ PAGES = {
     "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
+    "mutated_robots": Page(
+        write_mutated_robots, "aloft bench mutated_robots --json > FILE", "FILE"
+    ),
     "excerpts": Page(write_excerpts),
     "export": Page(write_export, "aloft bench export --tsid FOLDER --json > FILE", "FILE"),
     "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),

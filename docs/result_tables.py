@@ -295,6 +295,18 @@ def every_robot_table(rows: Sequence[Row]) -> str:
     )
 
 
+def mutated_robots_table(rows: Sequence[Row]) -> str:
+    """One row a kind of mistake: how often it was made, and what became of it."""
+    return table(
+        ("what was made wrong", "cases", "what became of it"),
+        (
+            (row["name"], f"{row['value']:.0f}", row["note"])
+            for row in rows
+            if row["value"] is not None
+        ),
+    )
+
+
 def short_tasks_table(summary: Row) -> str:
     """How many tasks met their goal, the rows of ``README_TASKS``, and those of all that did not.
 
@@ -518,9 +530,10 @@ def fault_table(runs: Sequence[Row]) -> str:
 
 
 def _fault_cell(runs: Sequence[Row]) -> str:
-    """How the runs of one fault end, such as ``2 succeed, 3 fall; tilt after 0.41 s``."""
+    """How the runs of one fault end, such as ``2 succeed, 3 fall; tilt after 0.41 s; 4 warned: torque after 0.1 s``."""
     ends = {"succeed": 0, "fall": 0, "stop": 0, "fail": 0}
     stops: dict[str, list[float]] = {}
+    warned: dict[str, list[float]] = {}
     for run in runs:
         reason = run["reason"]
         ends["succeed" if run["success"] else "fall" if reason.startswith("fell") else
@@ -528,9 +541,15 @@ def _fault_cell(runs: Sequence[Row]) -> str:
         if run.get("safety_fault_time_s") is not None and run.get("fault_time_s") is not None:
             after = run["safety_fault_time_s"] - run["fault_time_s"]
             stops.setdefault(run["safety_fault"].replace("_", " "), []).append(after)
-    counted = ", ".join(f"{n} {end}" for end, n in ends.items() if n)
-    seen = ", ".join(f"{who} after {median(after):.2f} s" for who, after in stops.items())
-    return f"{counted}; {seen}" if seen else counted or "-"
+        if run.get("suspect_time_s") is not None and run.get("fault_time_s") is not None:
+            after = run["suspect_time_s"] - run["fault_time_s"]
+            warned.setdefault(run["suspect"], []).append(after)
+    parts = [", ".join(f"{n} {end}" for end, n in ends.items() if n)]
+    parts.append(", ".join(f"{who} after {median(after):.2f} s" for who, after in stops.items()))
+    parts += [
+        f"{len(after)} warned: {who} after {median(after):.2f} s" for who, after in warned.items()
+    ]
+    return "; ".join(part for part in parts if part) or "-"
 
 
 def equally_likely(first: int, second: int) -> float:

@@ -415,6 +415,16 @@ class RobotDescription(Part):
         }
 
     @property
+    def element_names(self) -> Mapping[str, tuple[str, ...]]:
+        """The robot's own names for the elements along a dimension."""
+        return {
+            "n_joints": tuple(joint.name for joint in self.joints),
+            "n_contacts": tuple(contact.name for contact in self.contacts),
+            "n_feet": tuple(foot.name for foot in self.feet),
+            "n_thrusters": tuple(self.thrusters),
+        }
+
+    @property
     def base_velocities(self) -> int:
         """The number of velocities of the base: 6 if floating, 3 if planar, 0 if fixed."""
         return BASE_VELOCITIES[self.base_joint]

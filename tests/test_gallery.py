@@ -23,9 +23,9 @@ def run(graph: str, *settings: str) -> RunResult:
     return load(ROOT / "docs" / graph, list(settings)).run()
 
 
-def test_twelve_examples_each_with_a_picture_a_file_and_commands() -> None:
+def test_thirteen_examples_each_with_a_picture_a_file_and_commands() -> None:
     sections = TEXT.split("\n## ")[1:]
-    assert len(sections) == 12
+    assert len(sections) == 13
     for section in sections:
         assert section.count("![") == 1 and "<!-- from: " in section and "```sh" in section
     shown = set(re.findall(r"\]\(gallery/(\S+)\)", TEXT))

@@ -25,7 +25,7 @@ def made(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 def test_each_section_is_a_notebook_with_its_text_graph_and_commands(made: dict[str, Path]) -> None:
-    assert len(made) == PAGE.count("\n## ") == 12
+    assert len(made) == PAGE.count("\n## ") == 13
     for path in made.values():
         found = nbformat.read(path, as_version=4)
         nbformat.validate(found)
@@ -53,7 +53,8 @@ def test_a_section_without_a_file_is_told(script: ModuleType) -> None:
 
 
 NAMES = (
-    "mass", "cart_pole", "swing_up", "arm", "hop", "ball", "mass_two", "push", "ros2", "fmu", "urdf", "jump",
+    "mass", "cart_pole", "swing_up", "arm", "quadrotor", "hop", "ball", "mass_two", "push", "ros2", "fmu", "urdf",
+    "jump",
 )  # fmt: skip
 
 

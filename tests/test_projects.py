@@ -52,7 +52,7 @@ def run(bin_folder: Path, folder: Path, command: str) -> subprocess.CompletedPro
     )  # fmt: skip
 
 
-@pytest.fixture(params=["arm", "cart_pole"])
+@pytest.fixture(params=["arm", "cart_pole", "quadrotor"])
 def project(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """A copy of a project's files in an empty folder."""
     folder = tmp_path / request.param
@@ -83,7 +83,8 @@ def test_the_page_lists_every_file(project: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "graph", "metric", "most"),
     [("arm", "reach", "target_error_rad", 0.01),
-     ("cart_pole", "balance", "largest_position", 0.05)],
+     ("cart_pole", "balance", "largest_position", 0.05),
+     ("quadrotor", "flight", "hover_error_after_m", 0.15)],
 )  # fmt: skip
 def test_the_graph_does_what_the_page_says(
     bin_folder: Path, tmp_path: Path, name: str, graph: str, metric: str, most: float

@@ -55,11 +55,11 @@ def path_of(name: str) -> Path:
     return folder() / f"{name}{SOCKET_SUFFIX}"
 
 
-def open_endpoint(name: str) -> ParameterEndpoint:
-    """An endpoint for a run called ``name``. Raises ``AloftError``."""
+def open_endpoint(name: str, *, paused: bool = False) -> ParameterEndpoint:
+    """An endpoint for a run called ``name``, which begins ``paused`` or not. Raises ``AloftError``."""
     from ...runtime.live.parameter_endpoint import ParameterEndpoint
 
-    return ParameterEndpoint(path_of(name))
+    return ParameterEndpoint(path_of(name), paused=paused)
 
 
 def find(name: str) -> Path:

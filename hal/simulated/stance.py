@@ -234,7 +234,7 @@ def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:
     """The indices of the joints that move a foot."""
     legs = np.zeros(len(robot.joints), dtype=np.bool_)
     for foot in robot.feet:
-        legs |= joints_above(robot, foot.link)
+        legs |= np.array(joints_above(robot, foot.link), np.bool_)
     return np.flatnonzero(legs)
 
 
@@ -532,7 +532,7 @@ def holding_gains(model: MjModel, robot: RobotDescription, lag: float = 0.0) -> 
     if robot.contacts and base.velocities:
         legs = np.zeros(len(robot.joints), dtype=np.bool_)
         for foot in robot.feet:
-            legs |= joints_above(robot, foot.link)
+            legs |= np.array(joints_above(robot, foot.link), np.bool_)
         height = float(standing_com(robot)[2] - standing_heights(robot).min())
         needed = _two_digits(GRAVITY_SHARE * robot.weight * max(height, 0.01))
         stiffness[legs], damping[legs] = needed, DAMPING_TIME * needed

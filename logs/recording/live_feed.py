@@ -40,14 +40,15 @@ STARTING = 15.0
 
 
 class LiveFeed:
-    """Sends one run to the viewer that listens at ``source``.
+    """Sends one run to the viewer that listens at ``source``, under ``name``, by default the graph's.
 
     Attributes:
         problem: why nothing is shown any more; empty while all is well.
         left_out: pieces of work the viewer was too slow for.
     """
 
-    def __init__(self, source: str, header: Header) -> None:
+    def __init__(self, source: str, header: Header, name: str = "") -> None:
+        self._name = name or header.name
         self.problem = ""
         self.left_out = 0
         self._source, self._header = source, header
@@ -94,7 +95,7 @@ class LiveFeed:
 
         header = self._header
         try:
-            stream = rr.RecordingStream("aloft", recording_id=header.name, send_properties=False)
+            stream = rr.RecordingStream("aloft", recording_id=self._name, send_properties=False)
             rr.set_log_time_enabled(False, recording=stream)
             layout = recording_blueprint(header, live=True)
             stream.connect_grpc(self._source, default_blueprint=layout)

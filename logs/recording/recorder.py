@@ -30,7 +30,7 @@ from ..file.header import header_of
 from ..file.reader import read
 from .place import cause_of, part_of, remedy, replaced, take_place
 from .recorder_link import RecorderLink, rerun_is_installed
-from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
+from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import space_of
 
 STALL_TIME = 60.0
@@ -275,6 +275,23 @@ class Recorder:
         if not self._write(KEYFRAME, tick, self._frame):
             self._wait_for_room(KEYFRAME, tick, self._frame)
 
+    def rewind(self, tick: int) -> None:
+        """Go on in a new file, which begins with the graph's whole memory before ``tick``.
+
+        The run stands still meanwhile, so this waits for room in every run. Where the process takes
+        nothing any more, nothing more is recorded: in one file a tick is never there twice.
+        """
+        if self.link is None:
+            return
+        self.link.reset_stall_timer()
+        while not ((self._gap is None or self._note_gap(tick)) and self._write(REWIND, tick, b"")):
+            if not self._waiting_helps():
+                self._write, self._waits, self._every = _no_room, False, 0
+                self._warn(f"nothing is recorded after the run has gone back to tick {tick}")
+                return
+            time.sleep(1e-3)
+        self._keep_keyframe(tick)
+
     def _note_change(self, change: ParameterChange) -> None:
         self.note(parameter_note(change))
 
@@ -290,7 +307,7 @@ class Recorder:
         """Have the outcome written, and wait for the process to end. Returns what went wrong."""
         if self.link is None:
             return self.warnings
-        if self._gap is not None:
+        if self._gap is not None and self._write is not _no_room:
             self.link.reset_stall_timer()
             while not self._note_gap(self._gap[1]) and self._waiting_helps():
                 time.sleep(1e-3)
@@ -349,6 +366,11 @@ class Recorder:
         with suppress(AloftError, OSError):
             count += len(read(part_of(path), damaged=True).ticks)
         return count, part_of(path)
+
+
+def _no_room(kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
+    """Stands for the ring of a recorder that is given up."""
+    return False
 
 
 def _encoded(note: Note) -> bytes:

@@ -31,7 +31,7 @@ from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
 from .place import RecordingPlace, cause_of, split_name, take_place
-from .recorder_protocol import KEYFRAME, NOTE, ROW, RecorderReport, RecorderTask
+from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
 from .writer import RecordingWriter
 
@@ -67,7 +67,9 @@ class RecorderProcess:
         self._rows = np.zeros((batch, self._bus_size), np.uint8)
         self._filled = self._taken = 0
         self._notes: list[Note] = []
-        self._last_tick = header.first_tick
+        self._changes: list[Note] = []
+        """The changes of parameters so far, which each file of several has."""
+        self._last_tick = header.first_tick - 1
         self._syncing = threading.Thread()
         self._sync_error: OSError | None = None
         self._header = header
@@ -80,23 +82,36 @@ class RecorderProcess:
             self._place = RecordingPlace(Path(task.path), file, task.keep)
             self._guard(lambda: self._open(header))
         self.feed = _live_feed(task.live, header) if task.live else None
-        self._fed_rows = 0
+        self._fed_rows = self._rewinds = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
         assert self._place is not None
         self._writer = RecordingWriter(self._place.target, header, place=self._place)
 
-    def _split(self, tick: int) -> None:
-        """Close the file, and go on in a new one with the tick ``tick``."""
+    def _go_back(self, tick: int) -> None:
+        """Go on with ``tick``, which has been run before, in a new file and as a new run of the viewer."""
+        self._write_batch()
+        self._changes = [note for note in self._changes if note.tick < tick]
+        self._split(tick, back=True)
+        self._last_tick = tick - 1
+        if self.feed is not None:
+            self.feed.finish(None)
+            self._rewinds += 1
+            name = f"{self._header.name}, again from {tick / self._header.base_rate:.3f} s"
+            self.feed = _live_feed(self._task.live, self._header, f"{name} ({self._rewinds})")
+
+    def _split(self, tick: int, *, back: bool = False) -> None:
+        """Close the file, and go on in a new one with the tick ``tick``, or ``back`` with it."""
         writer, place = self._writer, self._place
         if writer is None or place is None:
             return
         following = split_name(Path(self._task.path), len(self._files) + 2)
         self._write_batch()
         self._write_notes()
-        ticks = tick - self._begun_at()
-        self._write(lambda writer: writer.write_outcome(_went_on(following, ticks)))
+        ticks = (self._last_tick + 1 if back else tick) - self._begun_at()
+        outcome = _went_on(following, ticks, tick if back else None)
+        self._write(lambda writer: writer.write_outcome(outcome))
         self._guard(self._close)
         if self.report.problem:
             return
@@ -106,6 +121,7 @@ class RecorderProcess:
         self._writer = None
         self._header = replace(self._header, first_tick=tick, run_begin=self._begun_at())
         self._guard(lambda: self._open_following(following))
+        self._notes = list(self._changes)
 
     def _begun_at(self) -> int:
         """The first tick of the run."""
@@ -151,9 +167,13 @@ class RecorderProcess:
             if 0 < self._task.split <= record.tick - self._header.first_tick:
                 self._split(record.tick)
             self._write(lambda writer: writer.write_keyframe(Snapshot(record.tick, bus, state)))
+        elif record.kind == REWIND:
+            self._go_back(record.tick)
         elif record.kind == NOTE:
             note = Note(**json.loads(bytes(record.data)))
             self._notes.append(note)
+            if note.kind == "parameter":
+                self._changes.append(note)
             if self.feed is not None:
                 self.feed.note(note)
 
@@ -278,23 +298,26 @@ class RecorderProcess:
         self.report.error_number = cause_of(error)
 
 
-def _live_feed(source: str, header: Header) -> LiveFeed:
+def _live_feed(source: str, header: Header, name: str = "") -> LiveFeed:
     from .live_feed import LiveFeed  # imports what only a viewer of a part needs
 
-    return LiveFeed(source, header)
+    return LiveFeed(source, header, name)
 
 
-def _went_on(path: Path, ticks: int) -> dict[str, Any]:
-    """The outcome in a file of a run that goes on in the file ``path``; ``ticks`` were run so far."""
+def _went_on(path: Path, ticks: int, back_to: int | None) -> dict[str, Any]:
+    """The outcome in a file of a run that goes on in the file ``path``, or goes back there; ``ticks`` were
+    run so far."""
+    back = "" if back_to is None else f"went back to tick {back_to} and "
     return {
         "success": False,
-        "reason": f"the run goes on in {path.name}",
+        "reason": f"the run {back}goes on in {path.name}",
         "exit_code": 0,
         "run_hash": "",
         "ticks": ticks,
         "metrics": {},
         "blocks": {},
         "goes_on_in": path.name,
+        "back_to": back_to,
     }
 
 

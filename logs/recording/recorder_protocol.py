@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-HEADER, ROW, KEYFRAME, NOTE = 1, 2, 3, 4
-"""The kinds of records in the ring; a keyframe is the bytes of the bus, then of the state."""
+HEADER, ROW, KEYFRAME, NOTE, REWIND = 1, 2, 3, 4, 5
+"""The kinds of records in the ring. A keyframe is the bytes of the bus, then of the state; after ``REWIND``
+come its tick and later ones once more, another way."""
 
 
 @dataclass(frozen=True)

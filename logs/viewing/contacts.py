@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ...robots.kinematics import LinkPoses
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
 from .drawing import ChangedRows, Moments, ScenePart, ThinnedRows
 from .robot_shapes import reach_of
@@ -46,6 +47,19 @@ def force_arrows(robot: RobotDescription, force: Array) -> Array:
     longest = LONGEST_ARROW * reach_of(robot)
     shorter: Array = arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12))
     return shorter
+
+
+def thruster_forces(
+    robot: RobotDescription, poses: LinkPoses, thrust: Array
+) -> tuple[Array, Array]:
+    """Where the thrusters push and with which forces, for ``thrust`` (n, n_thrusters) [N]: both
+    (n, n_thrusters, 3) [m, N, world]."""
+    places, forces = [], []
+    for k, thruster in enumerate(robot.thrusters.values()):
+        position, rotation = poses.of(thruster.link)
+        places.append(position + rotation @ np.array(thruster.position))
+        forces.append(thrust[:, k, None] * (rotation @ np.array(thruster.axis)))
+    return np.stack(places, axis=1), np.stack(forces, axis=1)
 
 
 class ContactPart(ScenePart):

@@ -27,6 +27,7 @@ from .contacts import (
     FootForces,
     LandingPeaks,
     force_arrows,
+    thruster_forces,
 )
 from .drawing import Colors, Detail, Moments, ScenePart
 from .robot_shapes import capsules, drawn_link, eye_height, shapes_of
@@ -249,17 +250,11 @@ class ThrustPart(ScenePart):
 
         if self.ports.thrust is None or not len(moments):
             return
-        thrust, poses = moments[self.ports.thrust], moments.poses(self.robot, self.ports.pose)
-        places, forces = [], []
-        for k, thruster in enumerate(self.robot.thrusters.values()):
-            position, rotation = poses.of(thruster.link)
-            places.append(position + rotation @ np.array(thruster.position))
-            forces.append(thrust[:, k, None] * (rotation @ np.array(thruster.axis)))
-        vectors = force_arrows(self.robot, np.stack(forces, axis=1))
-        arrows = rr.Arrows3D.columns(
-            origins=np.stack(places, axis=1).reshape(-1, 3), vectors=vectors.reshape(-1, 3)
-        )
-        self.send("thrust", moments, arrows.partition(np.full(len(moments), len(places))))
+        poses = moments.poses(self.robot, self.ports.pose)
+        places, forces = thruster_forces(self.robot, poses, moments[self.ports.thrust])
+        vectors = force_arrows(self.robot, forces)
+        arrows = rr.Arrows3D.columns(origins=places.reshape(-1, 3), vectors=vectors.reshape(-1, 3))
+        self.send("thrust", moments, arrows.partition(np.full(len(moments), places.shape[1])))
 
 
 class PushPart(ScenePart):

@@ -38,16 +38,14 @@ def names_along(
     linear and angular x, y, z for six; else numbers.
     """
     if robot is not None:
-        joints = [joint.name for joint in robot.joints]
-        known = {
-            # as many motors as joints, but a motor may turn two of them
-            "n_joints": list(robot.transmission.motors) if "motor" in field.field_name else joints,
-            "n_velocities": [*BASE_NAMES[robot.base_joint], *joints],
-            "n_contacts": [contact.name for contact in robot.contacts],
-            "n_feet": [foot.name for foot in robot.feet],
-        }
+        known = dict(robot.element_names)
+        known["n_velocities"] = (*BASE_NAMES[robot.base_joint], *known["n_joints"])
+        if (
+            "motor" in field.field_name
+        ):  # as many motors as joints, but a motor may turn two of them
+            known["n_joints"] = robot.transmission.motors
         if size in known:
-            return known[str(size)]
+            return list(known[str(size)])
     if length in (3, 4):
         return list("xyzw"[:length])
     if length == 6:

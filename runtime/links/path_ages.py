@@ -57,6 +57,10 @@ class PathAges:
         self._ticks[place], self._began[place] = tick, self._clock.began or time.perf_counter_ns()
         self._count += 1
 
+    def resume(self, tick: int) -> None:
+        """Begin anew: the time of a pause is no age."""
+        self._count = 0
+
     def close(self) -> None:
         """Nothing to do."""
 

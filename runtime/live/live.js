@@ -51,7 +51,7 @@ function fieldsOf(port) {
 }
 
 // What the run is doing, a few times a second.
-const words = {running: "running", starting: "starting", still: "stands still", ended: "has ended",
+const words = {running: "running", paused: "paused", starting: "starting", still: "stands still", ended: "has ended",
   gone: "is gone", unheard: "not heard", partly: "in part", other: "another graph", lost: "this page's program has ended"};
 function say(state, said) {
   badge.className = state; badge.textContent = words[state] || state;
@@ -105,11 +105,53 @@ async function look() {
     const found = await call("now");
     if (found.state === "other") { location.reload(); return; }
     if (found.values) draw(found);
+    if (found.control !== undefined) drawControl(found.control);
+    if (pause) pause.disabled = found.state === "ended" || found.state === "gone";
     sayParts();
     say(found.state, [found.said, found.line].filter(Boolean).join("; "));
     if (found.state === "ended" || found.state === "gone") wait = SLOWER;
   } catch (error) { say("lost", String(error.message)); wait = SLOWER; }
   setTimeout(look, document.hidden ? SLOWER : wait);
+}
+
+// Pausing, and going back to a snapshot. The slider has a place for each; what it shows is asked for when it is let go.
+const back = document.getElementById("back"), pause = document.getElementById("pause");
+let standing = null;
+const instant = tick => (tick * data.live.period).toFixed(3) + " s";
+function drawControl(found) {
+  if (!pause) return;
+  const before = standing;
+  standing = found;
+  pause.textContent = !found ? "pause" : found.over ? "end the run" : "go on";
+  document.getElementById("paused").hidden = !found;
+  if (!found || JSON.stringify(before) === JSON.stringify(found)) return;
+  back.min = 0; back.max = found.kept.length - 1; back.step = 1;
+  const place = found.kept.filter(tick => tick <= found.tick).length - 1;
+  document.getElementById("kept").replaceChildren(...found.kept.map((_, k) => new Option("", k)));
+  back.value = place;
+  target(found.kept[place]);
+}
+const target = tick => { document.getElementById("target").textContent = tick === undefined ? "" : instant(tick); };
+async function control(body) {
+  const refused = document.getElementById("refused");
+  try { drawControl((found => found.paused ? found : null)(await call("control", body))); refused.textContent = ""; }
+  catch (error) { refused.textContent = error.message; }
+  refresh();
+}
+if (pause) {
+  const length = document.getElementById("for");
+  pause.onclick = () => {
+    if (!standing) { control({do: "pause"}); return; }
+    const text = length.value.trim(), seconds = /^(\d*\.?\d+) *s?$/.exec(text);
+    if (text && !seconds) {
+      document.getElementById("refused").textContent = "expected seconds, as 0.5, not " + text;
+      return;
+    }
+    const number = standing.over || !text ? null : Math.max(1, Math.round(seconds[1] / data.live.period));
+    control({do: "go on", number});
+  };
+  back.oninput = () => target(standing.kept[back.value]);
+  back.onchange = () => control({do: "back", number: standing.kept[back.value]});
 }
 
 // Parameters that can be changed.

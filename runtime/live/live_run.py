@@ -16,7 +16,16 @@ from ..loading import LoadError, load, load_text
 from ..running.memory import Memory
 from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
 from .texts import ValueTexts, tick_text, time_texts
-from .window import ENDED, RATE, STARTING, WindowContents, WindowLayout, WindowReader, digest
+from .window import (
+    ENDED,
+    PAUSED,
+    RATE,
+    STARTING,
+    WindowContents,
+    WindowLayout,
+    WindowReader,
+    digest,
+)
 
 STALLED_AFTER = 1.0
 """Seconds without a new tick after which it is said that the graph stands still."""
@@ -100,7 +109,15 @@ class LiveRun:
                     state, said = self._state(look)
             if look is None:
                 return {"state": state, "said": said}
-            return {"state": state, "said": said, **self._moment(look)}
+            control: dict[str, Any] | None = None
+            if state == "paused":
+                try:
+                    control = self.control("look")
+                except EndpointError:
+                    state, said = "gone", "the process has gone, and did not say why"
+                else:
+                    said = paused_text(control, self.graph.base_period)
+            return {"state": state, "said": said, "control": control, **self._moment(look)}
 
     def _moment(self, look: WindowContents) -> dict[str, Any]:
         assert self._reader is not None
@@ -134,6 +151,9 @@ class LiveRun:
             return "gone", "the process was stopped in the midst of a tick"
         if look.state == ENDED:
             return "ended", f"the run has ended: {look.said}" if look.said else "the run has ended"
+        if look.state == PAUSED:
+            self._since = time.monotonic()
+            return "paused", ""
         if look.tick != self._seen or look.state == STARTING:
             self._seen, self._since = look.tick, time.monotonic()
         silent = time.monotonic() - self._since
@@ -165,6 +185,41 @@ class LiveRun:
     def set(self, settings: list[str]) -> list[dict[str, Any]]:
         """Change parameters, all in one tick. Raises ``EndpointError``."""
         return set_parameters(self._path, settings)
+
+    @property
+    def can_be_paused(self) -> bool:
+        """Whether the run can be paused and go back."""
+        return not self._about["refusal"]
+
+    def control(self, do: str, number: int | None = None) -> dict[str, Any]:
+        """Pause the run, go back in it, or let it go on.
+
+        Args:
+            do: ``pause``; ``go on``, with the number of ticks after which it pauses again; ``back``,
+                with the tick, to the last snapshot up to it; or ``look``.
+            number: of ticks, or the tick.
+
+        Returns:
+            How the run stands then; see ``RunControl.about``.
+
+        Raises:
+            EndpointError: nobody answers, or the run refuses.
+        """
+        of = {"back": "tick", "go on": "ticks"}.get(do)
+        more = {of: number} if of is not None and number is not None else {}
+        return ask(self._path, {"verb": "control", "do": do, **more})
+
+
+def paused_text(control: dict[str, Any], period: float) -> str:
+    """What is said of a run that is paused: where, and how far back it can go."""
+    tick, kept = control["tick"], control["kept"]
+    over = f" at its end ({control['over']})" if control["over"] else ""
+    back = (
+        f"it can go back to {len(kept)} snapshots from {kept[0] * period:.3f} s on" if kept else ""
+    )
+    problem = f"no more snapshots are kept: {control['problem']}" if control["problem"] else ""
+    said = [f"paused before tick {tick}, {tick * period:.3f} s{over}", back, problem]
+    return "; ".join(filter(None, said))
 
 
 def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[str]]:

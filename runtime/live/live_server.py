@@ -27,6 +27,12 @@ _CONTROLS = (
     '<span id="state" role="status">connecting</span>'
     '<label><input type="checkbox" id="numbers" checked>numbers</label>'
 )
+_PAUSES = (
+    '<span id="control"><button id="pause">pause</button><span id="paused" hidden>'
+    '<input type="range" id="back" list="kept" aria-label="go back to"><datalist id="kept"></datalist>'
+    '<output id="target"></output><label>for <input id="for" placeholder="no end" '
+    'aria-label="go on for"></label></span><output id="refused"></output></span>'
+)
 
 
 def live_page(
@@ -35,6 +41,7 @@ def live_page(
     token: str,
     *,
     tuning: bool = True,
+    pauses: bool = False,
     save: str = "",
     opened: Opened = "diagram",
 ) -> str:
@@ -45,15 +52,19 @@ def live_page(
         closed: the sub-graphs that are closed.
         token: without which the server answers nothing.
         tuning: whether parameters can be changed.
+        pauses: whether the run can be paused and go back.
         save: the name of the file for changed values, as it is shown.
         opened: what its side shows at first.
     """
     button = '<button id="tune">parameters</button>' if tuning else ""
-    data = {"token": token, "tuning": tuning, "save": save, "opened": opened}
+    data = {
+        "token": token, "tuning": tuning, "pauses": pauses, "period": graph.base_period, "save": save,
+        "opened": opened,
+    }  # fmt: skip
     addition = PageAddition(
         "live",
         data,
-        f'{_CONTROLS}{button}<output id="parts"></output><output id="line"></output>',
+        f'{_CONTROLS}{button}{_PAUSES if pauses else ""}<output id="parts"></output><output id="line"></output>',
         (_HERE / "live.css").read_text(encoding="utf-8"),
         _script(),
     )
@@ -98,6 +109,13 @@ class WatchedRun(Protocol):
 
     def set(self, settings: list[str]) -> list[dict[str, Any]]:
         """Change parameters."""
+
+    @property
+    def can_be_paused(self) -> bool:
+        """Whether the run can be paused and go back."""
+
+    def control(self, do: str, number: int | None = None) -> dict[str, Any]:
+        """Pause it, go back in it, or let it go on."""
 
 
 class LiveServer(ThreadingHTTPServer):
@@ -156,7 +174,7 @@ class _RequestHandler(LoopbackHandler):
             run.refresh()
             text = live_page(
                 run.graph, asked.get("closed", []), self.server.token,
-                tuning=run.has_parameters, save=str(self.server.save), opened=self.server.opened,
+                tuning=run.has_parameters, pauses=run.can_be_paused, save=str(self.server.save), opened=self.server.opened,
             )  # fmt: skip
             self.answer(text, "text/html")
         elif self._knows(self.headers.get("X-Aloft-Token", "")):
@@ -187,6 +205,12 @@ class _RequestHandler(LoopbackHandler):
                 self._refuse(400, 'expected {"settings": ["block.parameter=value", ...]}')
                 return
             self._tell(lambda: {"changes": self.server.run.set(settings)})
+        elif path == "/control":
+            do, number = body.get("do"), body.get("number")
+            if not isinstance(do, str) or not (number is None or type(number) is int):
+                self._refuse(400, 'expected {"do": "back", "number": 500}')
+                return
+            self._tell(lambda: self.server.run.control(do, number))
         elif path == "/save":
             self._tell(self._save)
         else:

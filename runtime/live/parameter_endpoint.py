@@ -6,9 +6,12 @@ one line of JSON, and so is its answer::
     {"verb": "list"}                                  {"graph": ..., "parameters": [...]}
     {"verb": "set", "settings": ["landing.w_c=0.1"]}  {"changes": [{"tick": 812, "path": ...}]}
     {"verb": "watch"}                                 {"graph": ..., "text": ..., "shape": {...}}
+    {"verb": "control", "do": "back", "tick": 500}    {"paused": true, "tick": 500, "kept": [...]}
 
 Where something is wrong the answer is ``{"error": text}``, with the report of a ``LoadError`` under
-``report``. With the answer to ``watch`` comes the descriptor of a window; see ``live.window``. A thread of its own answers; the control thread only looks into the slot of
+``report``. ``control`` pauses the run and goes back: ``do`` is ``pause``, ``go on`` (for ``ticks``, if
+they are given), ``back`` (to the last snapshot up to ``tick``) or ``look``, and the answer is
+``RunControl.about``. With the answer to ``watch`` comes the descriptor of a window; see ``live.window``. A thread of its own answers; the control thread only looks into the slot of
 ``LiveParameters`` once a tick.
 """
 
@@ -30,6 +33,7 @@ from ..language.errors import AloftError
 from ..loading.checking.parameters import adjust, entries
 from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph
+from ..running.run_control import RunControl, refusal_of
 from ..running.run_result import RunResult
 from ..running.ticker import Ticker
 from .window import Window, digest
@@ -52,13 +56,15 @@ class ParameterEndpoint:
 
     Args:
         path: of the socket; one that nobody answers any more is replaced.
+        paused: whether the run begins paused, and waits at its end.
 
     Raises:
         EndpointError: another run answers there, or the socket cannot be made.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, paused: bool = False) -> None:
         self.path = path
+        self.control = RunControl(paused=paused)
         if len(str(path).encode()) > _LONGEST_PATH:
             raise EndpointError(f"the name of the socket {path} is too long")
         if path.exists():
@@ -80,23 +86,30 @@ class ParameterEndpoint:
     def open(self, bound: BoundGraph) -> None:
         """Begin to answer."""
         self._window.open(bound)
-        self._about = _about(bound)
+        self.control.open(bound)
+        self._about = _about(bound) | {"refusal": refusal_of(bound)}
         self._thread = threading.Thread(
             target=self._serve, args=(bound.parameters, bound.graph.name), daemon=True
         )
         self._thread.start()
 
     def watch_ticker(self, ticker: Ticker) -> None:
-        """Let the run be watched."""
+        """Let the run be watched, and paused."""
         self._window.watch_ticker(ticker)
+        control, window = self.control, self._window
+        control.watch_ticker(ticker)
+        control.on_change = lambda: window.turn(paused=control.paused)
 
     def record(self, tick: int) -> None:
-        """Renew the window; changes of parameters are recorded elsewhere."""
+        """Renew the window and keep a snapshot, if it is time; changes of parameters are recorded
+        elsewhere."""
         self._window.record(tick)
+        self.control.record(tick)
 
     def close(self) -> None:
         """Answer no more."""
         self._closing = True
+        self.control.close()
         self._window.close()
         self.path.unlink(missing_ok=True)
         with suppress(OSError):
@@ -118,7 +131,7 @@ class ParameterEndpoint:
             with connection, suppress(OSError):  # the client may have closed the connection
                 connection.settimeout(REQUEST_TIMEOUT)
                 request = _read_line(connection)
-                answer = _answer(request, parameters, graph, self._watch)
+                answer = _answer(request, parameters, graph, self._watch, self.control)
                 if "shape" in answer:
                     socket.send_fds(connection, [b" "], [self._window.descriptor])
                 connection.sendall(json.dumps(answer).encode() + b"\n")
@@ -148,6 +161,7 @@ def _answer(
     parameters: LiveParameters,
     graph: str,
     watch: Callable[[], dict[str, Any]],
+    control: RunControl,
 ) -> dict[str, Any]:
     """The answer to one request; a request that makes no sense gets an error as its answer."""
     try:
@@ -165,6 +179,8 @@ def _answer(
             return {"changes": [asdict(change) for change in adjustment.changes()]}
         if verb == "watch":
             return watch()
+        if verb == "control":
+            return _control(message, control)
         return {"error": f"there is no verb {verb!r}"}
     except LoadError as error:
         return {"error": str(error), "report": error.report.as_json()}
@@ -172,6 +188,20 @@ def _answer(
         return {"error": str(error)}
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         return {"error": f"not a request: {error}"}
+
+
+def _control(message: Mapping[str, Any], control: RunControl) -> dict[str, Any]:
+    """Do what is asked with the run, and say how it stands then. Raises ``AloftError``."""
+    do, ticks = message["do"], message.get("ticks")
+    if do == "pause":
+        control.pause()
+    elif do == "go on":
+        control.go_on(None if ticks is None else int(ticks))
+    elif do == "back":
+        control.go_back(int(message["tick"]))
+    elif do != "look":
+        raise AloftError(f"a run does not {do!r}; it can pause, go on, back and look")
+    return control.about()
 
 
 def _read_line(connection: socket.socket) -> bytes:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..language.errors import AloftError
 from ..language.layout import Layout
 from ..links.observer import STALE, Observer
 from ..links.part import part_graph
@@ -136,6 +137,12 @@ class SpreadRun:
         """All parameters that can be changed, as they are now. Raises ``EndpointError``."""
         listed = ask(self._socket(), {"verb": "list"})["parameters"]
         return [entry for entry in listed if entry["live"]]
+
+    can_be_paused = False
+
+    def control(self, do: str, number: int | None = None) -> dict[str, Any]:
+        """Refused. Raises ``AloftError``."""
+        raise AloftError("a graph on several machines cannot be paused; run it in one process")
 
     def set(self, settings: list[str]) -> list[dict[str, Any]]:
         """Change parameters, in one tick on all parts. Raises ``EndpointError``."""

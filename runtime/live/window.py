@@ -33,7 +33,7 @@ RATE = 25.0
 SEQUENCE, TICK, STATE, OVERRUNS, SKIPPED, CHANGES, SAID = range(7)
 """The words of the head; ``SAID`` is the length of the text about the end [bytes]."""
 HEAD = 8
-STARTING, RUNNING, ENDED = range(3)
+STARTING, RUNNING, ENDED, PAUSED = range(4)
 """What ``STATE`` can be."""
 TEXT = 4096
 """Room for the text about the end [bytes]."""
@@ -140,6 +140,12 @@ class Window:
             self._next = tick + self._every
             self._renew(RUNNING)
 
+    def turn(self, *, paused: bool) -> None:
+        """Show that the run has been paused, has gone back or goes on; it stands before a tick."""
+        tick = self._bound.clock.tick
+        self._tick, self._next = max(0, tick - 1), tick
+        self._renew(PAUSED if paused else RUNNING)
+
     def _renew(self, state: int) -> None:
         if self.shape is None:
             return
@@ -200,7 +206,7 @@ class WindowContents:
 
     Attributes:
         tick: the last tick that is shown.
-        state: one of ``STARTING``, ``RUNNING`` and ``ENDED``.
+        state: one of ``STARTING``, ``RUNNING``, ``PAUSED`` and ``ENDED``.
         overruns: how many ticks began too late.
         skipped: how many periods were left out.
         changes: how many changes of parameters there were.

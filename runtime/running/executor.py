@@ -94,6 +94,7 @@ class Executor:
         self._plain = plain
         self._fuse = fuse and not plain
         self._warnings: list[str] = []
+        self._paused = 0  # [ns]
 
     def start(self, ticks: int | None = None) -> None:
         """Compile the kernels, open the sinks and start all blocks: idle -> ready.
@@ -147,7 +148,7 @@ class Executor:
                     self._note("life", "running")
                     with self._real_time.granted():
                         start_time = self._time.now()
-                        self.ticker.advance(limit)
+                        self._advance(limit, interrupts, watchdog)
                     if watchdog.hung is not None:
                         raise watchdog.hung
                 finally:  # within the outer try, so that nothing interrupts what follows
@@ -169,9 +170,25 @@ class Executor:
                 self._note("life", "stopped")
                 problems += self._close_sinks()
         result = self._result(
-            clock.tick - first_tick, (end_time - start_time) * 1e-9, error, problems, interrupts
-        )
+            clock.tick - first_tick, (end_time - start_time - self._paused) * 1e-9, error, problems,
+            interrupts,
+        )  # fmt: skip
         return replace(result, warnings=tuple(self._finish_sinks(result)))
+
+    def _advance(self, ticks: int | None, interrupts: Interrupts, watchdog: Watchdog) -> None:
+        """Run the ticks, with pauses where somebody asks for them."""
+        control = self.ticker.control
+        if control is None:
+            self.ticker.advance(ticks)
+            return
+        control.begin(ticks, lambda: interrupts.received is not None or watchdog.hung is not None)
+        while True:
+            began = self._time.now()
+            goes_on = control.may_go_on()
+            self._paused += self._time.now() - began
+            if not goes_on:
+                return
+            self.ticker.advance(control.ticks)
 
     def result(self, error: RunError | None = None) -> RunResult:
         """The outcome so far of a run that is stepped; ``error`` is what has ended it."""
@@ -223,6 +240,7 @@ class Executor:
             self.ticker.records.append(sink.record)
             if isinstance(sink, SupportsNotes):
                 self.ticker.notes.append(sink.note)
+        self.ticker.sinks = tuple(self._opened)
         if self._fuse:  # once the freeze guard has said where the block that runs is written
             self.ticker.fuse()
         for each in (*self._sinks, *self.bound.blocks.values()):

@@ -11,11 +11,14 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ..language.block import Block
 from ..language.errors import AloftError
 from ..language.parameter_change import Adjustment, ParameterChange
+from ..language.parameters import Parameters
 from ..language.steps import refresh_parameters
 from .failures import describe
 
@@ -24,11 +27,23 @@ ANSWER_TIME = 2.0
 _POLL = 1e-3
 
 
+@dataclass
+class Command:
+    """Something else to do between two ticks, handed over in the same slot; see ``run_control``.
+
+    Once ``answered`` is true, it was done, or refused for the reason in ``error``.
+    """
+
+    work: Callable[[], None]
+    error: str = ""
+    answered: bool = False
+
+
 class LiveParameters:
     """The parameters of a bound graph's ``blocks`` while it runs.
 
     Attributes:
-        requests: the slot. It holds one adjustment, which the control thread takes out.
+        requests: the slot. It holds one adjustment or command, which the control thread takes out.
         handed_in: where ``submit`` puts an adjustment. It is the slot, unless machines that share
             the graph must agree first.
         changes: all changes so far, in order.
@@ -37,24 +52,28 @@ class LiveParameters:
 
     def __init__(self, blocks: Mapping[str, Block]) -> None:
         self.blocks = blocks
-        self.requests: deque[Adjustment] = deque(maxlen=1)
-        self.handed_in = self.requests
+        self.requests: deque[Adjustment | Command] = deque(maxlen=1)
+        self.handed_in: deque[Any] = self.requests
         self.changes: list[ParameterChange] = []
         self.listeners: list[Callable[[ParameterChange], None]] = []
         self.compile: Callable[[Sequence[KernelCall]], object] | None = None
         """Compiles the calls of kernels that a block makes anew; none in a plain run."""
 
     def answer(self, tick: int) -> None:
-        """Apply the adjustment in the slot, from ``tick`` on; only the control thread does this."""
+        """Apply the adjustment in the slot, from ``tick`` on, or do what the command in it says; only
+        the control thread does this."""
         try:
-            adjustment = self.requests.popleft()
+            request = self.requests.popleft()
         except IndexError:  # withdrawn in this very moment
             return
         try:
-            self.apply(adjustment, tick)
+            if isinstance(request, Command):
+                request.work()
+            else:
+                self.apply(request, tick)
         except AloftError as error:
-            adjustment.error = str(error)
-        adjustment.answered = True
+            request.error = str(error)
+        request.answered = True
 
     def apply(self, adjustment: Adjustment, tick: int) -> None:
         """Change the parameters, from ``tick`` on.
@@ -78,6 +97,17 @@ class LiveParameters:
             for listener in self.listeners:
                 listener(change)
 
+    def go_back(self, params: Mapping[str, Parameters], changes: int) -> None:
+        """Have these parameters again, after the first ``changes`` changes; the rest never was.
+
+        Call it when the clock shows the tick from which they hold, and before the states are restored.
+        """
+        del self.changes[changes:]
+        for path, block in self.blocks.items():
+            if block.params is not params[path]:
+                block.params = params[path]
+                self._take_over(block)
+
     def _take_over(self, block: Block) -> None:
         with collect_calls() as calls:
             refresh_parameters(block)
@@ -94,18 +124,30 @@ class LiveParameters:
             AloftError: a block refused it, another adjustment is waiting, or no tick came in
                 time. In all these cases nothing has changed.
         """
-        if self.handed_in:
+        self._hand_over(self.handed_in, adjustment, timeout)
+
+    def command(self, work: Callable[[], None], timeout: float = ANSWER_TIME) -> None:
+        """Have the control thread do something between two ticks, and wait until it is done.
+
+        Raises:
+            AloftError: it was refused, another request is waiting, or no tick came in time.
+        """
+        self._hand_over(self.requests, Command(work), timeout)
+
+    @staticmethod
+    def _hand_over(slot: deque[Any], request: Adjustment | Command, timeout: float) -> None:
+        if slot:
             raise AloftError("another change is waiting for its tick; try again")
-        self.handed_in.append(adjustment)
+        slot.append(request)
         end = time.monotonic() + timeout
-        while not adjustment.answered:
+        while not request.answered:
             if time.monotonic() > end:
                 try:
-                    self.handed_in.remove(adjustment)
+                    slot.remove(request)
                 except ValueError:
                     end = time.monotonic() + timeout  # it was taken just now: wait for the answer
                     continue
                 raise AloftError(f"no tick came within {timeout:g} s; nothing was changed")
             time.sleep(_POLL)
-        if adjustment.error:
-            raise AloftError(adjustment.error)
+        if request.error:
+            raise AloftError(request.error)

@@ -195,6 +195,8 @@ class BoundGraph:
     """
 
     clock_type: type[Clock] = Clock
+    machine = ""
+    """Whose part of a graph on several machines this is; empty for a whole graph."""
 
     def __init__(self, graph: CheckedGraph, clock: Clock | None = None) -> None:
         self.graph = graph

@@ -48,6 +48,9 @@ class Pacer(Protocol):
     def wait(self, tick: int) -> int:
         """Wait until ``tick`` may begin. Returns by how many nanoseconds it is late, or zero."""
 
+    def restart(self) -> None:
+        """Let the next tick begin at once, after a pause: the time of the pause is not lost time."""
+
 
 class Paced:
     """Lets ticks begin at absolute deadlines of wall time: it sleeps first, then polls the clock.
@@ -62,13 +65,14 @@ class Paced:
         self._rate = rate
         self._source = source
         self._start: int | None = None
-        self._first_tick = 0
+        self._first_tick = self._skipped_before = 0
 
     def wait(self, tick: int) -> int:
         """Sleep and spin to the tick's deadline."""
         now = self._source.now()
         if self._start is None:
             self._start, self._first_tick = now, tick
+            self._skipped_before = self.skipped_periods
             return 0
         deadline = self._deadline(self._start, tick)
         late = now - deadline
@@ -88,9 +92,13 @@ class Paced:
             pass
         return late
 
+    def restart(self) -> None:
+        """Count the deadlines from the next tick on."""
+        self._start = None
+
     def _deadline(self, start: int, tick: int) -> int:
         # computed from the count of periods, so that rounding errors do not add up
-        periods = tick - self._first_tick + self.skipped_periods
+        periods = tick - self._first_tick + self.skipped_periods - self._skipped_before
         return start + int(periods * 1e9 / self._rate)
 
 
@@ -117,6 +125,9 @@ class RobotDriven:
         self.overruns += bool(missed)
         self.skipped_periods += missed
         return int(missed * 1e9 / self._rate)
+
+    def restart(self) -> None:
+        """Nothing to do: a run that a robot drives is not paused."""
 
 
 def driving_block(bound: BoundGraph) -> Block:

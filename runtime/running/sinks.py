@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from hashlib import blake2b
@@ -68,6 +69,23 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Finish, once, also after a failure."""
+
+
+@runtime_checkable
+class SupportsRewind(Protocol):
+    """The method that a sink has if it keeps ticks, for a run that goes back; see ``run_control``."""
+
+    def rewind(self, tick: int) -> None:
+        """Forget, or set apart, ``tick`` and all after it: they come again, and may be others. The
+        graph's memory is already that before ``tick``."""
+
+
+@runtime_checkable
+class SupportsResume(Protocol):
+    """The method that a sink has if it measures time, for a run that is paused."""
+
+    def resume(self, tick: int) -> None:
+        """The run has stood still, and goes on with ``tick``."""
 
 
 @runtime_checkable
@@ -157,6 +175,14 @@ class MemoryLog:
         self._flat[first : first + self._size] = self._bus
         self._used += 1
         self.ticks.append(tick)
+
+    def rewind(self, tick: int) -> None:
+        """Forget ``tick`` and all after it; notes stay."""
+        count = bisect_left(self.ticks, tick)
+        rows = self.rows()[:count].copy()
+        del self.ticks[count:]
+        self._chunks = [rows]
+        self._add_chunk(self.CHUNK)
 
     def note(self, note: Note) -> None:
         """Keep the note."""

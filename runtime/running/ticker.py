@@ -24,8 +24,22 @@ from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
-from .sinks import Note
+from .sinks import Note, Sink
 from .timing import Program
+
+
+class Pauses(Protocol):
+    """What may pause a run between two ticks; see ``run_control``."""
+
+    def begin(self, ticks: int | None, interrupted: Callable[[], bool]) -> None:
+        """All blocks have started, and there are so many ticks to run."""
+
+    def may_go_on(self) -> bool:
+        """Hold the run while it is paused. Returns whether there are ticks to run."""
+
+    @property
+    def ticks(self) -> int | None:
+        """How many ticks to run next."""
 
 
 class Ticker:
@@ -45,6 +59,9 @@ class Ticker:
         overruns_by_block: for each block, the number of deadlines that passed while it ran, and
             of results that were late.
         policy: how the run is paced.
+        sinks: all sinks of the run.
+        control: what may pause the run, if anything.
+        paused: whether ``advance`` ends at once; only the control thread sets it, between two ticks.
     """
 
     def __init__(
@@ -68,6 +85,9 @@ class Ticker:
         self._finite = FiniteCheck(bound.memory.bus) if finite_check else None
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
+        self.sinks: Sequence[Sink] = ()
+        self.control: Pauses | None = None
+        self.paused = False
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
         """The different programs, and for each tick of the hyperperiod the program it runs."""
@@ -144,7 +164,7 @@ class Ticker:
         """Run up to ``ticks`` ticks, or without a limit until stopped. Returns how many were run.
 
         The blocks must have been started by the caller. The run ends early when a block or a
-        signal (SIGINT, SIGTERM) asks it to stop.
+        signal (SIGINT, SIGTERM) asks it to stop, or when it is paused.
 
         Raises:
             RunError: a block failed, a value is not finite or the overrun policy says stop.
@@ -164,6 +184,8 @@ class Ticker:
                     call = parameters.answer
                     parameters.answer(tick)
                     self.refresh_chains()
+                    if self.paused:
+                        break
                 if wait is not None:
                     call = wait
                     late = wait(tick)

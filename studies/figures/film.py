@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...hal.simulated.scenes import flat
 from ...logs.file.reader import RecordedRun
-from ...logs.viewing.contacts import force_scale
+from ...logs.viewing.contacts import force_scale, thruster_forces
 from ...logs.viewing.scene_ports import scene_ports
 from ...mathematics.arrays import Array
 from ...plotting import DPI, Panel, draw_panels, image, new_figure, style
@@ -116,6 +116,11 @@ class Take:
         self._points = self._forces = np.zeros((count, 0, 3))
         if camera.forces and ports.contact_position and ports.contact_force:
             self._points, self._forces = run[ports.contact_position], run[ports.contact_force]
+        if camera.forces and ports.thrust:
+            poses = link_poses(robot, self.base, self.turn, self.joints)
+            places, forces = thruster_forces(robot, poses, run[ports.thrust])
+            self._points = np.concatenate([self._points, places], axis=1)
+            self._forces = np.concatenate([self._forces, forces], axis=1)
         self._push = None
         if camera.forces and ports.push:
             self._push = run[f"{ports.push}.point"], run[f"{ports.push}.force"]
@@ -143,7 +148,7 @@ class Take:
         return View(place, self._distance, self._camera.azimuth, self._camera.elevation)
 
     def arrows(self, row: int) -> Iterator[tuple[Array, Array]]:
-        """The forces: on the feet from where they act, a push to where it acts."""
+        """The forces: on the feet and of thrusters from where they act, a push to where it acts."""
         for point, force in zip(self._points[row], self._forces[row], strict=True):
             if np.linalg.norm(force) * self._arrow > 0.01:
                 yield point, point + self._arrow * force

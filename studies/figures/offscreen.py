@@ -102,7 +102,7 @@ class Offscreen:
         if self._model.nq > len(joints):
             data.qpos[:3] = base
             data.qpos[3], data.qpos[4:7] = quaternion[3], quaternion[:3]
-        data.qpos[-len(joints) :] = joints
+        data.qpos[self._model.nq - len(joints) :] = joints
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
         camera.lookat[:] = view.look_at

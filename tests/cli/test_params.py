@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from aloft.runtime.live.live_run import LiveRun
+
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
 Start = Callable[..., subprocess.Popen[str]]
@@ -96,6 +98,43 @@ def test_nothing_runs(sockets: Path, call: Call, call_json: CallJson) -> None:
     result = call_json("run", "count.yaml", "--no-record", "--params", "dead")
     assert result["success"] and not (sockets / "aloft" / "dead.sock").exists()
     assert "cannot name a run" in call("run", "count.yaml", "--params", "a/b", code=2).stderr
+
+
+def test_a_run_that_begins_paused(sockets: Path, start: Start, call_json: CallJson) -> None:
+    whole = call_json("run", "count.yaml", "--no-record")
+    process = start("run", "count.yaml", "--paused", "--no-record", "--json")
+    path = sockets / "aloft" / "count.sock"
+    end = time.monotonic() + 240.0
+    while not path.exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    live = LiveRun(path)
+    for do in ("go on", "go on"):  # from the start, and where it waits at its end
+        while live.now()["state"] != "paused" and time.monotonic() < end:
+            time.sleep(0.02)
+        live.control(do)
+        while live.now()["state"] == "running" and time.monotonic() < end:
+            time.sleep(0.02)
+    output, errors = process.communicate(timeout=240)
+    live.close()
+    assert (
+        "the run begins paused; `aloft graph --live --run count` shows where it goes on" in errors
+    )
+    assert json.loads(output)["run_hash"] == whole["run_hash"]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (("--seeds", "0:2"), "--paused is for one run in one process"),
+        (("--local",), "--paused is for one run in one process"),
+        (("--machine", "ground"), "without --seeds, --machine and --local"),
+        (("--params", "none"), "--paused needs the page; --params none lets nobody reach the run"),
+    ],
+)
+def test_what_does_not_begin_paused(
+    sockets: Path, call_json: CallJson, options: tuple[str, ...], reason: str
+) -> None:
+    assert reason in call_json("run", "count.yaml", "--paused", *options, code=2)["reason"]
 
 
 PAGES = [

@@ -32,9 +32,6 @@ from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, part_signal, read_values
 from .wire_check import WireCheck
 
-JOINTS = "n_joints"
-"""The dimension whose elements have the names of the robot's joints."""
-
 
 def resolve_composite_wires(
     graph: FlatGraph,
@@ -45,7 +42,7 @@ def resolve_composite_wires(
     """The drafts with an inserted block in front of every input that is put together."""
     found: dict[str, BlockDraft] = {}
     check = WireCheck(graph, drafts, problems)
-    names = tuple(joint.name for joint in robot.joints) if robot is not None else ()
+    names = robot.element_names if robot is not None else {}
     for path, draft in drafts.items():
         wires = dict(draft.flat.wires)
         excused = list(draft.flat.excused)
@@ -78,7 +75,7 @@ class _WireComposer:
     wire: FlatWire
     drafts: Mapping[str, BlockDraft]
     check: WireCheck
-    joints: tuple[str, ...]
+    names: Mapping[str, tuple[str, ...]]
     problems: Problems
 
     def __post_init__(self) -> None:
@@ -230,7 +227,7 @@ class _WireComposer:
         shape = draft.shape(field)
         if shape is None:
             return None  # a dimension is not known, which is reported
-        names = self.joints if field.shape and field.shape[0] == JOINTS else ()
+        names = self.names.get(str(field.shape[0]), ()) if field.shape else ()
         try:
             places = select(Selection("", item.selection.indices), shape, names)
         except ValueError as error:

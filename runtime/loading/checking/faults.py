@@ -400,16 +400,9 @@ def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
     return replace(wire, source=target, shown=wire.shown or source)
 
 
-def _element_names(settings: Settings) -> dict[str, tuple[str, ...]]:
+def _element_names(settings: Settings) -> Mapping[str, tuple[str, ...]]:
     """The names of elements by their dimension."""
-    robot = settings.robot
-    if robot is None:
-        return {}
-    return {
-        "n_joints": tuple(joint.name for joint in robot.joints),
-        "n_contacts": tuple(point.name for point in robot.contacts),
-        "n_feet": tuple(foot.name for foot in robot.feet),
-    }
+    return {} if settings.robot is None else settings.robot.element_names
 
 
 def _number(text: str, field: Field) -> float | None:

@@ -18,6 +18,7 @@ from aloft.runtime.links.path_ages import NAME, check_path_ages, path_sinks, tim
 from aloft.runtime.loading import load_text
 from aloft.runtime.placement.placed import place
 from aloft.runtime.running.executor import run
+from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.spread import run_parts_of, run_spread
 from aloft.runtime.transports.hub import Hub
 
@@ -52,6 +53,22 @@ class Late:
 
 def checked(text: str = GRAPH) -> CheckedGraph:
     return load_text(text, Path("graph.yaml"))
+
+
+def test_a_pause_is_no_age() -> None:
+    def oldest(*, told: bool) -> Any:
+        graph = checked()
+        (ages,) = path_sinks(graph)
+        bound = BoundGraph(graph)
+        ages.open(bound)
+        for tick in range(20):
+            bound.clock.began = (tick + 500 * (tick >= 10) + 1) * 10_000_000
+            if tick == 10 and told:
+                ages.resume(tick)
+            ages.record(tick)
+        return ages.metrics()[f"age_max_ms {PATH}"]
+
+    assert (oldest(told=False), oldest(told=True)) == pytest.approx((5010.0, 10.0))
 
 
 def test_a_run_in_time_is_praised_with_the_ages() -> None:

@@ -14,6 +14,7 @@ from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\
 rate: 200 Hz
@@ -43,6 +44,7 @@ class Running:
     path: Path
     file: Path
     thread: threading.Thread
+    results: list[RunResult]
 
     def stop(self, reason: str = "the test is over") -> None:
         """End the run and wait for its end."""
@@ -51,13 +53,16 @@ class Running:
         assert not self.thread.is_alive()
 
 
-def start(file: Path, path: Path) -> Running:
-    """Run the graph in ``file``; it answers at ``path``."""
+def start(file: Path, path: Path, *, paused: bool = False) -> Running:
+    """Run the graph in ``file``; it answers at ``path``, and may begin ``paused``."""
     bound = BoundGraph(load(file))
-    executor = Executor(bound, log=False, plain=True, sinks=[ParameterEndpoint(path)])
-    thread = threading.Thread(target=executor.run)
+    executor = Executor(
+        bound, log=False, plain=True, sinks=[ParameterEndpoint(path, paused=paused)]
+    )
+    results: list[RunResult] = []
+    thread = threading.Thread(target=lambda: results.append(executor.run()))
     thread.start()
-    return Running(bound, path, file, thread)
+    return Running(bound, path, file, thread, results)
 
 
 def write_graph(folder: Path) -> Path:

@@ -13,6 +13,7 @@ from aloft.blocks.general.arithmetic import Gain
 from aloft.blocks.general.sources import SineWave
 from aloft.runtime.live.parameter_endpoint import _answer
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.run_control import RunControl
 from aloft.runtime.testing import BlockUse, checked_graph
 
 TRIES = int(os.environ.get("ALOFT_FUZZ", "800"))
@@ -56,16 +57,18 @@ def test_every_request_has_an_answer_and_the_next_one_too() -> None:
         checked_graph({"wave": BlockUse(SineWave), "gain": BlockUse(Gain, wires={"u": "wave.y"})})
     )
     bound.parameters.submit = lambda adjustment: None  # type: ignore[method-assign]
+    control = RunControl()
+    control.open(bound)
     draw = random.Random(11)
     kinds = {"error": 0, "parameters": 0, "changes": 0, "starting": 0}
     for _ in range(TRIES):
         data = request(draw)
-        answer = _answer(data, bound.parameters, "g", starting)
+        answer = _answer(data, bound.parameters, "g", starting, control)
         assert json.loads(json.dumps(answer)) is not None
         (kind,) = set(kinds) & set(answer)
         kinds[kind] += 1
     assert min(kinds.values()) > 0
     good = _answer(
-        b'{"verb": "set", "settings": ["gain.gain=0.5"]}', bound.parameters, "g", starting
+        b'{"verb": "set", "settings": ["gain.gain=0.5"]}', bound.parameters, "g", starting, control
     )
     assert good["changes"][0]["new"] == 0.5

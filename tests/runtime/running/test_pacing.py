@@ -77,6 +77,20 @@ def begun_ms() -> list[float]:
     return [round((instant - Worker.begun[0]) / MS, 2) for instant in Worker.begun]
 
 
+def test_the_time_of_a_pause_is_no_lost_time() -> None:
+    time = PollingTime()
+    pacer = Paced(100.0, time)
+    assert pacer.wait(0) == 0
+    time.instant += 25 * MS  # a tick that takes too long
+    assert pacer.wait(1) > 0 and pacer.skipped_periods == 2
+    time.instant += 5000 * MS
+    pacer.restart()
+    began = time.instant
+    assert pacer.wait(2) == 0 and time.instant - began < MS, "it begins at once"
+    assert pacer.wait(3) == 0 and (pacer.overruns, pacer.skipped_periods) == (1, 2)
+    assert (time.instant - began) / MS == pytest.approx(10.0, abs=0.1), "and then in periods"
+
+
 def test_ticks_begin_at_whole_periods() -> None:
     result = paced(ClockSpec("paced"), [2], 1.5).run()
     assert begun_ms() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]
