@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ending_tables import fault_table, ground_table
 from result_tables import (
     FRONTIER_PICTURE,
     SEEDS,
@@ -30,9 +31,7 @@ from result_tables import (
     direction_table,
     effects_table,
     every_robot_table,
-    fault_table,
     frontier_table,
-    ground_table,
     impulse_table,
     quarter_table,
     ratio_table,
