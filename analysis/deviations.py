@@ -329,7 +329,7 @@ def _estimates(run: RobotRun) -> Iterator[Measure]:
 
 
 def _limits(run: RobotRun) -> Iterator[Measure]:
-    """Motors and joints at their limits, programs without a solution, and the safety stop."""
+    """Motors and joints at their limits, programs without a solution, what was warned of, and the safety stop."""
     truth, robot = run.truth, run.robot
     torque, speed, motors = run(truth, "motor_torque"), run(truth, "motor_speed"), robot.motors
     slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
@@ -345,9 +345,15 @@ def _limits(run: RobotRun) -> Iterator[Measure]:
     if run.solver:
         failed = np.diff(run(run.solver, "failures"), prepend=0).astype(float)
         yield Measure("limit", "the whole-body program has no solution", failed, 0.5, "")
+    outcome = run.outcome.get("metrics", {})
+    if "suspect_time_s" in outcome:
+        since = (run.time >= outcome["suspect_time_s"]).astype(float)
+        yield Measure(
+            "sensor", f"the fault detector suspects: {outcome['suspect']}", since, 0.5, ""
+        )
     if run.command:
         damped = (run(run.command, "mode") == CommandMode.DAMPING).astype(float)
-        fault = run.outcome.get("metrics", {}).get("safety_fault", "")
+        fault = outcome.get("safety_fault", "")
         yield Measure("limit", f"{DAMPED} ({fault})" if fault else DAMPED, damped, 0.5, "")  # fmt: skip
 
 

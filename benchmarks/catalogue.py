@@ -31,6 +31,7 @@ from .jumps.real_robot import real_robot
 from .links.link_delays import link_delays
 from .links.links import links
 from .loading import loading
+from .mutated_robots import mutated_robots
 from .planner.online_plans import online_plans
 from .planner.planner import planner
 from .recorder import recorder
@@ -70,18 +71,20 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "staircase": staircase,
     "go2_staircase": go2_staircase,
     "every_robot": every_robot,
+    "mutated_robots": mutated_robots,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "go2_courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
+    "mutated_robots",
 )  # fmt: skip
 """Those that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background", "export"),
-    "count": ("agreement", "jumps", "export", "online_plans"),
-    "seed": ("agreement", "jumps"),
+    "count": ("agreement", "jumps", "export", "online_plans", "mutated_robots"),
+    "seed": ("agreement", "jumps", "mutated_robots"),
     "seeds": (
         "jumps",
         "frontier",

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ending_tables import fault_table, ground_table
 from result_tables import (
     FRONTIER_PICTURE,
     SEEDS,
@@ -30,9 +31,7 @@ from result_tables import (
     direction_table,
     effects_table,
     every_robot_table,
-    fault_table,
     frontier_table,
-    ground_table,
     impulse_table,
     quarter_table,
     ratio_table,
@@ -264,6 +263,13 @@ def write_every_robot(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
 
 
+def write_mutated_robots(file: Path) -> None:
+    """What becomes of real descriptions with one thing made wrong."""
+    rows = [row for row in read_json(file)["rows"] if row["value"] is not None]
+    text = every_robot_table(rows, "what was made wrong", "cases")
+    refresh(DOCS / "robots_results.md", "mutated robots", text)
+
+
 def write_effects(file: Path) -> None:
     """What each effect of a real robot does to a jump."""
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
@@ -344,6 +350,9 @@ PAGES = {
     "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
+    "mutated_robots": Page(
+        write_mutated_robots, "aloft bench mutated_robots --json > FILE", "FILE"
+    ),
     "excerpts": Page(write_excerpts),
     "export": Page(write_export, "aloft bench export --tsid FOLDER --json > FILE", "FILE"),
     "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),

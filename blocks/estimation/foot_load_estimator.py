@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.kernel import kernel
-from ...mathematics.linear_algebra import solve_positive
 from ...robots.description import RobotDescription
 from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Input, Output, State
@@ -22,11 +21,10 @@ from ..signals import (
     Phase,
     PhaseState,
 )
+from .leg_forces import force_along, solve_leg
 
 _STILL = 0.05
 """A point that moves up or down more slowly than this [m/s] is still."""
-_DAMPING = 1e-6
-"""Added to the squared lever arms [m^2] of the joints, so that a straight leg has a finite inverse."""
 
 
 class FootLoadMemory(Signal):
@@ -63,7 +61,8 @@ class FootLoadScratch(Signal):
     """What a tick computes on its way."""
 
     normal = Field(("n_leg_joints", "n_leg_joints"), text="J' J of a leg, damped")
-    torque = Field("n_leg_joints", unit="N m", text="torque of a leg that the ground gives")
+    needed = Field("n_joints", unit="N m", text="torques that the ground gives")
+    torque = Field("n_leg_joints", text="y")
 
 
 class FootLoadEstimator(Block):
@@ -171,8 +170,13 @@ class FootLoadEstimator(Block):
         period: float,
     ) -> None:
         first = terms.velocity.shape[0] - joints.torque.shape[0]
+        for k in range(joints.torque.shape[0]):
+            scratch.needed[k] = terms.nonlinear_effects[first + k] - joints.torque[k]
         for foot in range(load.force.shape[0]):
-            solve_leg(foot, terms, joints, constants, scratch, first)
+            solve_leg(
+                foot, terms.contact_jacobian, scratch.needed, constants.leg_joints[foot],
+                constants.foot_of_point, first, scratch.normal, scratch.torque,
+            )  # fmt: skip
             filter_forces(foot, terms, memory, constants, scratch.torque, first)
             find_centre(foot, terms, load, memory, constants)
             threshold = constants.least[0] if memory.loaded[foot] else constants.least[1]
@@ -186,39 +190,6 @@ class FootLoadEstimator(Block):
             find_touched(terms, switches, memory, constants.foot_of_point, params.still_time)
             leave_risen_points(terms, closed, memory, params.flat_height, contacts)
             add_loaded_points(terms, memory, constants.foot_of_point, params.flat_height, contacts)
-
-
-@kernel
-def solve_leg(
-    foot: int,
-    terms: DynamicsTerms,
-    joints: JointState,
-    constants: FootLoadConstants,
-    scratch: FootLoadScratch,
-    first: int,
-) -> None:
-    """Solve (J' J + damping) y = n - tau; ``scratch.torque`` becomes y. The forces are J y.
-
-    Args:
-        first: where the joints begin in the generalised velocity.
-    """
-    normal, torque, leg = scratch.normal, scratch.torque, constants.leg_joints[foot]
-    normal[:] = 0.0
-    torque[:] = 0.0
-    for i in range(leg.shape[0]):
-        normal[i, i] = _DAMPING
-        if leg[i] >= 0:
-            torque[i] = terms.nonlinear_effects[first + leg[i]] - joints.torque[leg[i]]
-    for point in range(constants.foot_of_point.shape[0]):
-        if constants.foot_of_point[point] != foot:
-            continue
-        for axis in range(3):
-            row = terms.contact_jacobian[point, axis]
-            for i in range(leg.shape[0]):
-                for j in range(leg.shape[0]):
-                    if leg[i] >= 0 and leg[j] >= 0:
-                        normal[i, j] += row[first + leg[i]] * row[first + leg[j]]
-    solve_positive(normal, torque)
 
 
 @kernel
@@ -236,10 +207,7 @@ def filter_forces(
         if constants.foot_of_point[point] != foot:
             continue
         for axis in range(3):
-            force = 0.0
-            for i in range(leg.shape[0]):
-                if leg[i] >= 0:
-                    force += terms.contact_jacobian[point, axis, first + leg[i]] * solution[i]
+            force = force_along(terms.contact_jacobian[point, axis], leg, solution, first)
             memory.force[point, axis] += constants.following * (force - memory.force[point, axis])
 
 

@@ -8,7 +8,8 @@ the ground follow from the robot:
 - motors are used to 85 %, and up to 92 % where the jump asks for much;
 - feet may hit the ground with speed, but the impulse has a high weight in the cost;
 - the torso's orientation and the forces have high weights, so that the robot squats no deeper than it must;
-- the last sixth of the thrust is done on the toes, which lengthens the legs by the foot;
+- the last sixth of the thrust is done on the toes, which lengthens the legs by the foot, by robots whose ankles
+  are strong enough;
 - until lift-off every contact point on the ground bears some load, so that the feet stay flat;
 - feet come down slowly, and more slowly still along the ground; from high up the toes touch down
   before the heels;
@@ -35,7 +36,14 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
-from .scaling import knee_limits, least_distance_to_limits, rounded, size_of, toe_name_token
+from .scaling import (
+    knee_limits,
+    least_distance_to_limits,
+    rounded,
+    size_of,
+    toe_name_token,
+    toe_push,
+)
 from .sequence import Hop, PhaseSpec
 
 EFFORT, MOST_EFFORT = 0.85, 0.92
@@ -59,6 +67,10 @@ step of 3 cm made G1 leave the ground on bent knees, after a squat in which its 
 KNEE_SAG = 0.04
 """Of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are
 50 mrad off."""
+TOE_PUSH = 2.5
+"""Times the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8. At its
+margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on straight
+knees and swung its torso by 50 degrees, and fell."""
 LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
@@ -191,7 +203,7 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
     if task.take_off or task.touchdown:
         return
-    toes = toe_name_token(robot)
+    toes = _toes(robot)
     if toes and task.thrust_time is not None and not (rows and contact is None):
         whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
         late = min(rounded(TOES * slow), 0.5 * whole)
@@ -212,6 +224,12 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
             landing = _landing(landing[0].time, soft, toes)
             why += f"; they come down {1000 * soft:.0f} ms after them, because flat feet would be too fast"
         yield Choice("phases", (*spans, PhaseSpec(phase="flight"), *landing), why)
+
+
+def _toes(robot: RobotDescription) -> str:
+    """What the names of the toes of a robot have in common that can thrust with them; empty for others."""
+    token = toe_name_token(robot)
+    return token if token and toe_push(robot) >= TOE_PUSH else ""
 
 
 def _thrust(whole: float, late: float, toes: str) -> tuple[PhaseSpec, PhaseSpec]:
@@ -288,7 +306,7 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
             "margins.load", share, "it does not squat so fast that its feet lose the ground"
         )
     rise = min(_rise(hop) for hop in hops)
-    low = 0.0 < rise < LOW * size_of(robot).height and toe_name_token(robot)
+    low = 0.0 < rise < LOW * size_of(robot).height and _toes(robot)
     if "lift_off_speed" not in said and low and all(hop.rise for hop in hops):
         speed = rounded(math.sqrt(2.0 * GRAVITY * FLOWN * rise))
         yield Choice(
@@ -301,9 +319,15 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
     yield from _slow_feet(task, robot, said)
     fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
-    if "step" not in said and any(hop.landing_height for hop in hops):
-        gap = rounded(STEP + STEP_HEIGHT * max(fall, onto) + knee_sag(robot))
-        yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
+    at_a_step = any(hop.landing_height for hop in hops)
+    if "step" not in said and (at_a_step or knee_sag(robot)):
+        edge = STEP + STEP_HEIGHT * max(fall, onto) if at_a_step else 0.0
+        why = (
+            "a disturbed robot must not touch the step"
+            if at_a_step
+            else "knees hang lower than planned"
+        )
+        yield Choice("margins.step", rounded(edge + knee_sag(robot)), why)
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
         yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
@@ -346,7 +370,7 @@ def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
     fall = drop + _rise(hop) / size.height
     bare = "margins" in task.model_fields_set and task.margins is None
     other = bare or len(task.hops()) > 1 or hop.distance_y or hop.twist
-    if other or not toe_name_token(robot) or fall <= FALL or drop < DROP:
+    if other or not _toes(robot) or fall <= FALL or drop < DROP:
         return None
     return next((rounded(speed * size.slow) for most, speed in TOES_SPEEDS if fall <= most), None)
 

@@ -22,7 +22,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
-from ...robots.kinematics import link_poses
+from ...robots.kinematics import LinkPoses, link_poses
 from ...robots.limb import chain_to
 from ...runtime.language.parameters import Parameters
 
@@ -72,6 +72,8 @@ SAME_PLACE = 0.01
 """Contact points of a foot closer together than this [m], along it, are no heel and toe."""
 LEAST_CHANGE = 0.02
 """m for each rad; what bends a leg by less is no knee."""
+LEAST_LOAD = 1e-6
+"""Motors that a load on the toes takes a smaller share of their torque of do not carry it."""
 PART_OF_STANDING = 0.8
 """Where a robot stands on nearly straight legs, this share of how they are bent then is asked for."""
 
@@ -92,6 +94,29 @@ def toe_name_token(robot: RobotDescription) -> str:
         if all(word in name for name in front) and not any(word in name for name in others):
             return word
     return ""
+
+
+@per_robot
+def toe_push(robot: RobotDescription) -> float:
+    """How many times its weight a robot can bear on its toes: what the joints behind its knees can, each with all of
+    its motors' torque, as the robot stands. Infinite where no such joint carries the toes."""
+    toes = [c for c in robot.contacts if toe_name_token(robot) in c.name.split("_")]
+    poses, torque = _standing_poses(robot), np.zeros(len(robot.joints))
+    for foot in robot.feet:
+        knee, here = _knee(robot, foot.link, foot.sole), [c for c in toes if c.foot == foot.name]
+        chain = chain_to(robot, foot.link)
+        place, turn = poses.of(foot.link)
+        for k in chain[chain.index(knee[0]) + 1 :] if knee else ():
+            origin, rotation = poses.of(robot.joints[k].child)
+            axis = product(rotation[0], np.array(robot.joints[k].axis))
+            for contact in here:
+                arm = place[0] + product(turn[0], np.array(contact.position)) - origin[0]
+                weight = np.array([0.0, 0.0, robot.weight / len(toes)])
+                if robot.joints[k].kind == "hinge":
+                    torque[k] += float(product(axis, np.cross(arm, weight)))
+    motors = np.abs(product(robot.torque_to_motor, torque))
+    loaded = motors > LEAST_LOAD * robot.motors.peak_torque
+    return float(min((robot.motors.peak_torque[loaded] / motors[loaded]), default=np.inf))
 
 
 @per_robot
@@ -175,11 +200,7 @@ DIGITS = 2
 def standing_height(robot: RobotDescription) -> float:
     """How high the centre of mass is above the lowest contact point as the robot stands [m], with
     the base upright."""
-    angles = robot.standing_position.copy()
-    for k, joint in enumerate(robot.joints):
-        angles[k] = robot.held.get(joint.name, angles[k])
-    upright = np.array([[0.0, 0.0, 0.0, 1.0]])
-    poses = link_poses(robot, np.zeros((1, 3)), upright, angles[None])
+    poses = _standing_poses(robot)
 
     def height(link: str, place: Any) -> float:
         position, rotation = poses.of(link)
@@ -188,6 +209,15 @@ def standing_height(robot: RobotDescription) -> float:
     com = sum(link.mass * height(link.name, link.com) for link in robot.links) / robot.total_mass
     link_of = {foot.name: foot.link for foot in robot.feet}
     return com - min(height(link_of[c.foot], c.position) for c in robot.contacts)
+
+
+def _standing_poses(robot: RobotDescription) -> LinkPoses:
+    """Of the robot as it stands, with the base upright at the origin."""
+    angles = robot.standing_position.copy()
+    for k, joint in enumerate(robot.joints):
+        angles[k] = robot.held.get(joint.name, angles[k])
+    upright = np.array([[0.0, 0.0, 0.0, 1.0]])
+    return link_poses(robot, np.zeros((1, 3)), upright, angles[None])
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 from ...files.problems import listing
 from ..validation import RobotError, RobotFault
 from ..validation.faults import number
+from .urdf_words import misspelt, wrong_inertia
 
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
@@ -129,6 +130,15 @@ def check_urdf(file: XmlFile) -> None:
     for name in dict.fromkeys(links):
         if links.count(name) > 1:
             add("link", name, f"link {name!r} is there {links.count(name)} times", "each name once")
+    for part in (*file.root.findall("link"), *file.root.findall("joint")):
+        name = part.get("name", "")
+        for found, meant in misspelt(part):
+            what = f"{part.tag} {name} has {found}, which a URDF does not know"
+            add(part.tag, name, what, meant, found)
+        wrong = wrong_inertia(part)
+        if wrong:
+            add("link", name, f"link {name} has a mass or an inertia that no body has",
+                "finite numbers, none negative but ixy, ixz and iyz", wrong)  # fmt: skip
     carried: dict[str, str] = {}
     joints = [joint.get("name", "") for joint in file.root.findall("joint")]
     for name in dict.fromkeys(joints):

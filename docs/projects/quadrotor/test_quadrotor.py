@@ -1,11 +1,11 @@
 """``python -m pytest`` in this folder."""
 
 import math
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from geometric_control import FlightMode, GeometricController, allocate, wrenches
 from mission import FlightPhase, Mission
 from observer import Observer
@@ -13,12 +13,14 @@ from score import FlightScore
 
 import aloft
 from aloft.robots.description import find_robot
+from aloft.robots.importing.urdf_text import find_file
 from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases
 
 HERE = Path(__file__).parent
 ROBOT = find_robot("quadrotor.xml", HERE)
+URDF = yaml.safe_load((HERE / "iris.yaml").read_text())["file"]
 WEIGHT = 9.81 * ROBOT.total_mass
 MATRIX = wrenches(ROBOT)
 MOST = np.full(4, 7.0)
@@ -136,6 +138,6 @@ def test_the_flight_succeeds_and_the_score_sees_a_flip_that_is_none():
     assert not lame.success
 
 
-@pytest.mark.skipif(find_spec("cmeel") is None, reason="needs example-robot-data")
+@pytest.mark.skipif(find_file(URDF, HERE) is None, reason="pip install example-robot-data")
 def test_another_quadrotor_flies_the_same_graph():
     assert aloft.load(HERE / "iris_flight.yaml").run(log=False).success

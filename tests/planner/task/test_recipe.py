@@ -150,14 +150,24 @@ def test_feet_clear_a_step_lower_than_their_share_by_its_height_alone() -> None:
     assert clearance("bruce", 0.02) == clearance("bruce", 0.08) < 0.04
 
 
+def test_heels_rise_first_where_the_ankles_can_thrust_on_the_toes() -> None:
+    def contacts(robot: str) -> list[str]:
+        task = make_task({"name": "a", "rise": 0.05}).resolved(find_robot(robot))
+        return [span.contacts for span in task.spans() if span.phase == "thrust"]
+
+    assert contacts("bruce") == contacts("talos") == ["all", "toe"]
+    assert contacts("g1") == ["all"]
+
+
 def test_a_jump_that_is_low_beside_the_robot_leaves_the_ground_with_a_least_speed() -> None:
     def least(robot: str, rise: float) -> float | None:
         margins = make_task({"name": "a", "rise": rise}).resolved(find_robot(robot)).margins
         assert margins is not None
         return margins.lift_off_speed
 
-    assert least("g1", 0.05) == pytest.approx(math.sqrt(2.0 * 9.81 * 0.75 * 0.05), abs=0.005)
-    assert least("g1", 0.1) is None
+    assert least("talos", 0.05) == pytest.approx(math.sqrt(2.0 * 9.81 * 0.75 * 0.05), abs=0.005)
+    assert least("talos", 0.1) is None
+    assert least("g1", 0.05) is None  # it does not stand up onto its toes
     assert least("bruce", 0.05) is None  # he is half as high
     assert least("bruce", 0.03) is not None
     assert least("go2", 0.02) is None  # balls have no toes to stand up onto
@@ -215,6 +225,10 @@ def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:
     for robot in (soles, balls):
         task = make_task({"name": "a", "rise": 0.12, "distance_x": 0.3, "landing_height": 0.05})
         chosen[robot.name] = {c.parameter: c.value for c in choices(task, robot)}
+        level = {
+            c.parameter: c.value for c in choices(make_task({"name": "b", "rise": 0.1}), robot)
+        }
+        assert ("margins.step" in level) is (robot is balls), "on level ground it is for the knees"
     slow = size_of(balls).slow
     assert chosen["bruce"]["margins.touchdown_slide"] == pytest.approx(0.6, rel=0.02)
     assert chosen[balls.name]["margins.touchdown_slide"] == pytest.approx(1.2 * slow, rel=0.02)

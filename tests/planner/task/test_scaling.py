@@ -19,6 +19,7 @@ from aloft.planner.task.scaling import (
     scaled_defaults,
     standing_height,
     toe_name_token,
+    toe_push,
 )
 from aloft.planner.task.task import make_task
 from aloft.robots.description import RobotDescription, find_robot
@@ -100,6 +101,13 @@ def test_only_the_last_results_are_kept() -> None:
 def test_toes_are_the_front_points_of_soles_by_their_common_word() -> None:
     assert toe_name_token(BRUCE) == "toe"
     assert toe_name_token(quadruped()) == "", "feet of one point are no soles"
+
+
+def test_what_toes_bear_follows_from_the_ankles() -> None:
+    ankles = [k for k, joint in enumerate(BRUCE.joints) if joint.name.endswith("ankle")]
+    lever = max(contact.position[0] for contact in BRUCE.contacts)
+    both = float(BRUCE.motors.peak_torque[ankles].sum())
+    assert toe_push(BRUCE) == pytest.approx(both / (lever * BRUCE.weight), rel=0.02)
 
 
 def test_front_points_that_have_no_word_of_their_own_are_no_toes() -> None:

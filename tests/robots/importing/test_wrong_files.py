@@ -23,6 +23,13 @@ UNKNOWN_LINK = """<robot name="x">
 <link name="a"/><link name="b"/>
 <joint name="j" type="hinge"><parent link="a"/><child link="c"/><axis xyz="0 0 0"/></joint></robot>"""
 TWO_ROOTS = '<robot name="x">\n<link name="a"/>\n<link name="b"/>\n</robot>'
+MISSPELT = """<robot name="x">
+<gazebo/><ros2_control/>
+<link name="a"><inertila/><self_filter/></link>
+<link name="b"><inertial><mass value="-2"/>
+<inertia ixx="nan" ixy="0" ixz="0" iyy="1" iyz="0" izz="-1"/></inertial></link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/>
+<limit loewr="-1" upper="1" effort="1" velocity="1" gear_velocity="3"/></joint></robot>"""
 RING = """<robot name="x"><link name="a"/><link name="b"/>
 <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
 <joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint></robot>"""
@@ -70,6 +77,17 @@ MODELS = [
         "    expected   one link that no joint carries",
         "    found      a, b",
     ]),
+    ("x.urdf", MISSPELT, [
+        "x.urdf:3:1: link a has <inertila>, which a URDF does not know",
+        "    expected   <inertial>",
+        "    found      <inertila>",
+        "x.urdf:4:1: link b has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      ixx nan, izz -1, mass -2",
+        "x.urdf:6:1: joint j has loewr= in <limit>, which a URDF does not know",
+        "    expected   lower=",
+        "    found      loewr= in <limit>",
+    ]),
     ("x.urdf", RING, [
         "x.urdf:1:17: the links make no single tree: 0 have no parent",
         "    expected   one link that no joint carries",
@@ -84,18 +102,15 @@ MODELS = [
         "    found      lower 1, upper -1",
     ]),
     ("x.urdf", ARM.replace('<mass value="1"/>', '<mass value="-1"/>'), [
-        "x.urdf: link ground has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
-        "x.urdf:8:3: link upper has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
-        "x.urdf:15:3: link lower has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
+        "x.urdf:3:3: link base has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
+        "x.urdf:8:3: link upper has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
+        "x.urdf:15:3: link lower has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
     ]),
     ("x.sdf", "<sdf/>", [
         "x.sdf: files in SDF are not read",

@@ -1,0 +1,588 @@
+"""Compares a legged robot's sensors and motors with each other, and warns of those that disagree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import IntEnum
+
+import numpy as np
+
+from ...mathematics.constants import GRAVITY
+from ...mathematics.kernel import kernel
+from ...mathematics.linear_algebra import product, solve_positive
+from ...robots.description import RobotDescription
+from ...robots.limb import leg_joints
+from ...runtime.language.block import Block, Clock, Input, Metric, State
+from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.signals import Field, Signal
+from ..signals import (
+    ContactState,
+    ContactSwitches,
+    DynamicsTerms,
+    FootLoad,
+    ImuReading,
+    JointCommand,
+    JointState,
+    Phase,
+    PhaseState,
+)
+from .leg_forces import force_along, solve_leg
+
+_SLIGHT = 0.05
+"""The share of a joint's peak torque that is added to what was asked of it."""
+_SPREAD = 0.05
+"""Points whose three moments of inertia, as shares of half their sum, have a smaller product are in a line, or nearly."""
+
+
+class Suspect(IntEnum):
+    """What disagrees with all the rest."""
+
+    NONE = 0
+    GYROSCOPE = 1
+    """It turns otherwise than the base over the feet that stand."""
+    ACCELEROMETER = 2
+    """Its direction is not that of the force with which the legs push."""
+    TORQUE = 3
+    """A joint's torque is off its command."""
+    ENCODER = 4
+    """A joint's angle changes otherwise than its speed says."""
+    SWITCHES = 5
+    """None is closed under feet that carry the robot."""
+
+
+class FaultDetectorParams(Parameters):
+    """The parameters of ``FaultDetector``."""
+
+    window: float = parameter(
+        0.2, unit="s", gt=0.0, text="time constant in which a disagreement is forgotten"
+    )
+    force_window: float = parameter(0.4, unit="s", gt=0.0, text="the same of forces")
+    lateness: float = parameter(
+        0.004, unit="s", ge=0.0, text="by which one measurement may be later than the other"
+    )
+    gyroscope_error: float = parameter(
+        0.08, unit="rad/s", ge=0.0, text="its largest steady error; zero: not judged"
+    )
+    acceleration_error: float = parameter(
+        0.05, ge=0.0, text="largest error of the accelerometer across the weight, in g; zero: not judged",
+    )  # fmt: skip
+    torque_error: float = parameter(
+        0.15,
+        ge=0.0,
+        text="share by which a joint's torque may be off its command; zero: not judged",
+    )
+    encoder_error: float = parameter(
+        0.1, unit="rad/s", ge=0.0,
+        text="largest steady difference of an angle's change and the speed; zero: not judged",
+    )  # fmt: skip
+    open_time: float = parameter(
+        0.15, unit="s", ge=0.0,
+        text="how long all switches may be open under load; zero: not judged",
+    )  # fmt: skip
+    open_load: float = parameter(
+        0.5, gt=0.0, text="from which load on the feet on, in weights of the robot"
+    )
+    slip_speed: float = parameter(
+        0.1, unit="m/s", gt=0.0, text="of points that stand against each other; faster ones slide"
+    )
+    settle_time: float = parameter(
+        0.03, unit="s", ge=0.0, text="for which points have stood before they count"
+    )
+    rest_speed: float = parameter(
+        1.0, unit="rad/s", gt=0.0, text="mean speed of joints below which forces are those of rest"
+    )
+
+
+class FaultDetectorState(Signal):
+    """The state of ``FaultDetector``."""
+
+    suspect = Field(dtype="int64", values=Suspect, text="the first that was found")
+    tick = Field(dtype="int64", text="when")
+    place = Field(dtype="int64", text="its axis or joint")
+    value = Field(text="by how much it disagrees")
+    share = Field(6, text="largest disagreement so far of each suspect, as a share of its limit")
+    started = Field(dtype="bool", text="whether there was a last tick")
+    standing = Field(dtype="int64", text="ticks in a row in which the points stood")
+    turn = Field(3, unit="rad", text="turn by the gyroscope less turn over the feet")
+    rate = Field(3, unit="rad/s", text="the gyroscope's mean")
+    slip = Field("n_joints", unit="rad", text="change of the angle less integral of the speed")
+    speed = Field("n_joints", unit="rad/s", text="mean speed of each joint")
+    position = Field("n_joints", unit="rad", text="angles of the last tick")
+    expected = Field("n_joints", unit="N m", text="torques that the last command asks for")
+    level = Field("n_joints", unit="N m", text="their mean")
+    asked = Field("n_joints", unit="N m", text="the mean of their magnitudes")
+    missing = Field("n_joints", unit="N m", text="mean of measured torques less expected ones")
+    lacking = Field(3, unit="N", frame="body", text="mean force that the legs lack")
+    open = Field(dtype="int64", text="ticks in a row with load and no switch closed")
+
+
+class FaultDetectorConstants(Signal):
+    """What the robot's description and the parameters say."""
+
+    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
+    leg_joints = Field(
+        ("n_feet", "n_leg_joints"), dtype="int64", text="joints of each foot's leg, then -1"
+    )
+    slight = Field("n_joints", unit="N m", text="torques that are added to those asked for")
+    weight = Field(unit="N", text="of the robot")
+    fading = Field(2, text="share of a mean that goes in a tick: of all, of forces")
+    settling = Field(dtype="int64", text="ticks for which points have stood before they count")
+    open_ticks = Field(dtype="int64", text="ticks with load and open switches that are no fault")
+
+
+class FaultDetectorScratch(Signal):
+    """What a tick computes on its way."""
+
+    stands = Field("n_contacts", dtype="bool", text="points that stand")
+    arm = Field(("n_contacts", 3), unit="m", text="points from their mean, world axes")
+    moved = Field(("n_contacts", 3), unit="m/s", text="their velocities against the base's")
+    mean = Field((2, 3), text="of the points and their velocities")
+    inertia = Field((3, 3), unit="m^2", text="of the points, as unit masses, about their mean")
+    turning = Field(
+        (2, 3), unit="rad/s", text="the base's rate over its feet, in world and base axes"
+    )
+    force = Field(3, unit="N", text="force of a contact point, world axes")
+    needed = Field("n_joints", unit="N m", text="torques that the ground gives")
+    normal = Field(("n_leg_joints", "n_leg_joints"), text="J' J of a leg, damped")
+    solution = Field("n_leg_joints", text="y of a leg")
+    lacking = Field(3, unit="N", frame="body", text="force that the legs lack now")
+
+
+class FaultDetector(Block):
+    """Warns of a sensor or motor that disagrees with the others, from what a real robot measures.
+
+    Each check is a law that two measurements must agree with. A difference d is summed up and forgotten with
+    the time constant ``window`` T, x' = d - x / T, so that a steady one ends at T d. It may reach T times the check's
+    ``..._error``, and in addition what a measurement that is ``lateness`` late gives: this times the change of
+    what is measured, against its mean over T.
+
+    * **Gyroscope.** Points that stand do not move. From their velocities u_i against the base, J_i q', follows the
+      base's rate over its feet as that of a rigid body, -I^-1 sum r_i x u_i, with r_i from the points' mean and I
+      their inertia as unit masses. It is the gyroscope's. Points stand that are in contact, have their
+      switch closed, and may push by the phase, for ``settle_time``; three or more that are not in a line, no
+      faster against each other than ``slip_speed``.
+    * **Accelerometer.** At rest, with the measured specific force a of the base, the base rows b and joint rows j of
+      the equations of motion are M_b a = J_b' f and M_j a = tau + J_j' f. The legs' torques tau give the
+      forces f (as in ``FootLoadEstimator``), and these must push along a. Neither the estimated attitude nor the ground's slope is in
+      it. Judged is what is lacking across the weight, along the base's x and y, over ``force_window``. A steady
+      push from outside, or torques that are wrong, look the same.
+    * **Torque.** A joint's measured torque is what its command asked for, within ``torque_error`` of it and of 5 %
+      of its peak. Before lift-off at any time, afterwards at rest: hard landings and gains in flight make good
+      drives differ by as much.
+    * **Encoder.** The change of a joint's angle is the integral of its speed. A slip that both show is not found.
+    * **Switches.** By the legs' torques the feet carry more than ``open_load`` weights, and no switch is closed
+      for ``open_time``. One foot across an edge may stand so, and does not count.
+
+    It only warns, for a robot often survives what is found, and damping would make it fall. The first suspect is kept in the state, in
+    the metrics ``suspect`` and ``suspect_time_s`` and in the result's warnings. ``SafetyMonitor`` judges what must end a run.
+    ``largest_disagreement`` says how near a run came to a warning, as a share of the limit.
+
+    Not found are motors whose torque constant is less than the drive believes, for their current is as commanded; what begins in the
+    air before the robot stands again; and sensors that are late while nothing moves.
+    """
+
+    Params = FaultDetectorParams
+    Constants = FaultDetectorConstants
+    Scratch = FaultDetectorScratch
+    needs = ("floating base", "feet")
+    params: FaultDetectorParams
+    constants: FaultDetectorConstants
+    imu = Input(ImuReading, text="the IMU's readings")
+    joints = Input(JointState, text="the measured joints")
+    terms = Input(DynamicsTerms, text="the model's terms")
+    load = Input(FootLoad, text="the load on each foot, by the legs' torques")
+    contacts = Input(ContactState, text="which points are in contact")
+    switches = Input(ContactSwitches, text="the raw switches")
+    phase = Input(PhaseState, text="the phase the robot is in")
+    command = Input(JointCommand, text="what the drives get")
+    state = State(FaultDetectorState, text="sums, and the first suspect")
+
+    @classmethod
+    def state_dimensions(
+        cls, params: Parameters, robot: RobotDescription | None
+    ) -> Mapping[str, int]:
+        """The number of joints of the longest leg."""
+        assert robot is not None
+        return {"n_leg_joints": leg_joints(robot).shape[1]}
+
+    def setup(self) -> None:
+        robot, constants = self.robot, self.constants
+        constants.foot_of_point[:] = robot.foot_of_contact()
+        constants.leg_joints[:] = leg_joints(robot)
+        peak = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
+        constants.slight[:] = _SLIGHT * peak
+        constants.weight = robot.weight
+
+    def prepare(self) -> None:
+        p, constants, period = self.params, self.constants, self.period
+        constants.fading[:] = min(1.0, period / p.window), min(1.0, period / p.force_window)
+        constants.settling = round(p.settle_time / period)
+        constants.open_ticks = round(p.open_time / period)
+
+    @kernel
+    @staticmethod
+    def step(
+        imu: ImuReading,
+        joints: JointState,
+        terms: DynamicsTerms,
+        load: FootLoad,
+        contacts: ContactState,
+        switches: ContactSwitches,
+        phase: PhaseState,
+        command: JointCommand,
+        state: FaultDetectorState,
+        params: FaultDetectorParams,
+        constants: FaultDetectorConstants,
+        scratch: FaultDetectorScratch,
+        clock: Clock,
+        period: float,
+    ) -> bool:
+        before = state.suspect
+        compare_encoders(joints, state, params, constants, period)
+        find_standing(contacts, switches, phase, scratch)
+        rigid = turn_over_feet(joints, terms, params.slip_speed, scratch)
+        state.standing = state.standing + 1 if rigid else 0
+        stands = state.standing > constants.settling
+        compare_gyroscope(stands, imu, state, params, constants, scratch, period)
+        rests = stands and is_slow(state, params.rest_speed)
+        on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
+        compare_torques(rests or on_the_ground, joints, state, params, constants)
+        expect_torques(command, joints, state, constants)
+        if rests:
+            weigh(imu, joints, terms, constants, scratch)
+            compare_forces(state, params, constants, scratch)
+        else:
+            state.lacking[:] = 0.0
+        compare_switches(load, switches, state, params, constants)
+        state.started = True
+        begins: bool = before == Suspect.NONE and state.suspect != Suspect.NONE
+        if begins:
+            state.tick = clock.tick
+        return begins
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """The first suspect, and how near the run came to one."""
+        state = self.state
+        result: dict[str, Metric] = {"largest_disagreement": float(state.share.max())}
+        if state.suspect != Suspect.NONE:
+            result["suspect"] = Suspect(int(state.suspect)).name.lower()
+            result["suspect_time_s"] = self._time()
+        return result
+
+    def warnings(self) -> Sequence[str]:
+        """The first suspect, in words."""
+        if self.state.suspect == Suspect.NONE:
+            return ()
+        return (f"from {self._time():g} s on: {self._reason()}",)
+
+    def _time(self) -> float:
+        return int(self.state.tick) * self.context.clock.base_period
+
+    def _reason(self) -> str:
+        """What is suspected, by its measured value and its limit."""
+        suspect, value, p = Suspect(int(self.state.suspect)), float(self.state.value), self.params
+        place, joints = int(self.state.place), self.robot.joints
+        if suspect == Suspect.GYROSCOPE:
+            return (
+                f"the gyroscope's axis {'xyz'[place]} turns by {value / p.window:+.2f} rad/s otherwise than the base over the feet that "
+                f"stand; gyroscope_error is {p.gyroscope_error:g} rad/s"
+            )
+        if suspect == Suspect.ACCELEROMETER:
+            off = value / self.constants.weight * GRAVITY
+            return (
+                f"the accelerometer's axis {'xyz'[place]} is {off:+.2f} m/s^2 off the force of the legs, or something pushes the robot "
+                f"steadily; acceleration_error is {p.acceleration_error * GRAVITY:.2f} m/s^2"
+            )
+        if suspect == Suspect.TORQUE:
+            return (
+                f"joint {joints[place].name}: its torque is {value:+.2f} N m off its command; torque_error is "
+                f"{100.0 * p.torque_error:g} %"
+            )
+        if suspect == Suspect.ENCODER:
+            return (
+                f"joint {joints[place].name}: its angle has changed by {1e3 * value:+.0f} mrad otherwise than its speed says; "
+                f"encoder_error is {p.encoder_error:g} rad/s"
+            )
+        return (
+            f"no foot switch has been closed for {1e3 * p.open_time:g} ms under feet that carry more than "
+            f"{100.0 * p.open_load:g} % of the weight"
+        )
+
+
+@kernel
+def judge(state: FaultDetectorState, suspect: int, place: int, value: float, limit: float) -> None:
+    """Note how far a disagreement is of its limit, and the first that is beyond."""
+    if not limit > 0.0:
+        return
+    share = abs(value) / limit
+    state.share[suspect] = max(state.share[suspect], share)
+    if share > 1.0 and state.suspect == Suspect.NONE:
+        state.suspect = suspect
+        state.place = place
+        state.value = value
+
+
+@kernel
+def allowance(error: float, change: float, params: FaultDetectorParams) -> float:
+    """What a sum may reach where the measured value is ``change`` off its mean; zero: not judged."""
+    return error * params.window + params.lateness * abs(change) if error > 0.0 else 0.0
+
+
+# The joints
+
+
+@kernel
+def compare_encoders(
+    joints: JointState,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+    period: float,
+) -> None:
+    """Compare the change of every angle with its speed."""
+    fading = constants.fading[0]
+    for k in range(joints.position.shape[0]):
+        angle, speed = joints.position[k], joints.velocity[k]
+        if state.started:
+            state.slip[k] += angle - state.position[k] - period * speed - fading * state.slip[k]
+            state.speed[k] += fading * (speed - state.speed[k])
+            limit = allowance(params.encoder_error, speed - state.speed[k], params)
+            judge(state, Suspect.ENCODER, k, state.slip[k], limit)
+        else:
+            state.speed[k] = speed
+        state.position[k] = angle
+
+
+@kernel
+def compare_torques(
+    judged: bool,
+    joints: JointState,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+) -> None:
+    """Compare every measured torque with what the command before asks for; begin anew where it is not ``judged``."""
+    fading, late = constants.fading[0], params.lateness / params.window
+    for k in range(joints.torque.shape[0]):
+        expected = state.expected[k]
+        state.level[k] += fading * (expected - state.level[k])
+        state.asked[k] += fading * (abs(expected) - state.asked[k])
+        if judged and state.started:
+            state.missing[k] += fading * (joints.torque[k] - expected - state.missing[k])
+            limit = params.torque_error * (state.asked[k] + constants.slight[k])
+            if limit > 0.0:
+                limit += late * abs(expected - state.level[k])
+            judge(state, Suspect.TORQUE, k, state.missing[k], limit)
+        else:
+            state.missing[k] = 0.0
+
+
+@kernel
+def expect_torques(
+    command: JointCommand,
+    joints: JointState,
+    state: FaultDetectorState,
+    constants: FaultDetectorConstants,
+) -> None:
+    """The torques that a command asks for, no more than the motors have."""
+    for k in range(joints.torque.shape[0]):
+        torque = command.torque[k]
+        torque += command.stiffness[k] * (command.position[k] - joints.position[k])
+        torque += command.damping[k] * (command.velocity[k] - joints.velocity[k])
+        most = constants.slight[k] / _SLIGHT
+        state.expected[k] = min(max(torque, -most), most)
+
+
+# The base over its feet
+
+
+@kernel
+def find_standing(
+    contacts: ContactState,
+    switches: ContactSwitches,
+    phase: PhaseState,
+    scratch: FaultDetectorScratch,
+) -> None:
+    """The points that stand by contact, switch and phase."""
+    on_the_ground = phase.phase != Phase.FLIGHT and phase.phase != Phase.HANG
+    for point in range(scratch.stands.shape[0]):
+        touches = contacts.active[point] and switches.closed[point]
+        scratch.stands[point] = on_the_ground and touches and phase.stance[point]
+
+
+@kernel
+def turn_over_feet(
+    joints: JointState, terms: DynamicsTerms, slip_speed: float, scratch: FaultDetectorScratch
+) -> bool:
+    """The base's rate from the points that stand; whether there are enough, and do not slide."""
+    mean, arm, moved = scratch.mean, scratch.arm, scratch.moved
+    count, first = 0, terms.velocity.shape[0] - joints.velocity.shape[0]
+    mean[:] = 0.0
+    for point in range(arm.shape[0]):
+        if scratch.stands[point]:
+            count += 1
+            for axis in range(3):
+                speed = 0.0
+                for k in range(joints.velocity.shape[0]):
+                    speed += terms.contact_jacobian[point, axis, first + k] * joints.velocity[k]
+                moved[point, axis] = speed
+                arm[point, axis] = terms.contact_position[point, axis] - terms.base_position[axis]
+                mean[0, axis] += arm[point, axis]
+                mean[1, axis] += speed
+    if count < 3:
+        return False
+    mean[:] /= count
+    if not fit_rate(scratch):
+        return False
+    rate, off = scratch.turning[0], 0.0
+    for point in range(arm.shape[0]):
+        if scratch.stands[point]:
+            x, y, z = arm[point, 0], arm[point, 1], arm[point, 2]
+            u = moved[point, 0] + rate[1] * z - rate[2] * y
+            v = moved[point, 1] + rate[2] * x - rate[0] * z
+            w = moved[point, 2] + rate[0] * y - rate[1] * x
+            off += u * u + v * v + w * w
+    for axis in range(3):
+        total = 0.0
+        for k in range(3):
+            total += terms.base_rotation[k, axis] * rate[k]
+        scratch.turning[1, axis] = total
+    return off < count * slip_speed * slip_speed
+
+
+@kernel
+def fit_rate(scratch: FaultDetectorScratch) -> bool:
+    """Fit the rate of a rigid body to the points that stand; false where they are in a line.
+
+    Leaves ``arm`` and ``moved`` less their means.
+    """
+    mean, arm, moved, inertia = scratch.mean, scratch.arm, scratch.moved, scratch.inertia
+    rate = scratch.turning[0]
+    inertia[:] = 0.0
+    rate[:] = 0.0
+    for point in range(arm.shape[0]):
+        if scratch.stands[point]:
+            for axis in range(3):
+                arm[point, axis] -= mean[0, axis]
+                moved[point, axis] -= mean[1, axis]
+            x, y, z = arm[point, 0], arm[point, 1], arm[point, 2]
+            u, v, w = moved[point, 0], moved[point, 1], moved[point, 2]
+            inertia[0, 0] += y * y + z * z
+            inertia[1, 1] += x * x + z * z
+            inertia[2, 2] += x * x + y * y
+            inertia[1, 0] -= x * y
+            inertia[2, 0] -= x * z
+            inertia[2, 1] -= y * z
+            rate[0] -= y * w - z * v
+            rate[1] -= z * u - x * w
+            rate[2] -= x * v - y * u
+    a, b, c = inertia[0, 0], inertia[1, 1], inertia[2, 2]
+    d, e, f = inertia[1, 0], inertia[2, 0], inertia[2, 1]
+    inertia[0, 1], inertia[0, 2], inertia[1, 2] = d, e, f
+    half = 0.5 * (a + b + c)
+    determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)
+    if determinant < _SPREAD * half * half * half:
+        return False
+    solve_positive(inertia, rate)
+    return True
+
+
+@kernel
+def compare_gyroscope(
+    stands: bool,
+    imu: ImuReading,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+    scratch: FaultDetectorScratch,
+    period: float,
+) -> None:
+    """Compare the gyroscope with the base's rate over its feet, while these stand."""
+    fading, begins = constants.fading[0], state.standing == constants.settling + 1
+    for axis in range(3):
+        rate = imu.angular_velocity[axis]
+        state.turn[axis] -= fading * state.turn[axis]
+        state.rate[axis] = rate if begins else state.rate[axis] + fading * (rate - state.rate[axis])
+        if stands:
+            state.turn[axis] += period * (rate - scratch.turning[1, axis])
+            limit = allowance(params.gyroscope_error, rate - state.rate[axis], params)
+            judge(state, Suspect.GYROSCOPE, axis, state.turn[axis], limit)
+
+
+# The weight over the feet
+
+
+@kernel
+def is_slow(state: FaultDetectorState, rest_speed: float) -> bool:
+    """Whether no joint moves fast for long."""
+    slow = True
+    for k in range(state.speed.shape[0]):
+        slow = slow and abs(state.speed[k]) < rest_speed
+    return slow
+
+
+@kernel
+def weigh(
+    imu: ImuReading,
+    joints: JointState,
+    terms: DynamicsTerms,
+    constants: FaultDetectorConstants,
+    scratch: FaultDetectorScratch,
+) -> None:
+    """What the force on the base at rest lacks by the legs' torques: of M_b a - J_b' f the force, in the base's axes."""
+    mass, a, lacking, force = terms.mass_matrix, imu.specific_force, scratch.lacking, scratch.force
+    first = terms.velocity.shape[0] - joints.torque.shape[0]
+    for row in range(mass.shape[0]):
+        total = mass[row, 0] * a[0] + mass[row, 1] * a[1] + mass[row, 2] * a[2]
+        if row < 3:
+            lacking[row] = total
+        elif row >= first:
+            scratch.needed[row - first] = total - joints.torque[row - first]
+    for foot in range(constants.leg_joints.shape[0]):
+        leg = constants.leg_joints[foot]
+        solve_leg(
+            foot, terms.contact_jacobian, scratch.needed, leg, constants.foot_of_point, first,
+            scratch.normal, scratch.solution,
+        )  # fmt: skip
+        for point in range(constants.foot_of_point.shape[0]):
+            if constants.foot_of_point[point] == foot:
+                for axis in range(3):
+                    jacobian = terms.contact_jacobian[point, axis]
+                    force[axis] = force_along(jacobian, leg, scratch.solution, first)
+                for k in range(3):
+                    for axis in range(3):
+                        lacking[k] -= terms.contact_jacobian[point, axis, k] * force[axis]
+
+
+@kernel
+def compare_forces(
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+    scratch: FaultDetectorScratch,
+) -> None:
+    """Judge the force across the weight that the legs lack."""
+    for k in range(3):
+        state.lacking[k] += constants.fading[1] * (scratch.lacking[k] - state.lacking[k])
+    for axis in range(2):
+        limit = params.acceleration_error * constants.weight
+        judge(state, Suspect.ACCELEROMETER, axis, state.lacking[axis], limit)
+
+
+@kernel
+def compare_switches(
+    load: FootLoad,
+    switches: ContactSwitches,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+) -> None:
+    """Count the ticks in which the feet carry load and no switch is closed."""
+    carried, closed = 0.0, False
+    for foot in range(load.force.shape[0]):
+        carried += load.force[foot]
+    for point in range(switches.closed.shape[0]):
+        closed = closed or bool(switches.closed[point])
+    missing = not closed and carried > params.open_load * constants.weight
+    state.open = state.open + 1 if missing else 0
+    judge(state, Suspect.SWITCHES, 0, float(state.open), float(constants.open_ticks))

@@ -1,0 +1,204 @@
+"""Measurements that disagree: each law on exact statics and kinematics, with each sensor and motor at fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aloft.blocks.control.dynamics import Dynamics
+from aloft.blocks.estimation.fault_detector import FaultDetector, Suspect
+from aloft.blocks.signals import CommandMode, Phase
+from aloft.mathematics.constants import GRAVITY
+from aloft.robots.description import find_robot
+from aloft.runtime.testing import BlockBench
+
+
+class Standing:
+    """A robot that stands under its weight, and all that its sensors say of it."""
+
+    def __init__(self, name="bruce", tilt=0.0, **params):
+        self.robot = find_robot(name)
+        self.bench = BlockBench(FaultDetector, params, robot=self.robot)
+        dynamics = BlockBench(Dynamics, {}, robot=self.robot)
+        orientation = [0.0, np.sin(tilt / 2), 0.0, np.cos(tilt / 2)]
+        dynamics.set("base", position=[0, 0, 0.4], orientation=orientation)
+        dynamics.set("joints", position=self.robot.standing_position)
+        dynamics.step()
+        self.terms = {name: array.copy() for name, array in dynamics.get("terms")}
+        points, feet = len(self.robot.contacts), len(self.robot.feet)
+        jacobian = self.terms["contact_jacobian"].reshape(3 * points, -1)
+        self.jacobian = jacobian
+        # Forces on the points that carry the weight where it is.
+        balance = np.linalg.lstsq(
+            jacobian[:, :6].T, self.terms["nonlinear_effects"][:6], rcond=None
+        )
+        self.torque = self.terms["nonlinear_effects"][6:] - jacobian[:, 6:].T @ balance[0]
+        self.gravity = self.terms["base_rotation"].T @ [0, 0, GRAVITY]
+        self.bench.set("terms", **self.terms)
+        self.bench.set("load", force=np.full(feet, self.robot.weight / feet))
+        self.bench.set("contacts", active=True)
+        self.bench.set("switches", closed=True)
+        self.bench.set("phase", phase=Phase.STAND, stance=True)
+        self.bench.set("command", mode=CommandMode.ACTIVE, torque=self.torque)
+        self.bench.set("joints", position=self.robot.standing_position, torque=self.torque)
+        self.bench.set("imu", angular_velocity=0.0, specific_force=self.gravity)
+
+    def run(self, ticks=500):
+        """The first suspect, and after how many ticks."""
+        for tick in range(ticks):
+            self.bench.step()
+            if self.state.suspect != Suspect.NONE:
+                return Suspect(int(self.state.suspect)), tick
+        return Suspect.NONE, ticks
+
+    @property
+    def state(self):
+        return self.bench.get("state")
+
+    def joint(self, values, number, change):
+        changed = np.array(values, dtype=float)
+        changed[number] += change
+        return changed
+
+
+@pytest.mark.parametrize("name", ["bruce", "go2", "g1", "solo12"])
+def test_what_agrees_is_not_suspected_whatever_the_robot(name):
+    stand = Standing(name)
+    assert stand.run() == (Suspect.NONE, 500)
+    metrics = stand.bench.block.metrics()
+    assert "suspect" not in metrics and metrics["largest_disagreement"] < 0.1
+    assert not stand.bench.block.warnings()
+
+
+def test_a_biased_gyroscope_is_found_as_its_sum_reaches_the_limit():
+    stand = Standing()
+    stand.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
+    found, tick = stand.run()
+    # x' = 0.3 - x / T reaches 0.08 T, once the points have stood for settle_time
+    expected = 0.03 - 0.2 * np.log(1.0 - 0.08 / 0.3)
+    assert found == Suspect.GYROSCOPE and tick / 500 == pytest.approx(expected, abs=0.006)
+    assert stand.state.place == 1
+    (text,) = stand.bench.block.warnings()
+    assert "the gyroscope's axis y turns by +0.08 rad/s otherwise" in text
+    assert stand.bench.block.metrics()["suspect"] == "gyroscope"
+
+
+@pytest.mark.parametrize("name", ["bruce", "go2", "g1"])
+def test_a_base_that_turns_over_its_feet_agrees_with_its_gyroscope(name):
+    stand = Standing(name)
+    _, values, rows = np.linalg.svd(stand.jacobian)
+    rank = int((values > 1e-9 * values[0]).sum())
+    free = rows[rank:]
+    velocity = free.T @ free[:, 4]  # motions of the robot that leave all points where they are
+    velocity *= 2.0 / velocity[4]
+    stand.bench.set("joints", velocity=velocity[6:])
+    stand.bench.set("imu", angular_velocity=velocity[3:6])
+    position = np.array(stand.robot.standing_position)
+    for _ in range(200):
+        stand.bench.set("joints", position=position)
+        stand.bench.step()
+        position = position + velocity[6:] / 500
+    assert stand.state.share[Suspect.GYROSCOPE] < 1e-6
+    stand.bench.set("imu", angular_velocity=velocity[3:6] * 0.7)
+    assert stand.run()[0] in (Suspect.GYROSCOPE, Suspect.ENCODER)
+
+
+def test_feet_that_slide_or_are_in_a_line_tell_nothing():
+    stand = Standing()
+    stand.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
+    stand.bench.set("switches", closed=[True, False, True, False])  # the toes, in a line
+    assert stand.run(200)[0] == Suspect.NONE
+    stand.bench.set("switches", closed=True)
+    names = [joint.name for joint in stand.robot.joints]
+    stand.bench.set(
+        "joints", velocity=stand.joint(np.zeros(10), names.index("left_hip_pitch"), 2.0)
+    )
+    stand.bench.step()
+    assert stand.state.standing == 0
+
+
+@pytest.mark.parametrize("tilt", [-0.1, 0.0, 0.1])
+def test_a_biased_accelerometer_is_found_on_a_slope_too(tilt):
+    assert Standing(tilt=tilt).run()[0] == Suspect.NONE
+    stand = Standing(tilt=tilt)
+    stand.bench.set("imu", specific_force=[stand.gravity[0] + 1.0, *stand.gravity[1:]])
+    found, tick = stand.run()
+    assert found == Suspect.ACCELEROMETER and stand.state.place == 0 and 0.15 < tick / 500 < 0.6
+    assert "+0.49 m/s^2 off the force of the legs" in stand.bench.block.warnings()[0]
+
+
+def test_a_weak_motor_is_found():
+    stand = Standing()
+    knee = [joint.name for joint in stand.robot.joints].index("left_knee")
+    stand.bench.set("joints", torque=stand.joint(stand.torque, knee, -0.3 * stand.torque[knee]))
+    found, tick = stand.run()
+    assert found == Suspect.TORQUE and stand.state.place == knee and tick / 500 < 0.5
+    assert "joint left_knee: its torque is" in stand.bench.block.warnings()[0]
+
+
+def test_torques_in_flight_are_not_judged():
+    stand = Standing()
+    stand.bench.set("phase", phase=Phase.FLIGHT, stance=False)
+    stand.bench.set("joints", torque=0.0)
+    assert stand.run()[0] == Suspect.NONE
+
+
+def test_an_encoder_that_slips_is_found_at_once_and_a_slow_one_too():
+    stand = Standing()
+    stand.run(10)
+    position = stand.robot.standing_position
+    stand.bench.set("joints", position=stand.joint(position, 3, 0.05))
+    assert stand.run() == (Suspect.ENCODER, 0) and stand.state.place == 3
+    stand = Standing()
+    for tick in range(200):
+        stand.bench.set("joints", position=stand.joint(position, 3, 0.2 * tick / 500))
+        if stand.run(1)[0] != Suspect.NONE:
+            break
+    assert tick / 500 == pytest.approx(0.2 * np.log(2.0), abs=0.01)
+
+
+def test_a_joint_that_moves_as_its_late_speed_says_is_not_suspected():
+    stand, position = Standing(), np.array(find_robot("bruce").standing_position)
+    for tick in range(300):
+        time, late = tick / 500, tick / 500 - 0.003
+        angle = 0.5 * (1.0 - np.cos(20.0 * time))
+        speed = 10.0 * np.sin(20.0 * max(late, 0.0))
+        stand.bench.set("joints", position=stand.joint(position, 3, angle))
+        stand.bench.set("joints", velocity=stand.joint(np.zeros(10), 3, speed))
+        stand.bench.step()
+    assert 0.1 < stand.state.share[Suspect.ENCODER] < 1.0
+
+
+def test_switches_that_all_stay_open_under_load_are_found():
+    stand = Standing()
+    stand.bench.set("switches", closed=False)
+    assert stand.run() == (Suspect.SWITCHES, 75)
+    assert "no foot switch has been closed for 150 ms" in stand.bench.block.warnings()[0]
+    stand = Standing()
+    stand.bench.set("switches", closed=[True, False, False, False])
+    assert stand.run()[0] == Suspect.NONE
+
+
+def test_a_limit_of_zero_is_not_judged():
+    stand = Standing(
+        gyroscope_error=0.0,
+        acceleration_error=0.0,
+        torque_error=0.0,
+        encoder_error=0.0,
+        open_time=0.0,
+    )
+    stand.run(5)
+    stand.bench.set("imu", angular_velocity=1.0, specific_force=0.0)
+    stand.bench.set("joints", position=1.0, torque=0.0)
+    stand.bench.set("switches", closed=False)
+    assert stand.run()[0] == Suspect.NONE
+
+
+def test_the_first_suspect_stays():
+    stand = Standing()
+    stand.bench.set("switches", closed=False)
+    stand.run()
+    tick = int(stand.state.tick)
+    stand.bench.set("joints", position=2.0)
+    stand.run(3)
+    assert stand.state.suspect == Suspect.SWITCHES and stand.state.tick == tick
