@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ending_tables import fault_table, ground_table
 from result_tables import (
     FRONTIER_PICTURE,
     SEEDS,
@@ -30,11 +31,8 @@ from result_tables import (
     direction_table,
     effects_table,
     every_robot_table,
-    fault_table,
     frontier_table,
-    ground_table,
     impulse_table,
-    mutated_robots_table,
     quarter_table,
     ratio_table,
     real_table,
@@ -267,8 +265,9 @@ def write_every_robot(file: Path) -> None:
 
 def write_mutated_robots(file: Path) -> None:
     """What becomes of real descriptions with one thing made wrong."""
-    rows = mutated_robots_table(read_json(file)["rows"])
-    refresh(DOCS / "robots_results.md", "mutated robots", rows)
+    rows = [row for row in read_json(file)["rows"] if row["value"] is not None]
+    text = every_robot_table(rows, "what was made wrong", "cases")
+    refresh(DOCS / "robots_results.md", "mutated robots", text)
 
 
 def write_effects(file: Path) -> None:

@@ -23,6 +23,9 @@ from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import axis_rotations, matrices_of_quaternions
 from .robot_description import Joint, RobotDescription
 
+FALL_SHARE = 0.315
+"""A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""
+
 
 @dataclass(frozen=True)
 class LinkPoses:
@@ -153,6 +156,11 @@ def standing_heights(robot: RobotDescription) -> Array:
         else:
             heights[k] = (p + product(R, np.array(contact.position)))[2]
     return heights
+
+
+def fall_height(robot: RobotDescription) -> float:
+    """The height of the base above the ground below which the robot counts as fallen [m]."""
+    return float(round(FALL_SHARE * -float(standing_heights(robot).min()), 3))
 
 
 def standing_contacts(robot: RobotDescription) -> Array:

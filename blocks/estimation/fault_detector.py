@@ -255,7 +255,7 @@ class FaultDetector(Block):
             state.lacking[:] = 0.0
         compare_switches(load, switches, state, params, constants)
         state.started = True
-        begins = before == Suspect.NONE and state.suspect != Suspect.NONE
+        begins: bool = before == Suspect.NONE and state.suspect != Suspect.NONE
         if begins:
             state.tick = clock.tick
         return begins

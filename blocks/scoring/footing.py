@@ -12,11 +12,9 @@ from ...mathematics.elementary import sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet, standing_heights
+from ...robots.kinematics import ball_feet, fall_height
 from ...robots.limb import place_limb, read_limb
 
-FALL_SHARE = 0.315
-"""A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""
 LOAD_SHARE = 0.4
 """Least load of a foot at rest, as a share of its load when all feet carry the same."""
 PLANE = 3
@@ -47,24 +45,19 @@ class BallFeet(NamedTuple):
 
 
 class Footing:
-    """A robot's feet and contact points, its weight and the height it stands at.
+    """A robot's feet and contact points, and its weight.
 
     Attributes:
         foot_of_point: for every contact point the index of its foot, (n_contacts,).
         weight: of the robot [N].
-        standing_height: of the base above the contact points in the standing pose [m].
+        fall_height: by default a base lower above the ground than this has fallen [m].
     """
 
     def __init__(self, robot: RobotDescription) -> None:
         self.foot_of_point = np.array(robot.foot_of_contact(), np.int64)
         self.weight = robot.weight
-        self.standing_height = -float(standing_heights(robot).min())
+        self.fall_height = fall_height(robot)
         self._robot = robot
-
-    @property
-    def fall_height(self) -> float:
-        """By default a base lower above the ground than this has fallen [m]."""
-        return float(round(FALL_SHARE * self.standing_height, 3))
 
     @property
     def load_share(self) -> float:

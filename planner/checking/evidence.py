@@ -320,6 +320,13 @@ class Evidence:
         )
 
     @cached_property
+    def base_height(self) -> Array:
+        """The base's height above the ground at the samples [m], (n,)."""
+        place = self.replay.samples.position
+        ground = ground_height(self.plan.task, place[:, 0], self.progress, place[:, 1])
+        return np.asarray(place[:, 2] - ground)
+
+    @cached_property
     def resting(self) -> Array:
         """What keeps its place while a contact point stands on the ground [m], (n, n_contacts, 3):
         the point itself; of a ball, which rolls, the way of the material where it touches."""

@@ -15,6 +15,7 @@ import numpy as np
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ...robots.kinematics import fall_height
 from ..models.exact_dynamics import dynamics_of
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
@@ -351,6 +352,9 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
         sample = int(heights[link].argmin())
         yield PlanTestResult("body_on_ground", -float(heights[link][sample]), 0.0, "m",
                     "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
+    low = fall_height(robot) - e.base_height
+    yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
+                "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
     lacking = leg_lack(robot, e.poses, task.leg_clearance)
     if lacking is None:
         return  # no two legs have shapes that could touch

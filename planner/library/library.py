@@ -99,15 +99,16 @@ def _other_parameters(task: Mapping[str, Any]) -> dict[str, Any]:
     """Of a task as plain data what must be the same for a start from its plan; what says nothing is
     left out."""
     given = {name: x for name, x in task.items() if name not in {"name", "recipe", *SCALES}}
-    return _without_none(given)
+    left: dict[str, Any] = _without_none(given)
+    return left
 
 
-def _without_none(data: dict[str, Any]) -> dict[str, Any]:
-    return {
-        name: _without_none(x) if isinstance(x, dict) else x
-        for name, x in data.items()
-        if x is not None
-    }
+def _without_none(data: Any) -> Any:
+    if isinstance(data, list):
+        return [_without_none(x) for x in data]
+    if not isinstance(data, dict):
+        return data
+    return {name: _without_none(x) for name, x in data.items() if x is not None}
 
 
 def kept_name(task: JumpTask, robot: RobotDescription) -> str:

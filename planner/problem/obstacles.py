@@ -133,9 +133,8 @@ class ObstacleRows:
         }
         self.feet = len(self._of_kind["foot"])
         self.count = len(kinds)
-        self._knees_fold = bool(ball_feet(model.robot))
-        self._folding = self._of("calf", "shin", "body")
-        self._folding_at_a_step = self._of("calf", "shin", "shank", "body")
+        self.knees_fold = bool(ball_feet(model.robot))
+        self._folding = self._of("calf", "shin", "shank", "body")
 
     def _of(self, *kinds: str) -> Indices:
         return np.sort(np.concatenate([self._of_kind[kind] for kind in kinds]))
@@ -143,9 +142,9 @@ class ObstacleRows:
     def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
         """The rows of a jump's knot; ``first`` says that it is the flight's first."""
         turns = bool(hop.rotation)
-        if self._knees_fold and not stretch.flies and not turns:
+        if self.knees_fold and not stretch.flies and not turns:
             # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
-            return self._folding if edge is None else self._folding_at_a_step
+            return self._folding
         landed = not stretch.flies and stretch.place > 0 and edge is not None
         if edge is None and not turns:
             return np.zeros(0, np.int64)

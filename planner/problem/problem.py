@@ -17,6 +17,7 @@ import numpy as np
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...robots.kinematics import fall_height
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -130,6 +131,7 @@ class ProblemBuilder:
         self._tables: dict[tuple[str, tuple[Rows, ...]], tuple[tuple[str, ...], Array, Array]] = {}
         self._of_motors: dict[float, list[Rows]] = {}
         self._body_points = body_points(model, coordinates)
+        self._fall_height = fall_height(self.exact.robot)
 
     def build(self) -> FullProblem:
         """The problem with its bounds and parameters."""
@@ -169,7 +171,7 @@ class ProblemBuilder:
         for k, stretch in enumerate(self.of_knot):
             begins = stretch.place == 0 and not stretch.flies
             if not begins:
-                other._bound_lean(k)
+                other._bound_base(k)
                 if not stretch.impact:
                     other._set(stretch.piece, k, nominal=other.nominal(k))
             for name in self.assembly.knots[k].pieces:
@@ -208,7 +210,7 @@ class ProblemBuilder:
             limits = limits[list(self.coordinates.moving)]
             self.lower[start + base : start + n] = limits[:, 0]
             self.upper[start + base : start + n] = limits[:, 1]
-            self._bound_lean(k)
+            self._bound_base(k)
         if k == 0 and stretch.timed:
             self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
         control = int(self.assembly.control_start[k])
@@ -221,8 +223,14 @@ class ProblemBuilder:
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
 
-    def _bound_lean(self, k: int) -> None:
-        """How far the torso may lean at a knot behind the first."""
+    def _bound_base(self, k: int) -> None:
+        """How far the torso may lean at a knot behind the first; and how low it may be on legs that fold until it
+        lies on the ground, or the robot would count as fallen."""
+        stretch = self.of_knot[k]
+        if self.structure.obstacles.knees_fold and not stretch.flies:
+            at = int(self.assembly.state_start[k]) + self.free_base.index(2)
+            ground = self.structure.places[stretch.place].z
+            self.lower[at] = ground + self._fall_height + (self.margins.step or 0.0)
         pitch, lean = self.free_base.index(3), self._most_lean(k)
         nominal, at = float(self.nominal(k)[pitch]), int(self.assembly.state_start[k]) + pitch
         self.lower[at], self.upper[at] = nominal - lean, nominal + lean

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -167,9 +166,9 @@ class Structure:
         self.obstacles = ObstacleRows(model, coordinates)
         self.given: dict[int, list[tuple[int, float, str]]] = {}
         self._kept: dict[ProblemPhase, NDArray[np.int64]] = {}
-        self.knots = self._knots(bool(ball_feet(model.robot)))
+        self.knots = self._knots()
 
-    def _knots(self, knees_fold: bool) -> list[Knot]:
+    def _knots(self) -> list[Knot]:
         n, end = self.n, len(self.of_knot)
         knots = []
         for k, stretch in enumerate(self.of_knot):
@@ -205,7 +204,9 @@ class Structure:
         fixed = tuple(i for i, _, _ in self.given[end])
         last = Knot(2 * n, 0, fixed=fixed)
         obstacle = self._obstacle_rows(end)
-        if knees_fold and len(obstacle):  # where the base is given, knees can still fold
+        if self.obstacles.knees_fold and len(
+            obstacle
+        ):  # where the base is given, knees can still fold
             last.pieces["obstacle"] = (np.arange(n), obstacle)
         return [*knots, last]
 

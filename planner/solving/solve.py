@@ -110,7 +110,8 @@ CURABLE = frozenset(
         "position_defect", "rotation_defect", "velocity_defect", "angular_velocity_defect",
         "flight_position", "flight_rotation", "rise", "joint_torque", "joint_limits",
         "motor_torque", "motor_speed", "effort", "touchdown_speed", "foot_slip", "foot_on_ground",
-        "foot_below_ground", "foot_clearance", "body_on_ground", "leg_clearance",
+        "foot_below_ground", "foot_clearance", "body_on_ground", "base_height",
+        "leg_clearance",
     }
 )  # fmt: skip
 """Tests whose figures depend on the length of the intervals."""

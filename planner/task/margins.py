@@ -41,7 +41,8 @@ class Margins(Parameters):
     step: float | None = parameter(
         None, unit="m", ge=0.0, le=0.1,
         text="least gap between calves and a step, and between feet and its edge where they pass "
-        "it; None: 2 mm for calves, no bound for feet",
+        "it; of legs that end in balls also between them and the ground, and above the base's height that counts "
+        "as a fall; None: 2 mm for calves, no bound for feet",
     )  # fmt: skip
     pressure: float = parameter(
         0.0, ge=0.0, lt=0.5, text="least share of a foot's load on each of its contact points"

@@ -319,9 +319,15 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
     yield from _slow_feet(task, robot, said)
     fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
-    if "step" not in said and any(hop.landing_height for hop in hops):
-        gap = rounded(STEP + STEP_HEIGHT * max(fall, onto) + knee_sag(robot))
-        yield Choice("margins.step", gap, "a disturbed robot must not touch the step")
+    at_a_step = any(hop.landing_height for hop in hops)
+    if "step" not in said and (at_a_step or knee_sag(robot)):
+        edge = STEP + STEP_HEIGHT * max(fall, onto) if at_a_step else 0.0
+        why = (
+            "a disturbed robot must not touch the step"
+            if at_a_step
+            else "knees hang lower than planned"
+        )
+        yield Choice("margins.step", rounded(edge + knee_sag(robot)), why)
     if "joints" not in said:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
         yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")

@@ -137,8 +137,8 @@ def check_urdf(file: XmlFile) -> None:
             add(part.tag, name, what, meant, found)
         wrong = wrong_inertia(part)
         if wrong:
-            add("link", name, f"link {name} has an inertia that no body has",
-                "finite numbers, none negative of ixx, iyy and izz", wrong)  # fmt: skip
+            add("link", name, f"link {name} has a mass or an inertia that no body has",
+                "finite numbers, none negative but ixy, ixz and iyz", wrong)  # fmt: skip
     carried: dict[str, str] = {}
     joints = [joint.get("name", "") for joint in file.root.findall("joint")]
     for name in dict.fromkeys(joints):

@@ -16,6 +16,8 @@ NEAR = 0.8
 """The likeness from which a word is taken for another one, misspelt."""
 LEAST_INERTIA = -1e-12
 """Rounding of what wrote the file [kg m^2]."""
+PRODUCTS = ("ixy", "ixz", "iyz")
+"""What may be negative of an inertia."""
 CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
@@ -70,20 +72,23 @@ def _near(word: str, known: tuple[str, ...]) -> str:
 
 
 def wrong_inertia(link: ElementTree.Element) -> str:
-    """The numbers of a link's inertia that no body has, as they are written; empty where there are none.
+    """The mass of a link and the numbers of its inertia that no body has, as they are written; empty where
+    there are none.
 
     MuJoCo does not look at those of a link that a fixed joint holds.
     """
-    inertia = link.find("inertial/inertia")
-    if inertia is None:
-        return ""
+    inertia, mass = link.find("inertial/inertia"), link.find("inertial/mass")
+    numbers = (
+        {} if inertia is None else {name: inertia.get(name, "0") for name in ATTRIBUTES["inertia"]}
+    )
+    if mass is not None:
+        numbers["mass"] = mass.get("value", "0")
     wrong = []
-    for name in ATTRIBUTES["inertia"]:
-        text = inertia.get(name, "0")
+    for name, text in numbers.items():
         try:
             value = float(text)
         except ValueError:
             continue  # MuJoCo names the line
-        if not math.isfinite(value) or (name[1] == name[2] and value < LEAST_INERTIA):
+        if not math.isfinite(value) or (name not in PRODUCTS and value < LEAST_INERTIA):
             wrong.append(f"{name} {text}")
     return ", ".join(wrong)

@@ -325,11 +325,12 @@ IDLE = {
                 for phase in ("landing", "stand")
                 for name in ("damping", "stiffness", "weight")
             ),
+            *(f"{phase}.raised_weight" for phase in ("landing", "stand")),
             "thrust.swing_stiffness",
         ]
     ),
 }
-"""One set of gains serves all phases: feet roll off only in the thrust, and there none swings down. Weights are
+"""One set of gains serves all phases: feet roll off and rise only in the thrust, and there none swings down. Weights are
 those of BRUCE, so its size changes none."""
 
 

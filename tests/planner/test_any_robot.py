@@ -14,6 +14,7 @@ from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.problem.structure import ContactRows
 from aloft.planner.solving.solve import solve_jump
+from aloft.planner.task.contact_groups import contact_points
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import RobotDescription
@@ -96,3 +97,24 @@ def test_contact_rows_are_independent(robot: RobotDescription) -> None:
     assert len(line) == np.linalg.matrix_rank(jacobian[line])
     # A foot that stands on two of its points already turns about their line only.
     assert len(rows.places(everything, few)) == 12 - len(line)
+
+
+@pytest.mark.long
+def test_fore_feet_leave_first_and_hind_feet_land_last() -> None:
+    """Raised points have no force and are above the ground, and exact dynamics of the motion with the forces left agree."""
+    turns = {"take_off": {"fore": 0.06}, "touchdown": {"hind": 0.06}}
+    values = {"recipe": "paper", "name": "bound", "rise": 0.08, "distance_x": 0.1, **turns}
+    task = make_task({**values, "knots": {**KNOTS, "landing": 10}, "impact": True})
+    plan = solve_jump(task, QUADRUPED, compiled=False)
+    report = check_plan(plan, QUADRUPED)
+    exact = {"force_without_contact", "force_balance", "violation", "pull", "friction", "rise"}
+    assert not exact & {test.name for test in report.failed}, report.explain()
+    fore = list(contact_points(QUADRUPED, "fore"))
+    hind = [k for k in range(4) if k not in fore]
+    at = {when: plan.knot_at(t) for when, t in (("before", plan.lift_off_time - 0.03),
+                                                ("after", plan.touchdown_time + 0.03))}  # fmt: skip
+    assert not plan.contact[at["before"], fore].any() and plan.contact[at["before"], hind].all()
+    assert plan.contact[at["after"], fore].all() and not plan.contact[at["after"], hind].any()
+    points = ExactDynamics(QUADRUPED)
+    for when, raised in (("before", fore), ("after", hind)):
+        assert points.points(plan.position[at[when]])[raised, 2].min() > 0.0

@@ -123,6 +123,7 @@ CHANGES: dict[str, Callable[[PlannedJump], PlannedJump]] = {
     "foot_clearance": asked(foot_clearance=0.2),
     "leg_clearance": asked(leg_clearance=0.15),
     "body_on_ground": shifted("position", -0.1, 2),
+    "base_height": shifted("position", -0.3, 2),
 }  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.blocks.signals import Phase
 from aloft.planner.library.library import solve_and_check
 from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
 from aloft.planner.models.symbolic_model import SymbolicModel
@@ -19,12 +20,15 @@ from aloft.planner.problem.obstacles import (
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
+from aloft.robots.kinematics import fall_height
 
 ROBOT = find_robot("bruce")
 MODEL = SymbolicModel(ROBOT)
 
 
-def test_the_last_link_of_a_leg_that_ends_in_a_ball_is_kept_off_a_step_by_its_upper_half() -> None:
+def test_the_last_link_of_a_leg_that_ends_in_a_ball_keeps_off_the_ground_by_its_upper_half() -> (
+    None
+):
     robot = find_robot("go2")
     model = SymbolicModel(robot)
     coordinates = full_coordinates(model)
@@ -36,10 +40,10 @@ def test_the_last_link_of_a_leg_that_ends_in_a_ball_is_kept_off_a_step_by_its_up
     rows = ObstacleRows(model, coordinates)
     level = make_task({"robot": "go2", "name": "a", "rise": 0.1, "distance_x": 0.5})
     step = level.model_copy(update={"landing_height": 0.08})
-    for task, edge, share in ((level, None, 0), (step, 0.25, len(shanks))):
+    for task, edge in ((level, None), (step, 0.25)):
         stance = layout(task.resolved(robot), robot)[0]
         found = rows.rows(task.hops()[0], edge, stance, False)
-        assert sum(points[k][0] == "shank" for k in found) == share
+        assert sum(points[k][0] == "shank" for k in found) == len(shanks)
 
 
 def standing(x: float) -> np.ndarray:
@@ -130,9 +134,8 @@ def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
         for stretch in layout(task, robot):
             found = rows.rows(task.hops()[0], None, stretch, False)
             links = {points[row][1][0] for row in found}
-            feet = {foot.link for foot in robot.feet}
-            others = {link.name for link in robot.links if link.shapes and link.name not in feet}
-            expected = others if watched and not stretch.flies else set()
+            bodies = {link.name for link in robot.links if link.shapes}
+            expected = bodies if watched and not stretch.flies else set()
             assert links == expected, stretch.phase
 
 
@@ -154,3 +157,25 @@ def test_a_high_step_is_jumped_onto_and_not_touched(ahead: float) -> None:
         "distance_x": ahead,
     }
     assert solve_and_check(make_task(task), ROBOT).valid
+
+
+def test_a_base_on_legs_that_fold_stays_above_what_counts_as_a_fall() -> None:
+    """On the ground, by the gap that knees have; and above the step on which it lands."""
+    for robot, bound in ((find_robot("go2"), True), (ROBOT, False)):
+        task = make_task(
+            {
+                "name": "up",
+                "robot": robot.name,
+                "rise": 0.2,
+                "distance_x": 0.5,
+                "landing_height": 0.1,
+            }
+        ).resolved(robot)
+        problem = make_problem(task, robot, compiled=False)
+        height = problem.coordinates.free_base.index(2)
+        lows = {problem.stretch_at(k).phase: problem.lower[problem.assembly.state_start[k] + height]
+                for k in range(2, problem.knots - 1)}  # fmt: skip
+        least = fall_height(robot) + (task.margins.step if task.margins else 0.0)
+        assert lows[Phase.FLIGHT] == -np.inf
+        assert lows[Phase.SQUAT] == (pytest.approx(least) if bound else -np.inf)
+        assert lows[Phase.LANDING] == (pytest.approx(least + 0.1) if bound else -np.inf)

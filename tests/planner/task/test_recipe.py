@@ -225,6 +225,10 @@ def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:
     for robot in (soles, balls):
         task = make_task({"name": "a", "rise": 0.12, "distance_x": 0.3, "landing_height": 0.05})
         chosen[robot.name] = {c.parameter: c.value for c in choices(task, robot)}
+        level = {
+            c.parameter: c.value for c in choices(make_task({"name": "b", "rise": 0.1}), robot)
+        }
+        assert ("margins.step" in level) is (robot is balls), "on level ground it is for the knees"
     slow = size_of(balls).slow
     assert chosen["bruce"]["margins.touchdown_slide"] == pytest.approx(0.6, rel=0.02)
     assert chosen[balls.name]["margins.touchdown_slide"] == pytest.approx(1.2 * slow, rel=0.02)

@@ -26,7 +26,7 @@ TWO_ROOTS = '<robot name="x">\n<link name="a"/>\n<link name="b"/>\n</robot>'
 MISSPELT = """<robot name="x">
 <gazebo/><ros2_control/>
 <link name="a"><inertila/><self_filter/></link>
-<link name="b"><inertial><mass value="1"/>
+<link name="b"><inertial><mass value="-2"/>
 <inertia ixx="nan" ixy="0" ixz="0" iyy="1" iyz="0" izz="-1"/></inertial></link>
 <joint name="j" type="revolute"><parent link="a"/><child link="b"/>
 <limit loewr="-1" upper="1" effort="1" velocity="1" gear_velocity="3"/></joint></robot>"""
@@ -81,9 +81,9 @@ MODELS = [
         "x.urdf:3:1: link a has <inertila>, which a URDF does not know",
         "    expected   <inertial>",
         "    found      <inertila>",
-        "x.urdf:4:1: link b has an inertia that no body has",
-        "    expected   finite numbers, none negative of ixx, iyy and izz",
-        "    found      ixx nan, izz -1",
+        "x.urdf:4:1: link b has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      ixx nan, izz -1, mass -2",
         "x.urdf:6:1: joint j has loewr= in <limit>, which a URDF does not know",
         "    expected   lower=",
         "    found      loewr= in <limit>",
@@ -102,18 +102,15 @@ MODELS = [
         "    found      lower 1, upper -1",
     ]),
     ("x.urdf", ARM.replace('<mass value="1"/>', '<mass value="-1"/>'), [
-        "x.urdf: link ground has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
-        "x.urdf:8:3: link upper has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
-        "x.urdf:15:3: link lower has a mass of -1 kg",
-        "    expected   a positive number of kg",
-        "    found      -1",
-        "    fix        mass: 0.1",
+        "x.urdf:3:3: link base has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
+        "x.urdf:8:3: link upper has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
+        "x.urdf:15:3: link lower has a mass or an inertia that no body has",
+        "    expected   finite numbers, none negative but ixy, ixz and iyz",
+        "    found      mass -1",
     ]),
     ("x.sdf", "<sdf/>", [
         "x.sdf: files in SDF are not read",
