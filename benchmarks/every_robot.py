@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..planner.library.library import shipped_folder
 from ..robots.description import ReadRobot, RobotError, read
-from ..robots.importing.urdf_text import find_file
+from ..robots.importing.package_files import find_file
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
 from ..studies.check_up import check_up, obstacles_to_jumping

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ..robots.description import ReadRobot, RobotError, read
 from ..robots.importing.new_yaml import new_yaml
-from ..robots.importing.urdf_text import find_file
+from ..robots.importing.package_files import find_file
 from ..robots.report import report
 from ..robots.surfaces import missing_meshes
 from ..runtime.language.errors import AloftError

@@ -51,7 +51,7 @@ from aloft.planner.task.margins import Margins
 from aloft.planner.task.sequence import Hop, KnownStairs, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
 from aloft.robots.description import find_robot
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 from aloft.runtime.language.parameters import Parameters
 from aloft.studies.batch.seeds import run_seeds
 from aloft.studies.reach.reach import BRUCE, beside

@@ -11,7 +11,8 @@ from ..files.document import read_file
 from ..files.nodes import MapNode, plain
 from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
-from .importing.urdf_text import SCHEME, find_file, package_of
+from .importing.package_files import SCHEME, find_file, package_of
+from .importing.xacro_text import XACRO
 from .robot_description import (
     BASE_VELOCITIES,
     ActuatorProfile,
@@ -39,11 +40,10 @@ if TYPE_CHECKING:
 
 
 SHIPPED = Path(__file__).parent
-MODEL_FILES = (".urdf", ".xml", ".mjcf")
+MODEL_FILES = (".urdf", ".xml", ".mjcf", XACRO)
 YAML_FILES = (".yaml", ".yml")
 OTHER_FORMATS = {
     ".sdf": "gz sdf has no way back to a URDF: export one from where this file came from",
-    ".xacro": "xacro {name} > {stem}.urdf  (pip install xacro), then read that",
 }
 """Formats of robots that are not read, and what to do instead."""
 DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
@@ -157,9 +157,10 @@ def read(path: Path) -> ReadRobot:
         RobotError: the file cannot be read, or describes no robot; it carries every fault.
     """
     if path.suffix in OTHER_FORMATS:
-        fix = OTHER_FORMATS[path.suffix].format(name=path.name, stem=path.name.partition(".")[0])
         what = f"files in {path.suffix.removeprefix('.').upper()} are not read"
-        fault = RobotFault((), what, "a URDF, MJCF or YAML file", path.suffix, fix)
+        fault = RobotFault(
+            (), what, "a URDF, MJCF or YAML file", path.suffix, OTHER_FORMATS[path.suffix]
+        )
         raise RobotError(str(path), [fault])
     if path.suffix in MODEL_FILES:
         beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
@@ -182,7 +183,9 @@ def _named_file(path: Path, text: PlacedYaml) -> Path:
         found = find_file(name, path.parent)
         if found is not None:
             return found
-    expected = "the path of a URDF or MJCF file, from this file's folder or as package://NAME/PATH"
+    expected = (
+        "the path of a URDF, xacro or MJCF file, from this file's folder or as package://NAME/PATH"
+    )
     message, fix = f"there is no file {name}", ""
     if not isinstance(name, str) or not name.endswith(MODEL_FILES):
         message = f"file cannot be {name!r}"

@@ -16,7 +16,7 @@ import numpy as np
 from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import matrices_of_quaternions
 from .importing.meshes import mesh_triangles, simplified
-from .importing.urdf_text import find_file
+from .importing.package_files import find_file
 from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart, Vector3
 
 MOST_TRIANGLES = 24_000

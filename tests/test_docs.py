@@ -14,7 +14,7 @@ import pytest
 import aloft
 from aloft.cli.blocks import all_references, reference_page
 from aloft.robots.description import find_robot
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 from aloft.runtime.language.block import Block
 from aloft.runtime.loading import LoadError
 

@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 
 PAGE = Path(__file__).parent.parent / "docs" / "robots.md"
 

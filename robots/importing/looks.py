@@ -14,7 +14,8 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import from_euler, matrices_of_quaternions, quaternions_of_matrices
 from . import capsules as fit
-from .urdf_text import SCHEME, XmlFile, find_file
+from .package_files import SCHEME, find_file
+from .urdf_text import XmlFile
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,10 @@ from ...mathematics.arrays import Array
 from . import capsules as fit
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
+from .package_files import find_file
 from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, RawThruster, full_tensor
-from .urdf_text import UrdfJoint, XmlFile, check_urdf, find_file, urdf_joints
+from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
+from .xacro_text import XACRO
 
 
 class TakenMesh(NamedTuple):
@@ -46,7 +48,10 @@ def read_model(path: Path) -> RawModel:
     if file.is_urdf:
         check_urdf(file)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        if path.suffix == XACRO:
+            spec = mujoco.MjSpec.from_string(file.content)
+        else:
+            spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:
         raise file.error(f"MuJoCo cannot read this: {_one_line(error)}") from error
     notes: list[str] = []

@@ -1,15 +1,9 @@
-"""Reads from a URDF what MuJoCo drops: speed limits, mimic joints, the lines of elements; and finds the files it names.
-
-No environment variable is read, so that the same graph finds the same robot: the package of ``package://`` is a
-folder of that name above the file or beside one of these, or it is installed with Python.
-"""
+"""Reads from a URDF what MuJoCo drops: speed limits, mimic joints, the lines of elements."""
 
 from __future__ import annotations
 
 import math
 import re
-import sys
-import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -18,6 +12,7 @@ from ...files.problems import listing
 from ..validation import RobotError, RobotFault
 from ..validation.faults import number
 from .urdf_words import misspelt, wrong_inertia
+from .xacro_text import XACRO, expand_xacro
 
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
@@ -36,16 +31,18 @@ class UrdfJoint:
 
 
 class XmlFile:
-    """An XML file, its root, and where a link or joint of some name stands in it."""
+    """An XML file, its content and root, and where a link or joint of some name stands in it. Of a xacro file it
+    is the URDF that it stands for, and so are the lines."""
 
     def __init__(self, path: Path) -> None:
         """Read the file. Raises ``RobotError`` where it is no URDF and no MJCF."""
         self.path = path
         try:
-            text = path.read_text(encoding="utf-8")
+            text = expand_xacro(path) if path.suffix == XACRO else path.read_text("utf-8")
             if not text.strip():
                 raise self.error("the file is empty", "a URDF or MJCF file")
             self.root = ElementTree.fromstring(text)
+            self.content = text
             # Comments are blanked: nothing is found in them, and all other positions stay.
             self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
         except OSError as error:
@@ -195,40 +192,3 @@ def _value(text: str | None) -> float:
         return float(text) if text is not None else math.nan
     except ValueError:
         return math.nan
-
-
-SCHEME = "package://"
-
-
-def find_file(name: str, folder: Path) -> Path | None:
-    """The file called ``name`` in a description that stands in ``folder``; None if there is none.
-
-    A path is relative to the folder. ``package://NAME/PATH`` is looked for in the folder and every
-    folder above it, where such a folder is called ``NAME`` or holds one; then among the shared
-    files of installed Python packages.
-    """
-    name = name.removeprefix("file://")
-    if not name.startswith(SCHEME):
-        path = folder / name
-        return path if path.is_file() else None
-    package, _, rest = name.removeprefix(SCHEME).partition("/")
-    here = folder.resolve()
-    for above in (here, *here.parents):
-        for root in (above, above / package):
-            if root.name == package and (root / rest).is_file():
-                return root / rest
-    return next((s / package / rest for s in _shared() if (s / package / rest).is_file()), None)
-
-
-def package_of(name: str) -> str:
-    """The package that a ``package://`` name asks for; empty for a plain path."""
-    if not name.startswith(SCHEME):
-        return ""
-    return name.removeprefix(SCHEME).partition("/")[0]
-
-
-def _shared() -> list[Path]:
-    """Where installed packages keep shared files: ``share`` folders, then the packages themselves."""
-    sites = [Path(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")]
-    shares = [site / "cmeel.prefix" / "share" for site in sites]
-    return list(dict.fromkeys([*shares, Path(sys.prefix) / "share", *sites]))

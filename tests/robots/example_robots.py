@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 
 PACKAGE = "package://example-robot-data/robots/"
 URDF = {

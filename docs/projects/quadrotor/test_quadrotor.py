@@ -13,7 +13,7 @@ from score import FlightScore
 
 import aloft
 from aloft.robots.description import find_robot
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.robots.importing.meshes import mesh_corners
-from aloft.robots.importing.urdf_text import find_file, package_of
+from aloft.robots.importing.package_files import find_file, package_of
 
 
 def test_a_package_is_a_folder_above_or_beside(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from aloft.robots.description import RobotError, find_robot, read_description
 from aloft.robots.importing.meshes import mesh_triangles, simplified
-from aloft.robots.importing.urdf_text import find_file
+from aloft.robots.importing.package_files import find_file
 
 from ..example_robots import needs_robots
 from .model_files import INERTIAL

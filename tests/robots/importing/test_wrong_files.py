@@ -118,12 +118,6 @@ MODELS = [
         "    found      .sdf",
         "    fix        gz sdf has no way back to a URDF: export one from where this file came from",
     ]),
-    ("x.xacro", "<robot/>", [
-        "x.xacro: files in XACRO are not read",
-        "    expected   a URDF, MJCF or YAML file",
-        "    found      .xacro",
-        "    fix        xacro x.xacro > x.urdf  (pip install xacro), then read that",
-    ]),
     ("x.urdf", "", ["x.urdf: the file is empty", "    expected   a URDF or MJCF file"]),
     ("x.xml", CLOSED, [
         ("x.xml: the file closes loops, which a tree of links has not: rod (a and b), connect (b and "
@@ -235,7 +229,7 @@ def test_a_package_that_is_not_installed(tmp_path: Path) -> None:
             "this file, and no installed Python package brings it"
         ),
         (
-            "    expected   the path of a URDF or MJCF file, from this file's folder or as "
+            "    expected   the path of a URDF, xacro or MJCF file, from this file's folder or as "
             "package://NAME/PATH"
         ),
         "    found      package://some-robots/x.urdf",
