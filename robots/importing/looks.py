@@ -69,7 +69,7 @@ def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
             if shape is None:
                 continue
             if shape.tag == "mesh":
-                scale = _numbers(shape.get("scale"), (1.0, 1.0, 1.0))
+                scale = numbers(shape.get("scale"), (1.0, 1.0, 1.0))
                 material = visual.find("material")
                 color = None if material is None else _material_color(material)
                 if material is not None and len(material) == 0:
@@ -87,7 +87,7 @@ def _material_color(material: ElementTree.Element) -> str | None:
     color = material.find("color")
     if color is None or material.find("texture") is not None:
         return None
-    values = _numbers(color.get("rgba"), (math.nan, math.nan, math.nan, 1.0))
+    values = numbers(color.get("rgba"), (math.nan, math.nan, math.nan, 1.0))
     return hex_color(values)
 
 
@@ -100,8 +100,8 @@ def hex_color(rgba: Array) -> str | None:
 
 
 def _simple(shape: ElementTree.Element) -> list[fit.Capsule]:
-    radius, length = (_numbers(shape.get(key), (0.0,))[0] for key in ("radius", "length"))
-    size = 0.5 * _numbers(shape.get("size"), (0.0, 0.0, 0.0))
+    radius, length = (numbers(shape.get(key), (0.0,))[0] for key in ("radius", "length"))
+    size = 0.5 * numbers(shape.get("size"), (0.0, 0.0, 0.0))
     if shape.tag == "sphere" and radius > 0.0:
         return fit.of_sphere(float(radius))
     if shape.tag == "cylinder" and radius > 0.0:
@@ -114,13 +114,13 @@ def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
     zero = (0.0, 0.0, 0.0)
     if element is None:
         return np.eye(3), np.zeros(3)
-    angles = _numbers(element.get("rpy"), zero)
+    angles = numbers(element.get("rpy"), zero)
     quaternion = np.empty(4)
     from_euler(angles, quaternion)
-    return matrices_of_quaternions(quaternion), _numbers(element.get("xyz"), zero)
+    return matrices_of_quaternions(quaternion), numbers(element.get("xyz"), zero)
 
 
-def _numbers(text: str | None, usual: Sequence[float]) -> Array:
+def numbers(text: str | None, usual: Sequence[float]) -> Array:
     """The numbers of an attribute, as many as usual; the usual ones where it has not those."""
     try:
         values = np.array([float(part) for part in (text or "").split()])

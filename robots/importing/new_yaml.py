@@ -43,7 +43,8 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
     notes = [*more, *imported.notes, *fitted]
     name = os.path.relpath(file, target.parent)
     estimated = not any(joint.rotor_inertia for joint in imported.built.raw_joints.values())
-    return yaml_text(Path(name).as_posix(), robot, feet, held, notes, estimated), notes
+    sensors = _sensors(robot, imported.model, imported.built)
+    return yaml_text(Path(name).as_posix(), robot, feet, held, notes, estimated, sensors), notes
 
 
 def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
@@ -187,7 +188,7 @@ def _sole(
 
 def yaml_text(
     file: str, robot: RobotDescription, feet: list[dict[str, Any]], held: Mapping[str, float],
-    notes: list[str], estimated: bool,
+    notes: list[str], estimated: bool, sensors: list[str],
 ) -> str:  # fmt: skip
     """The YAML's text.
 
@@ -197,6 +198,7 @@ def yaml_text(
         feet, held: that were guessed, as ``guess`` gives them.
         notes: what the file lacks, which become comments.
         estimated: whether the inertia of rotors is no file's.
+        sensors: the lines that say which there are.
     """
     lines = [
         f"# What {Path(file).name} does not say of the robot. Everything here was guessed or found by",
@@ -208,7 +210,7 @@ def yaml_text(
         "",
     ]
     lines += [f"# {note}." for note in notes]
-    lines += ["", *_feet(feet), "", *_profile(robot, estimated), "", *_sensors(robot)]
+    lines += ["", *_feet(feet), "", *_profile(robot, estimated), "", *sensors]
     if feet:
         lines += ["", *_angles("standing", robot.standing)]
     lines += [
@@ -266,12 +268,26 @@ def _profile(robot: RobotDescription, estimated: bool) -> list[str]:
     return lines
 
 
-def _sensors(robot: RobotDescription) -> list[str]:
-    text = f"{{imu: {str(robot.sensors.imu).lower()}, switches: {str(robot.sensors.switches).lower()}}}"
-    return [
+def _sensors(robot: RobotDescription, model: RawModel, built: LinkTree) -> list[str]:
+    lines = [
         "# ASSUMED: an IMU at the base's origin, and a switch in every contact point.",
-        f"sensors: {text}",
+        "sensors:",
+        f"  imu: {str(robot.sensors.imu).lower()}",
+        f"  switches: {str(robot.sensors.switches).lower()}",
     ]
+    found = {name: imu for name, imu in model.imus.items() if imu.body in built.frames}
+    if found:
+        lines.append(
+            "  # From the file: further IMUs, each an output of the robot, in its link's axes."
+        )
+    for name, imu in found.items():
+        frame = built.frames[imu.body]
+        turned = imu.turned or not np.allclose(frame.rotation, np.eye(3), atol=1e-6)
+        lines.append(
+            f"  {name}: {{kind: imu, link: {frame.link}, position: {vector(frame.point(imu.position))}}}"
+            + ("  # turned in the file" if turned else "")
+        )
+    return lines
 
 
 def _angles(key: str, angles: Mapping[str, float]) -> list[str]:

@@ -93,6 +93,16 @@ class RawThruster:
 
 
 @dataclass(frozen=True)
+class RawImu:
+    """An inertial measurement unit at ``position`` [m] in the frame of a ``body``; ``turned`` says that its axes are
+    not parallel to the body's."""
+
+    body: str
+    position: Array
+    turned: bool
+
+
+@dataclass(frozen=True)
 class RawBody:
     """A body of the file: ``rotation`` and ``position`` [m] in the world at the zero of all joints,
     its own ``inertial``, ``capsules`` and ``look`` in its own frame, and the joints that carry it."""
@@ -120,6 +130,7 @@ class RawModel:
         names_world: whether the file itself has a link for the world, as it must in MJCF.
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
         thrusters: actuators that push at a place, by name.
+        imus: inertial measurement units, by name.
         mimics: joints that the file ties to another one, or leaves no range.
         notes: what could not be taken over, one sentence each.
     """
@@ -134,3 +145,4 @@ class RawModel:
     mimics: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     thrusters: Mapping[str, RawThruster] = field(default_factory=dict)
+    imus: Mapping[str, RawImu] = field(default_factory=dict)

@@ -18,6 +18,7 @@ import numpy as np
 from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
+from .imus import imus
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
 from .package_files import find_file
@@ -106,7 +107,7 @@ def read_model(path: Path) -> RawModel:
     names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
         name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics + still,
-        tuple(dict.fromkeys(notes)), thrusters,
+        tuple(dict.fromkeys(notes)), thrusters, imus(model, file),
     )  # fmt: skip
 
 

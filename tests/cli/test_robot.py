@@ -180,7 +180,7 @@ def test_import_finds_flat_feet_and_a_standing_pose(tmp_path: Path) -> None:
         (
             "x.urdf",
             ARM.replace('<mass value="1"/>', '<mass value="nan"/>', 2),
-            "x.urdf:8:3: link upper has a mass of nan kg",
+            "x.urdf:8:3: link upper has a mass or an inertia that no body has",
         ),
     ],
 )
