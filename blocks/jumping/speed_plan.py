@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import field_validator
@@ -38,6 +38,9 @@ from ..signals import (
     PlanOutcome,
 )
 from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, keep_in_time
+
+if TYPE_CHECKING:
+    from ...planner.task.task import JumpTask
 
 ROW = 4
 """Jumps of a planned row: the first, one into the cycle, the cycle itself and the last."""
@@ -145,7 +148,7 @@ class SpeedPlan(Block):
 
     def setup(self) -> None:
         p = self.params
-        ways = [round(speed * (p.flight_time + p.contact_time), 6) for speed in p.speeds]
+        ways = row_lengths(p)
         tables = [self._table_of(way) for way in ways]
         self.table, self.firsts = joined(tables), first_rows(tables)
         self.ways = np.array(ways)
@@ -160,18 +163,13 @@ class SpeedPlan(Block):
         """The row of jumps of this length."""
         from ...planner.library.library import PlanLibrary
         from ...planner.library.once import reference_table_once
-        from ...planner.task.task import make_task
 
-        p, robot = self.params, self.robot
-        task = {
-            "name": "hop_on", "robot": robot.name, "flight_time": p.flight_time,
-            "contact_time": p.contact_time, "repeat": ROW, "distance_x": way,
-        }  # fmt: skip
+        robot = self.robot
         try:
-            plan, _ = PlanLibrary(robot).plan(make_task(task))
+            plan, _ = PlanLibrary(robot).plan(row_task(self.params, robot.name, way))
         except AloftError as error:
             raise BlockError(f"no row of jumps of {way:g} m can be planned: {error}") from error
-        return reference_table_once(plan, robot, p.stand_time)
+        return reference_table_once(plan, robot, self.params.stand_time)
 
     @kernel
     @staticmethod
@@ -219,6 +217,22 @@ class SpeedPlan(Block):
         keep_in_time(
             reference.time, terms, reference, progress, rotation, params, constants
         )  # fmt: skip
+
+
+def row_lengths(params: SpeedPlan.Params) -> list[float]:
+    """The length of the jumps of each row [m]."""
+    period = params.flight_time + params.contact_time
+    return [round(speed * period, 6) for speed in params.speeds]
+
+
+def row_task(params: SpeedPlan.Params, robot: str, way: float) -> JumpTask:
+    """The task of a row of jumps of this length [m]."""
+    from ...planner.task.task import make_task
+
+    return make_task({
+        "name": "hop_on", "robot": robot, "flight_time": params.flight_time,
+        "contact_time": params.contact_time, "repeat": ROW, "distance_x": way,
+    })  # fmt: skip
 
 
 def first_rows(tables: list[JumpTable]) -> Array:

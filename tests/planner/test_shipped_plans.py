@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from tests.robots.example_robots import INSTALLED
 
+from aloft.blocks.jumping.speed_plan import row_lengths, row_task
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.plan import read_plan
@@ -48,6 +49,14 @@ def test_what_was_rehearsed_is_of_the_shipped_plan_and_controller(path: Path) ->
     remedy = "the plan or the controller has changed since the rehearsal; " + REMEDY
     assert list(used.velocity_correction) == learnt["velocity_correction"], remedy
     assert list(used.momentum_correction) == learnt["momentum_correction"], remedy
+
+
+def test_the_rows_that_hop_on_mixes_are_shipped(tmp_path: Path) -> None:
+    """So that the graph runs without a solver, and to the same bytes everywhere."""
+    params: Any = load(SHIPPED.parent / "hop_on.yaml").checked.block("plan").params
+    robot = find_robot("bruce")
+    for way in row_lengths(params):
+        assert PlanLibrary(robot, tmp_path).find(row_task(params, "bruce", way)) is not None, REMEDY
 
 
 def test_no_plan_is_there_without_its_task() -> None:
