@@ -20,7 +20,13 @@ from .validation.wrong_robots import hopper
 
 def test_derived_figures() -> None:
     robot = RobotDescription.model_validate(hopper())
-    assert robot.dimensions == {"n_joints": 2, "n_velocities": 8, "n_contacts": 1, "n_feet": 1}
+    assert robot.dimensions == {
+        "n_joints": 2,
+        "n_velocities": 8,
+        "n_contacts": 1,
+        "n_feet": 1,
+        "n_thrusters": 0,
+    }
     assert robot.total_mass == 3.0
     assert robot.standing_position.tolist() == [0.0, 0.5]
     assert robot.foot_of_contact() == (0,)
