@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import io
 from pathlib import Path
-from unittest.mock import patch
 
 from ..validation import RobotError, RobotFault
 from .package_files import find_package
@@ -28,6 +27,8 @@ def expand_xacro(path: Path) -> str:
     Raises:
         RobotError: the library is not installed, a package is not found, or xacro cannot expand the file.
     """
+    from unittest.mock import patch  # imports asyncio, which `aloft check` has no need of
+
     try:
         import xacro
         import xacro.substitution_args as substitution
