@@ -55,5 +55,7 @@ def test_points_that_are_not_there() -> None:
         {"phase": "thrust"}, {"phase": "thrust", "contacts": "claw"}, {"phase": "flight"},
         {"phase": "landing"},
     ]  # fmt: skip
-    with pytest.raises(JumpTaskError, match="phase 2, thrust: no contact point of bruce is on the ground"):
+    with pytest.raises(
+        JumpTaskError, match="phase 2, thrust: no contact point of bruce is on the ground"
+    ):
         layout(make_task({"recipe": "paper", "name": "a", "rise": 0.1, "phases": phases}), ROBOT)
