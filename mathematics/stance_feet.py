@@ -7,6 +7,15 @@ from .kernel import kernel
 
 
 @kernel
+def has_contact(contact: Flags1D, foot_of_point: Indices1D, foot: int) -> bool:
+    """Whether a foot has a point in ``contact``; the arguments are those of ``find_stance_feet``."""
+    found = False
+    for point in range(contact.shape[0]):
+        found = found or (bool(contact[point]) and foot_of_point[point] == foot)
+    return found
+
+
+@kernel
 def find_stance_feet(contact: Flags1D, foot_of_point: Indices1D, stands: Flags1D) -> int:
     """Write which feet have a point in ``contact``, or that all have where none is; returns their number.
 
@@ -15,12 +24,9 @@ def find_stance_feet(contact: Flags1D, foot_of_point: Indices1D, stands: Flags1D
         foot_of_point: the foot of each contact point, (n_contacts,).
         stands: the result, (n_feet,).
     """
-    stands[:] = False
-    for point in range(contact.shape[0]):
-        if contact[point]:
-            stands[foot_of_point[point]] = True
     count = 0
     for foot in range(stands.shape[0]):
+        stands[foot] = has_contact(contact, foot_of_point, foot)
         count += 1 if stands[foot] else 0
     if count == 0:
         stands[:] = True

@@ -65,15 +65,7 @@ def report(read: ReadRobot) -> dict[str, Any]:
         "profiles": list(robot.profiles),
         "motors": _motors(robot),
         "thrusters": [
-            {
-                "thruster": name,
-                "link": each.link,
-                "position": list(each.position),
-                "axis": list(each.axis),
-                "max_thrust": each.max_thrust,
-                "torque_ratio": each.torque_ratio,
-                "time_constant": each.time_constant,
-            }
+            {"thruster": name, **each.model_dump(mode="json")}
             for name, each in robot.thrusters.items()
         ],
         "feet": [

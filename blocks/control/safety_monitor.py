@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array1D
+from ...mathematics.joint_feedback import expected_torques
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import inverse, multiply_vector, product
 from ...mathematics.rotations import tilt
@@ -162,7 +163,10 @@ class SafetyMonitor(Block):
             pass_on(desired, command)
         else:
             damp(joints.position, constants.damping, command)
-        expect_torques(command, joints, state, constants)
+        expected_torques(
+            command.torque, command.stiffness, command.damping, command.position, command.velocity,
+            joints.position, joints.velocity, constants.peak, state.expected,
+        )  # fmt: skip
         return begins
 
     def on_event(self) -> None:
@@ -329,20 +333,6 @@ def compare_torques(
         most = error * (state.asked[k] + _SLIGHT * constants.peak[k])
         beyond = error > 0.0 and state.measures and abs(state.missing[k]) > most
         state.off[k] = state.off[k] + 1 if beyond else 0
-
-
-@kernel
-def expect_torques(
-    command: JointCommand, joints: JointState, state: SafetyState, constants: SafetyConstants
-) -> None:
-    """The torques that a command asks for, no more than the motors have."""
-    for k in range(joints.torque.shape[0]):
-        torque = command.torque[k]
-        torque += command.stiffness[k] * (command.position[k] - joints.position[k])
-        torque += command.damping[k] * (command.velocity[k] - joints.velocity[k])
-        finite = math.isfinite(torque)
-        most = constants.peak[k]
-        state.expected[k] = min(max(torque, -most), most) if finite else 0.0
 
 
 @kernel

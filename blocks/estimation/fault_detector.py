@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
+from ...mathematics.joint_feedback import expected_torques
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import product, solve_positive
 from ...robots.description import RobotDescription
@@ -123,7 +124,7 @@ class FaultDetectorConstants(Signal):
     leg_joints = Field(
         ("n_feet", "n_leg_joints"), dtype="int64", text="joints of each foot's leg, then -1"
     )
-    slight = Field("n_joints", unit="N m", text="torques that are added to those asked for")
+    peak = Field("n_joints", unit="N m", text="the motors' peak torques at the joints")
     weight = Field(unit="N", text="of the robot")
     fading = Field(2, text="share of a mean that goes in a tick: of all, of forces")
     settling = Field(dtype="int64", text="ticks for which points have stood before they count")
@@ -209,8 +210,7 @@ class FaultDetector(Block):
         robot, constants = self.robot, self.constants
         constants.foot_of_point[:] = robot.foot_of_contact()
         constants.leg_joints[:] = leg_joints(robot)
-        peak = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
-        constants.slight[:] = _SLIGHT * peak
+        constants.peak[:] = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
         constants.weight = robot.weight
 
     def prepare(self) -> None:
@@ -247,7 +247,10 @@ class FaultDetector(Block):
         rests = stands and is_slow(state, params.rest_speed)
         on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
         compare_torques(rests or on_the_ground, joints, state, params, constants)
-        expect_torques(command, joints, state, constants)
+        expected_torques(
+            command.torque, command.stiffness, command.damping, command.position, command.velocity,
+            joints.position, joints.velocity, constants.peak, state.expected,
+        )  # fmt: skip
         if rests:
             weigh(imu, joints, terms, constants, scratch)
             compare_forces(state, params, constants, scratch)
@@ -369,28 +372,12 @@ def compare_torques(
         state.asked[k] += fading * (abs(expected) - state.asked[k])
         if judged and state.started:
             state.missing[k] += fading * (joints.torque[k] - expected - state.missing[k])
-            limit = params.torque_error * (state.asked[k] + constants.slight[k])
+            limit = params.torque_error * (state.asked[k] + _SLIGHT * constants.peak[k])
             if limit > 0.0:
                 limit += late * abs(expected - state.level[k])
             judge(state, Suspect.TORQUE, k, state.missing[k], limit)
         else:
             state.missing[k] = 0.0
-
-
-@kernel
-def expect_torques(
-    command: JointCommand,
-    joints: JointState,
-    state: FaultDetectorState,
-    constants: FaultDetectorConstants,
-) -> None:
-    """The torques that a command asks for, no more than the motors have."""
-    for k in range(joints.torque.shape[0]):
-        torque = command.torque[k]
-        torque += command.stiffness[k] * (command.position[k] - joints.position[k])
-        torque += command.damping[k] * (command.velocity[k] - joints.velocity[k])
-        most = constants.slight[k] / _SLIGHT
-        state.expected[k] = min(max(torque, -most), most)
 
 
 # The base over its feet

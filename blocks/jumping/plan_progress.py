@@ -10,6 +10,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle, wrap
+from ...mathematics.stance_feet import has_contact
 from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -128,11 +129,19 @@ def read_plan(
     constants: ProgressConstants,
 ) -> float:
     """Read the plan at the time ``now`` [s] of the run; returns its time."""
+    time, lead = plan_time(now, delay, progress, constants)
+    read_table(table, time, lead, constants.period, reference)
+    return time
+
+
+@kernel
+def plan_time(
+    now: float, delay: DelayEstimate, progress: PlanProgress, constants: ProgressConstants
+) -> tuple[float, float]:
+    """The plan's time at the time ``now`` of the run, and the delay that is left to compensate [s]."""
     lead = delay.delay if constants.lead < 0.0 else constants.lead
     early = min(delay.ahead, lead)
-    time: float = now - progress.late + early
-    read_table(table, time, lead - early, constants.period, reference)
-    return time
+    return now - progress.late + early, lead - early
 
 
 @kernel
@@ -252,7 +261,7 @@ def mean_height(position: Array2D, reference: JumpReference, constants: Progress
     """The mean height [m] of positions of feet (n, 3), of those that carry load in the plan; of all where none does."""
     total, count = 0.0, 0
     for foot in range(position.shape[0]):
-        if carries(reference, constants, foot):
+        if has_contact(reference.contact, constants.foot_of_point, foot):
             total += position[foot, 2]
             count += 1
     if count:
@@ -260,15 +269,6 @@ def mean_height(position: Array2D, reference: JumpReference, constants: Progress
     for foot in range(position.shape[0]):
         total += position[foot, 2]
     return total / len(position)
-
-
-@kernel
-def carries(reference: JumpReference, constants: ProgressConstants, foot: int) -> bool:
-    """Whether a foot carries load in the plan."""
-    for point in range(reference.contact.shape[0]):
-        if reference.contact[point] and constants.foot_of_point[point] == foot:
-            return True
-    return False
 
 
 @kernel

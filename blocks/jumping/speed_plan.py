@@ -37,7 +37,13 @@ from ..signals import (
     JumpReference,
     PlanOutcome,
 )
-from .plan_progress import PlanProgress, ProgressConstants, ProgressParameters, keep_in_time
+from .plan_progress import (
+    PlanProgress,
+    ProgressConstants,
+    ProgressParameters,
+    keep_in_time,
+    plan_time,
+)
 
 if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
@@ -190,9 +196,7 @@ class SpeedPlan(Block):
         scratch: Scratch,
         clock: Clock,
     ) -> None:
-        lead = delay.delay if constants.lead < 0.0 else constants.lead
-        early = min(delay.ahead, lead)
-        time = clock.base_period * clock.tick - progress.late + early
+        time, lead = plan_time(clock.base_period * clock.tick, delay, progress, constants)
         period = constants.hop_time
         slow, change = params.end_speed * period, params.most_change * period
         wanted = min(max(twist.linear[0] * period, ways[0]), ways[ways.shape[0] - 1])
@@ -203,9 +207,7 @@ class SpeedPlan(Block):
             left = params.jumps - memory.landed - 2
             land(min(wanted, slow + left * change), change, params.jumps, table, memory)
         now = time - memory.skipped
-        mix_rows(
-            now, lead - early, constants.period, table, firsts, ways, memory, reference, scratch
-        )
+        mix_rows(now, lead, constants.period, table, firsts, ways, memory, reference, scratch)
         write_marks(table, now, reference)
         if memory.jump < ROW and now >= table.jumps[memory.jump, 1]:
             memory.goal = memory.place + memory.way

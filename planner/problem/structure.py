@@ -204,9 +204,8 @@ class Structure:
         fixed = tuple(i for i, _, _ in self.given[end])
         last = Knot(2 * n, 0, fixed=fixed)
         obstacle = self._obstacle_rows(end)
-        if self.obstacles.knees_fold and len(
-            obstacle
-        ):  # where the base is given, knees can still fold
+        # Where the base is given, knees can still fold.
+        if self.obstacles.knees_fold and len(obstacle):
             last.pieces["obstacle"] = (np.arange(n), obstacle)
         return [*knots, last]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....mathematics.arrays import Indices1D
 from ....mathematics.kernel import kernel
+from ....mathematics.stance_feet import has_contact
 from ....mathematics.whole_body_qp import TaskRows
 from ....robots.description import RobotDescription
 from ....robots.limb import chain_to
@@ -203,15 +204,6 @@ def planned_acceleration(
 
 
 @kernel
-def stands(phase: PhaseState, foot_of_point: Indices1D, foot: int) -> bool:
-    """Whether a point of a foot is in stance."""
-    count = 0
-    for i in range(foot_of_point.shape[0]):
-        count += 1 if foot_of_point[i] == foot and phase.stance[i] else 0
-    return count > 0
-
-
-@kernel
 def lifting_rows(
     terms: DynamicsTerms,
     target: WholeBodyTarget,
@@ -234,7 +226,7 @@ def lifting_rows(
             continue
         foot = legs.foot[i]
         row, desired, ankle = 3 * i, 0.0, legs.ankle[foot]
-        if not stands(phase, legs.foot, foot):
+        if not has_contact(phase.stance, legs.foot, foot):
             for k in range(3):
                 joint = legs.joint[row + k]
                 rows.jacobian[row + k, :] = 0.0
