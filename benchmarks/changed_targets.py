@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..studies.summary import wilson_interval
-from .courses import SENSOR, run_seed
+from .courses import SENSOR, failures, run_seed
 from .rows import Row
 
 SEEDS = range(34000, 34020)
@@ -110,9 +110,7 @@ def changed_targets(seeds: Sequence[int] = SEEDS, kinds: Sequence[str] = tuple(K
         turns = [float(one["worst_turn_error_deg"]) for one in found if one.get("jumps")]
         told = sum(int(one["targets_changed"]) for one in found)
         nearest = sum(int(one["targets_not_reached"]) for one in found)
-        note = "; ".join(
-            f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"]
-        )
+        note = failures(found)
         rows += [
             Row(f"target changes, {kind}: jumps that miss", len(missed) / n, "", goal=MISSED_GOAL,
                 note=f"{n} jumps, 95 % interval {low:.2f} to {high:.2f}; {told} changes, of {nearest} the nearest"),

@@ -80,7 +80,7 @@ def _rows(found: Sequence[Mapping[str, Any]], missed_goal: float) -> list[Row]:
         name: sum(int(one[f"plans_{name}"]) for one in found)
         for name in ("planned", "nearest", "unsolved", "invalid")
     }
-    note = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    note = failures(found)
     return [
         Row("courses with a fall", len(fallen) / n, "", goal=missed_goal,
             note=f"{n} courses of {JUMPS} jumps, 95 % interval {low:.2f} to {high:.2f}"),
@@ -99,7 +99,7 @@ def pushed_courses(seeds: Sequence[int] = PUSHED_SEEDS) -> list[Row]:
     found = [run_pushed(seed) for seed in seeds]
     n, fallen = len(found), [one for one in found if fell(one)]
     low, high = wilson_interval(len(fallen), n)
-    note = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    note = failures(found)
     return [
         Row("pushed courses with a fall", len(fallen) / n, "", goal=0.1,
             note=f"{n} courses, 95 % interval {low:.2f} to {high:.2f}; {PUSH:g} N s in a flight of each"),
@@ -113,6 +113,11 @@ def run_pushed(seed: int) -> dict[str, Any]:
     flight, angle = int(rng.integers(1, JUMPS + 1)), float(rng.uniform(0.0, 2.0 * math.pi))
     push = {"push.force": PUSH / 0.01, "push.flight": flight, "push.angle": round(angle, 4)}
     return run_course(seed, push, (SENSOR, "trials/pushed.yaml"))
+
+
+def failures(found: Sequence[Mapping[str, Any]]) -> str:
+    """The seeds that are no success, and why."""
+    return "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
 
 
 def fell(metrics: Mapping[str, Any]) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..studies.summary import wilson_interval
-from .courses import fell, run_seed
+from .courses import failures, fell, run_seed
 from .rows import Row
 
 SEEDS = range(34100, 34120)
@@ -46,7 +46,7 @@ def hopping_on(seeds: Sequence[int] = SEEDS) -> list[Row]:
     made = [one for one in found if one.get("jumps")]
     off = [float(one["mean_length_error_m"]) / HOP_TIME for one in made]
     drift = [float(one["last_place_error_m"]) for one in made]
-    note = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    note = failures(found)
     return [
         Row("rows of hops with a fall", len(fallen) / n, "", goal=MISSED_GOAL,
             note=f"{n} rows of {HOPS}, 95 % interval {low:.2f} to {high:.2f}"),

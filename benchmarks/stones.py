@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..studies.summary import wilson_interval
-from .courses import JUMPS, LONGEST, fell, run_seed
+from .courses import JUMPS, LONGEST, failures, fell, run_seed
 from .rows import Row
 
 SEEDS = range(31800, 31820)
@@ -37,9 +37,7 @@ def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
         n, lost = len(found), [one for one in found if not passed(one)]
         low, high = wilson_interval(len(lost), n)
         worst = [float(one["worst_place_error_m"]) for one in found if one.get("jumps")]
-        why = "; ".join(
-            f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"]
-        )
+        why = failures(found)
         rows += [
             Row(f"{name}: courses lost", len(lost) / n, "", goal=MISSED_GOAL,
                 note=f"{n} courses of {JUMPS} jumps, 95 % interval {low:.2f} to {high:.2f}"),
@@ -82,7 +80,7 @@ def _rows_of_stairs(
     n, lost = len(found), [one for one in found if not passed(one, steps)]
     low, high = wilson_interval(len(lost), n)
     up = [float(one["duration"]) for one in found if passed(one, steps)]
-    why = "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
+    why = failures(found)
     return [
         Row(f"{name}: not up", len(lost) / n, "", goal=MISSED_GOAL,
             note=f"{n} robots, {steps} steps of {height}, 95 % interval {low:.2f} to {high:.2f}"),
