@@ -242,6 +242,7 @@ def calls():
         run_jump({**weak, "wbc.cones": "round"}, duration=0.1)
         run_jump({"robot.motor_model.load_friction": 0.05}, 0.02, "from_gantry.yaml")
         run_jump(FAULTS, duration=0.1)
+        run_jump(duration=0.3, graph="jump_twin.yaml")  # with the fault detector
         steer_alone()
         run_alone("hal.MujocoRobot", bruce_with(**SENSORS))
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
