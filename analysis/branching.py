@@ -8,73 +8,11 @@ recorded run did.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ..logs.replay.replay import Replayable, Replayed, ReplayError, replay
-from ..runtime.language.layout import Layout
-from ..runtime.language.parameter_change import ParameterChange
 from ..runtime.language.stages import CheckedGraph
 from ..runtime.running.memory import BoundGraph, Snapshot
 from ..runtime.running.sinks import Sink
-
-
-@dataclass(frozen=True)
-class RunWithKeyframe:
-    """A recorded run with one keyframe more."""
-
-    run: Replayable
-    taken: Snapshot
-
-    @property
-    def graph(self) -> CheckedGraph:
-        """The graph that ran."""
-        return self.run.graph
-
-    @property
-    def bus(self) -> Layout:
-        """The layout of the rows."""
-        return self.run.bus
-
-    @property
-    def state(self) -> Layout:
-        """The layout of the keyframes' state."""
-        return self.run.state
-
-    @property
-    def ticks(self) -> NDArray[np.int64]:
-        """All recorded ticks."""
-        return self.run.ticks
-
-    @property
-    def keyframes(self) -> Sequence[int]:
-        """The ticks before which the whole memory is known."""
-        return sorted({*self.run.keyframes, self.taken.tick})
-
-    @property
-    def changes(self) -> Sequence[ParameterChange]:
-        """The parameters that were changed while it ran."""
-        return self.run.changes
-
-    @property
-    def failed(self) -> bool:
-        """Whether a block failed in the tick after the last row."""
-        return self.run.failed
-
-    @property
-    def late(self) -> Sequence[str]:
-        """The background blocks of which a result was late."""
-        return self.run.late
-
-    def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The ticks from ``first`` up to ``last``, and their rows."""
-        return self.run.rows(first, last)
-
-    def keyframe(self, tick: int) -> Snapshot:
-        """What the graph remembered before ``tick``. Raises ``KeyError``."""
-        return self.taken if tick == self.taken.tick else self.run.keyframe(tick)
 
 
 def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:
@@ -136,8 +74,7 @@ def branch(
         raise ReplayError(
             "the run of a real robot cannot go on in another way; branch a simulation"
         )
-    known = RunWithKeyframe(recorded, snapshot_at(recorded, tick))
     return replay(
-        known, graph=chosen, inputs="seed", first_tick=tick, last_tick=until,
+        recorded, graph=chosen, inputs="seed", snapshot=snapshot_at(recorded, tick), last_tick=until,
         beyond=until or chosen.ticks, keep=True, sinks=sinks,
     )  # fmt: skip

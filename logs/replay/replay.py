@@ -225,6 +225,7 @@ def replay(
     inputs: Inputs | None = None,
     run: Sequence[str] | None = None,
     first_tick: int | None = None,
+    snapshot: Snapshot | None = None,
     last_tick: int | None = None,
     beyond: int | None = None,
     keep: bool = False,
@@ -240,6 +241,7 @@ def replay(
             are fed; by default the former if a simulator is all there is outside.
         run: run only these blocks, and feed all others.
         first_tick: begin at the last keyframe at or before it; by default at the beginning.
+        snapshot: begin with it, at its tick, instead.
         last_tick: end before it; by default with the recording.
         beyond: run on without the recording and end before this tick, if it comes later.
         keep: whether to keep the replayed rows.
@@ -254,7 +256,9 @@ def replay(
     if not len(recorded.ticks):
         raise ReplayError("the recording holds no tick")
     fed = _fed(graph, inputs or default_inputs(graph), run, recorded.late)
-    start = _start(recorded, first_tick)
+    if snapshot is None:
+        snapshot = _beginning(recorded, first_tick)
+    start = snapshot.tick if snapshot else 0
     end = int(recorded.ticks[-1]) + 1
     if last_tick is not None:
         end = min(end, last_tick)
@@ -264,11 +268,10 @@ def replay(
     end = max(end, beyond or 0)
     if end <= start:
         raise ReplayError(f"no tick from {start} up to {end} is in the recording")
-    _expect_beginning(recorded, start)
     _expect_no_gap(recorded, fed, start, end)
     bound = BoundGraph(playback_graph(graph, fed))
     bound.clock.tick = start
-    follower = Follower(recorded, bound, start, keep, before_tick)
+    follower = Follower(recorded, bound, snapshot, keep, before_tick)
     result = Executor(
         bound, clock=ClockSpec("free"), sinks=[follower, *sinks], log=False,
         on_ready=follower.ready,
@@ -306,27 +309,26 @@ def _fed(
     ]
 
 
-def _start(recorded: Replayable, first_tick: int | None) -> int:
-    """The tick to begin with: the recording's first, or a keyframe."""
-    first = int(recorded.ticks[0])
-    if first_tick is None:
-        return first
-    if not first <= first_tick <= recorded.ticks[-1]:
-        raise ReplayError(
-            f"tick {first_tick} is not in the recording, which has {first} to {recorded.ticks[-1]}"
-        )
-    keyframe = nearest_keyframe(recorded, first_tick)
-    return first if keyframe is None else keyframe
-
-
-def _expect_beginning(recorded: Replayable, start: int) -> None:
-    """Raise if the replay does not begin with the run and there is no keyframe to begin with."""
-    if start > 0 and start not in recorded.keyframes:
+def _beginning(recorded: Replayable, first_tick: int | None) -> Snapshot | None:
+    """The keyframe to begin with; ``None`` where the run begins as it did."""
+    first, last = int(recorded.ticks[0]), int(recorded.ticks[-1])
+    start = first
+    if first_tick is not None:
+        if not first <= first_tick <= last:
+            raise ReplayError(
+                f"tick {first_tick} is not in the recording, which has {first} to {last}"
+            )
+        nearest = nearest_keyframe(recorded, first_tick)
+        start = first if nearest is None else nearest
+    if start == 0:
+        return None
+    if start not in recorded.keyframes:
         raise ReplayError(
             f"the recording begins at tick {start}, and holds nothing of what the graph "
             "remembered there; begin at a keyframe with --from: "
             + (", ".join(map(str, recorded.keyframes)) or "there is none")
         )
+    return recorded.keyframe(start)
 
 
 def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: int) -> None:
@@ -348,11 +350,11 @@ class Follower:
     """A sink that feeds the blocks that do not run, applies recorded changes of parameters, and compares."""
 
     def __init__(
-        self, recorded: Replayable, bound: BoundGraph, first_tick: int, keep: bool,
+        self, recorded: Replayable, bound: BoundGraph, beginning: Snapshot | None, keep: bool,
         before_tick: BeforeTick | None = None,
     ) -> None:  # fmt: skip
         self._recorded, self._bound = recorded, bound
-        self._first, self._keep, self._before_tick = first_tick, keep, before_tick
+        self._beginning, self._keep, self._before_tick = beginning, keep, before_tick
         memory, order = bound.memory, bound.graph.order
         try:
             self._feed = Playback(bound, recorded.bus)
@@ -363,8 +365,8 @@ class Follower:
         self.ran = tuple(path for path in bound.blocks if path not in self._feed.paths)
         self._bus = Translation(recorded.bus, memory.bus.layout)
         self._state = Translation(recorded.state, memory.state.layout)
-        if first_tick > 0:
-            self._expect_state()
+        if beginning is not None:
+            self._expect_state(beginning.tick)
         ran = dict.fromkeys(self.ran)
         # a recording without keyframes says nothing of state
         states = self._state.notes if recorded.keyframes else []
@@ -382,12 +384,12 @@ class Follower:
         self._changes = list(recorded.changes)
         self._kept: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
 
-    def _expect_state(self) -> None:
-        """Raise if the keyframe lacks some of this graph's state."""
+    def _expect_state(self, tick: int) -> None:
+        """Raise if the keyframe before a tick lacks some of this graph's state."""
         for note in self._state.notes:
             if not note.endswith(" is in the recording only"):
                 raise ReplayError(
-                    f"what the keyframe at tick {self._first} holds does not fit this graph: state "
+                    f"what the keyframe at tick {tick} holds does not fit this graph: state "
                     f"{note}; replay from the beginning"
                 )
 
@@ -396,10 +398,12 @@ class Follower:
 
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""
-        if self._first > 0:  # at the beginning blocks are as they start
-            self._change_parameters(self._first)  # before: runs under way had those of their ticks
-            self._restore(self._recorded.keyframe(self._first))
-        self._prepare(self._first)
+        first = 0  # at the beginning blocks are as they start
+        if self._beginning is not None:
+            first = self._beginning.tick
+            self._change_parameters(first)  # before: runs under way had those of their ticks
+            self._restore(self._beginning)
+        self._prepare(first)
 
     def record(self, tick: int) -> None:
         """Keep the tick for comparison, and prepare the next one."""
@@ -462,7 +466,7 @@ class Follower:
             (self._bus, memory.bus, bus), (self._state, memory.state, state),
         ):  # fmt: skip
             translation.write(data, region.buffer)
-        self._bound.clock.tick = self._first
+        self._bound.clock.tick = keyframe.tick
         for block in self._bound.blocks.values():
             block.load_state()
 
