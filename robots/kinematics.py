@@ -17,10 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mathematics.arrays import Array
+from ..mathematics.arrays import Array, Flags1D
 from ..mathematics.body_dynamics import BodyTree, body_motion, place_bodies
 from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import axis_rotations, matrices_of_quaternions
+from .limb import FootKind, foot_shape
 from .robot_description import Joint, RobotDescription
 
 FALL_SHARE = 0.315
@@ -233,6 +234,23 @@ def standing_feet(robot: RobotDescription) -> Array:
         place, turn = poses.of(foot.link)
         feet[number] = place[0] + product(turn[0], np.array(foot.sole)) - com
     return feet
+
+
+def standing_directions(robot: RobotDescription) -> tuple[Array, Flags1D]:
+    """The direction of every foot as the robot stands, (n_feet, 2), and which of them are points, (n_feet,).
+
+    A foot with a line or a sole points ahead, (1, 0). A point has no direction; its place from the middle of
+    all feet [m] stands for it.
+    """
+    points = np.array(
+        [foot_shape(robot, foot)[0] is FootKind.POINT for foot in range(len(robot.feet))]
+    )
+    directions = np.zeros((len(points), 2))
+    directions[:, 0] = 1.0
+    feet = standing_feet(robot)[:, :2]
+    if len(points) > 1:
+        directions[points] = (feet - feet.mean(axis=0))[points]
+    return directions, points
 
 
 def foot_sides(feet: Array) -> tuple[float, ...]:

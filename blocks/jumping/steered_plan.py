@@ -20,7 +20,7 @@ from ...planner.library.jump_table import (
 from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
 from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
-from ...robots.foot_directions import standing_directions
+from ...robots.kinematics import standing_directions
 from ...runtime.language.block import (
     Block,
     Context,

@@ -10,7 +10,7 @@ from ...mathematics.arrays import Array2D
 from ...mathematics.elementary import atan2, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import wrap
-from ...robots.foot_directions import standing_directions
+from ...robots.kinematics import standing_directions
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.context import Clock
 from ...runtime.language.parameters import parameter
