@@ -19,7 +19,7 @@ reduced coordinates of ``Coordinates``:
 ``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
 ``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
             are, and how far on their own leg's side of the torso's middle plane, each point's
-            height and side less its radius.
+            height and side less its radius; then the gaps along the torso of ``fore_and_hind``.
 ``obstacle`` z = q.             Rows: how high the points of ``obstacle_points`` are above ground
             with a step, rounded, less their radii.
 
@@ -54,6 +54,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -311,7 +312,7 @@ def piece_expressions(
         z, cost, rows = _impact(model, coordinates, q, v, w)
     elif name == "contact":
         errors = _place_errors(model, coordinates, q, w)
-        rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
+        rows = [_contact_velocities(model, coordinates, q, v, w, errors), errors]
     elif name == "take_off":
         whole = centroidal_momentum(model, coordinates.expand(q), coordinates.expand(v))
         rise = whole.linear[2] / model.robot.total_mass
@@ -519,6 +520,40 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, w: Map
     return ca.vertcat(*errors)
 
 
+def _contact_velocities(
+    model: SymbolicModel, coordinates: Coordinates, q: Any, v: Any, w: Mapping[str, Any],
+    errors: Any,
+) -> Any:  # fmt: skip
+    """The velocities of the place errors, which die out at ``DRIFT_RATE``. Out of the sagittal plane those of a ball
+    along the ground are the velocities of its material where it touches: how far it has rolled follows from no
+    attitude then, and a leg that yaws while its knee stretches would slip by the difference."""
+    import casadi as ca
+
+    rates = ca.jtimes(errors, q, v)
+    if 1 not in coordinates.axes:
+        return rates + DRIFT_RATE * errors
+    robot, rows = model.robot, ca.vertsplit(rates + DRIFT_RATE * errors)
+    frames = model.frames(coordinates.expand(q), coordinates.limbs)
+    link_of = {foot.name: foot.link for foot in robot.feet}
+    axes = ca.reshape(w["axes"], 3, 3).T if "axes" in w else None
+    heading = w["heading"]
+    for i, c in enumerate(coordinates.contacts):
+        place, radius = touching_sphere(robot, c)
+        if not radius:
+            continue
+        link = link_of[robot.contacts[c].foot]
+        rotation = frames[link][0]
+        turning = ca.mtimes(ca.reshape(ca.jtimes(ca.vec(rotation), q, v), 3, 3), rotation.T)
+        centre = ca.jtimes(model.point(frames, link, place), q, v)
+        slip = centre - radius * ca.vertcat(turning[0, 2], turning[1, 2], 0.0)
+        if axes is None:
+            along = heading[0] * slip[0] + heading[1] * slip[1]
+            rows[3 * i], rows[3 * i + 1] = along, heading[0] * slip[1] - heading[1] * slip[0]
+        else:
+            rows[3 * i], rows[3 * i + 1] = ca.vertsplit(ca.mtimes(axes[:2, :], slip))
+    return ca.vertcat(*rows)
+
+
 def _air_rows(
     model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
 ) -> list[Any]:
@@ -538,7 +573,12 @@ def _air_rows(
         sign * ca.dot(left, place - whole[0:3]) - radius
         for place, (_, radius, sign) in zip(places, points, strict=True)
     ]
-    return [*heights, *(place[0] for place in places), *sides]
+    ahead = base_rotation(whole[3:6])[:, 0]
+    gaps = [
+        ca.dot(ahead, places[fore] - places[hind]) - points[fore][1] - points[hind][1]
+        for fore, hind in fore_and_hind(model, coordinates)
+    ]
+    return [*heights, *(place[0] for place in places), *sides, *gaps]
 
 
 HIP_JOINTS = 3
@@ -564,8 +604,27 @@ def body_points(model: SymbolicModel, coordinates: Coordinates
             for shape in link.shapes:
                 found += [((link.name, shape.start), shape.radius)]
                 found += [((link.name, shape.end), shape.radius)]
-    sides = {
-        limb: float(np.sign(robot.joints[model.limbs[limb][0]].origin[1]))
-        for limb in range(len(model.limbs))
-    }
+    sides = {limb: float(np.sign(_root(model, limb)[1])) for limb in range(len(model.limbs))}
     return [(point, radius, sides[model.limb_of_link[point[0]]]) for point, radius in found]
+
+
+def fore_and_hind(model: SymbolicModel, coordinates: Coordinates) -> list[tuple[int, int]]:
+    """Pairs of ``body_points`` of a leg and of the next one behind it on the same side, indices: a plane across the
+    torso keeps such legs apart if each point of the one is ahead of each point of the other."""
+    points = body_points(model, coordinates)
+    of_limb: dict[int, list[int]] = {}
+    for i, (point, _, _) in enumerate(points):
+        of_limb.setdefault(model.limb_of_link[point[0]], []).append(i)
+    found = []
+    for side in (-1.0, 0.0, 1.0):
+        legs = [limb for limb in of_limb if np.sign(_root(model, limb)[1]) == side]
+        legs.sort(key=lambda limb: -_root(model, limb)[0])
+        for fore, hind in pairwise(legs):
+            if _root(model, fore)[0] > _root(model, hind)[0]:
+                found += list(product(of_limb[fore], of_limb[hind]))
+    return found
+
+
+def _root(model: SymbolicModel, limb: int) -> tuple[float, float, float]:
+    """Where a limb's first joint is on the base [m]."""
+    return model.robot.joints[model.limbs[limb][0]].origin
