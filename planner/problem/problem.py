@@ -27,8 +27,9 @@ from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
+from .leg_rows import body_points, fore_and_hind
 from .obstacles import step_parameters
-from .stage_functions import StageFunction, body_points, fore_and_hind, parameter_sizes
+from .stage_functions import StageFunction, parameter_sizes
 from .structure import Structure
 
 BODY_CLEARANCE = 0.002

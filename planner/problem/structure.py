@@ -29,8 +29,9 @@ from ..task.sequence import Hop, StanceLocation, edge_of, ground_axes, step_of
 from ..task.task import JumpTask
 from .assembly import Knot
 from .layout import ProblemPhase, layout
+from .leg_rows import fore_and_hind
 from .obstacles import ObstacleRows
-from .stage_functions import StageFunction, fore_and_hind
+from .stage_functions import StageFunction
 
 LENGTH = 0.05
 """m; turns of a foot count as velocities at this distance."""

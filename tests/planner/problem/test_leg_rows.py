@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 
 from aloft.planner.models.symbolic_model import SymbolicModel
+from aloft.planner.problem.leg_rows import body_points, fore_and_hind
 from aloft.planner.problem.obstacles import touching_sphere
-from aloft.planner.problem.stage_functions import (
-    body_points,
-    fore_and_hind,
-    make_coordinates,
-    piece_expressions,
-)
+from aloft.planner.problem.stage_functions import make_coordinates, piece_expressions
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
