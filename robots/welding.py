@@ -21,15 +21,16 @@ from .kinematics import from_base_outwards
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """What hangs on a held joint: a rigid body that is part of a link of the welded robot.
+    """What hangs on a held joint: a rigid body that is part of a link of the welded robot, and what moves on it.
 
     Attributes:
         joint: the held joint's index in the whole robot.
         link: the link of the welded robot that carries it; all vectors are in that link's frame.
         axis, origin: of the joint (m).
-        mass, com: of all that hangs on it (kg, m).
+        mass, com: of the rigid body (kg, m).
         inertia: about that centre of mass, xx, yy, zz, xy, xz, yz (kg m^2).
         most: what the joint's motor can hold (N m), or infinity if several motors share the joint.
+        carried: the joints of the welded robot that move on the rigid body.
     """
 
     joint: int
@@ -40,6 +41,7 @@ class HeldLoad:
     com: Vector3
     inertia: tuple[float, float, float, float, float, float]
     most: float
+    carried: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +53,7 @@ class WeldedRobot:
         moving: for every joint of the welded robot its index in the whole one.
         held: the indices of the joints that are held in the whole robot.
         angles: their angles [rad] or places [m].
-        loads: what hangs on each held hinge that nothing moving and no foot hangs on.
+        loads: what hangs on each held hinge that no foot hangs on.
     """
 
     robot: RobotDescription
@@ -177,26 +179,30 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
 
 
 def _load(robot: RobotDescription, places: dict[str, _Place], index: int) -> HeldLoad | None:
-    """What hangs on a held joint; ``None`` for a slide, and where something that moves or stands
-    on the ground hangs on it."""
+    """What hangs on a held joint; ``None`` for a slide, and where something that stands on the ground
+    hangs on it."""
     joint = robot.joints[index]
-    beyond = {joint.child}
-    for _, other in from_base_outwards(robot):
-        if other.parent in beyond:
-            beyond.add(other.child)
-            if other.name not in robot.held:
-                return None
+    rigid, beyond, carried = {joint.child}, {joint.child}, list[int]()
+    for k, other in from_base_outwards(robot):
+        if other.parent not in beyond:
+            continue
+        beyond.add(other.child)
+        if other.parent in rigid and other.name in robot.held:
+            rigid.add(other.child)
+        elif other.parent in rigid:
+            carried.append(k)
     if joint.kind == "slide" or beyond & {foot.link for foot in robot.feet}:
         return None
     on = places[joint.parent]
-    mass, com, inertia = _lumped(places, [x for x in robot.links if x.name in beyond])
+    mass, com, inertia = _lumped(places, [x for x in robot.links if x.name in rigid])
     motors = np.flatnonzero(robot.joint_to_motor[:, index])
     alone = len(motors) == 1 and np.count_nonzero(robot.joint_to_motor[motors[0]]) == 1
     gear = float(abs(robot.joint_to_motor[motors[0], index])) if alone else 1.0
     most = gear * float(robot.motors.peak_torque[motors[0]]) if alone else np.inf
+    moving = [k for k, each in enumerate(robot.joints) if each.name not in robot.held]
     return HeldLoad(
         index, on.link, _vector(on.rotation @ np.array(joint.axis)), _vector(on.point(joint.origin)),
-        mass, _vector(com), _six(inertia), most,
+        mass, _vector(com), _six(inertia), most, tuple(moving.index(k) for k in carried),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ takes about a tenth of the time. Where the legs splay, all joints of the compute
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -32,6 +32,7 @@ class Coordinates:
         rows: of a base wrench (force, moment), those that are not zero by symmetry.
         joints: indices of the joints of the computed limbs; their motors are computed.
         moving: indices of the joints that are coordinates, in their order.
+        twins: of mirrored joints that are not computed those that they mirror.
         contacts: indices of the contact points on the computed limbs.
         axes: the components of a contact force that are variables.
         force_matrix: all contact forces (3 n_contacts) = this times those variables.
@@ -44,6 +45,7 @@ class Coordinates:
     rows: tuple[int, ...]
     joints: tuple[int, ...]
     moving: tuple[int, ...]
+    twins: Mapping[int, int]
     contacts: tuple[int, ...]
     axes: tuple[int, ...]
     force_matrix: Array
@@ -100,7 +102,7 @@ def full_coordinates(model: SymbolicModel) -> Coordinates:
     contacts = len(model.robot.contacts)
     return Coordinates(
         "full", np.eye(model.size), tuple(range(len(model.limbs))), 1, tuple(range(6)),
-        tuple(range(model.n_joints)), tuple(range(model.n_joints)), tuple(range(contacts)),
+        tuple(range(model.n_joints)), tuple(range(model.n_joints)), {}, tuple(range(contacts)),
         (0, 1, 2), np.eye(3 * contacts),
     )  # fmt: skip
 
@@ -135,7 +137,7 @@ def _mirrored(model: SymbolicModel, name: str) -> Coordinates | None:
     axes = (0, 2) if flat else (0, 1, 2)
     return Coordinates(
         name, matrix, tuple(pair.limbs[0] for pair in pairs), 2, (0, 2, 4),
-        tuple(i for i, _, _ in twins), tuple(i for i, _, _ in moving),
+        tuple(i for i, _, _ in twins), tuple(i for i, _, _ in moving), {j: i for i, j, _ in twins},
         tuple(c for pair in pairs for c, _ in pair.contacts), axes,
         _force_matrix(len(robot.contacts), pairs, axes),
     )  # fmt: skip

@@ -58,10 +58,10 @@ def _model(robot: RobotDescription, symmetric: bool) -> tuple[SymbolicModel, Sta
 
 
 def _matters(load: HeldLoad) -> bool:
-    """Whether a hard jump could need a good part of what the joint's motor can hold."""
+    """Whether a hard jump could need a good part of what the joint's motor can hold: what moves on it may."""
     arm = np.linalg.norm(np.array(load.com) - np.array(load.origin))
     torque = load.mass * arm * HARD + max(load.inertia[:3]) * HARD_TURN
-    return bool(torque > MATTERS * load.most)
+    return bool(load.carried) or bool(torque > MATTERS * load.most)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ dynamics: what every link carries (mass, momentum) is passed on to the link that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,10 @@ from .symmetry import limbs_of
 
 Expression = Any
 """A CasADi SX or DM; the library has no types of its own."""
+
+MIRRORED_WRENCH = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
+"""The mirror image of a force and a moment, by the base's x-z plane."""
+NO_TWINS: Mapping[int, int] = {}
 
 
 def base_rotation(angles: Expression) -> Expression:
@@ -222,8 +226,10 @@ class SymbolicModel:
 
         Returns:
             the wrench (force, moment about the base's origin; body frame) that the base link needs,
-            the wrench that each limb needs at the base, and the joint torques (n_joints), zero for
-            limbs left out. The robot moves freely where the wrenches add up to zero.
+            by joint the wrench that all that hangs on it needs from the link that carries it (force,
+            moment about that link's origin; its frame), and the joint torques (n_joints), zero for
+            limbs left out. The robot moves freely where those at the base add up to zero
+            (``base_wrench``).
         """
         import casadi as ca
 
@@ -250,7 +256,7 @@ class SymbolicModel:
                     wrench = wrench - ca.vertcat(push[child], ca.cross(place, push[child]))
             needed[child] = wrench
         torques = [ca.SX(0)] * self.n_joints
-        limb_wrenches: dict[int, Any] = {}
+        passed: dict[int, Any] = {}
         for index in reversed(joints):
             joint = robot.joints[index]
             wrench = needed[joint.child]
@@ -259,14 +265,19 @@ class SymbolicModel:
             turn = backs[joint.child].T
             force, moment = ca.mtimes(turn, wrench[0:3]), ca.mtimes(turn, wrench[3:6])
             origin = joint_origin(joint, q[6 + index])
-            passed = ca.vertcat(force, moment + ca.cross(origin, force))
-            if joint.parent == base:
-                limb_wrenches[self.limb_of_link[joint.child]] = passed
-            else:
-                needed[joint.parent] = needed[joint.parent] + passed
+            passed[index] = ca.vertcat(force, moment + ca.cross(origin, force))
+            if joint.parent != base:
+                needed[joint.parent] = needed[joint.parent] + passed[index]
         spun = ca.mtimes(ca.DM(self.rotors), a[6:])
         moved = [torques[i] + spun[i] if i in joints else torques[i] for i in range(self.n_joints)]
-        return needed[base], limb_wrenches, ca.vertcat(*moved)
+        return needed[base], passed, ca.vertcat(*moved)
+
+    def base_wrench(self, base: Expression, passed: dict[int, Expression], share: int) -> Any:
+        """The wrench that the robot needs from outside, of ``inverse_dynamics``' results, where every
+        computed limb stands for ``share`` of them."""
+        joints = self.robot.joints
+        limbs = [w for i, w in passed.items() if joints[i].parent == self.robot.base]
+        return base + share * sum(limbs)
 
     def _touching(
         self, contact: ContactPoint, backs: dict[str, Any], down: Expression, link: str
@@ -285,10 +296,23 @@ class SymbolicModel:
         return ca.DM(ball.centre) - ball.radius * up
 
     def held_torques(
-        self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None = None
+        self,
+        q: Expression,
+        v: Expression,
+        a: Expression,
+        passed: dict[int, Expression],
+        limbs: Sequence[int] | None = None,
+        twins: Mapping[int, int] = NO_TWINS,
     ) -> list[Any]:
         """The torques that keep held joints still in a motion, of those ``loads`` on the base and
-        those limbs."""
+        those limbs.
+
+        Args:
+            q, v, a: coordinates, velocities and accelerations.
+            passed: by joint what hangs on it needs, of ``inverse_dynamics``.
+            limbs: the limbs that are computed; by default all.
+            twins: of mirrored joints that are not computed those that they mirror.
+        """
         import casadi as ca
 
         spins, turns, pulls = self._accelerations(q, v, a, limbs)
@@ -302,7 +326,14 @@ class SymbolicModel:
             force = load.mass * (lifted + ca.cross(spin, ca.cross(spin, centre)))
             tensor = ca.DM(inertia_tensor(load))
             moment = ca.mtimes(tensor, turn) + ca.cross(spin, ca.mtimes(tensor, spin))
-            found.append(ca.dot(ca.DM(list(load.axis)), moment + ca.cross(arm, force)))
+            moment = moment + ca.cross(arm, force)
+            for joint in load.carried:
+                wrench = passed[twins.get(joint, joint)]
+                if joint in twins:
+                    wrench = ca.DM(MIRRORED_WRENCH) * wrench
+                own = ca.cross(ca.DM(list(load.origin)), wrench[0:3])
+                moment = moment + wrench[3:6] - own
+            found.append(ca.dot(ca.DM(list(load.axis)), moment))
         return found
 
     def _accelerations(

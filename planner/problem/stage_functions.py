@@ -356,10 +356,10 @@ def _interval(
         if forces
     }
     middle = coordinates.expand(half_q), coordinates.expand(half_v), coordinates.expand(a)
-    base, limbs, torque = model.inverse_dynamics(*middle, named, coordinates.limbs)
-    held = model.held_torques(*middle, coordinates.limbs)
+    base, passed, torque = model.inverse_dynamics(*middle, named, coordinates.limbs)
+    held = model.held_torques(*middle, passed, coordinates.limbs, coordinates.twins)
     if name != "flight":
-        wrench = base + coordinates.share * sum(limbs.values())
+        wrench = model.base_wrench(base, passed, coordinates.share)
         balance = [wrench[list(coordinates.rows)]]
     start = [] if name == "stance" else [-state]
     motors = _motor_rows(model, coordinates, torque, v, v + h * a, w["slope"])
@@ -459,10 +459,10 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
     sums = []
     # Gravity has no impulse: what holds the robot at rest is taken off again.
     for bend, forces in ((coordinates.expand(change), named), (still, {})):
-        base, limbs, torque = model.inverse_dynamics(
+        base, passed, torque = model.inverse_dynamics(
             coordinates.expand(q), still, bend, forces, coordinates.limbs
         )
-        wrench = base + coordinates.share * sum(limbs.values())
+        wrench = model.base_wrench(base, passed, coordinates.share)
         sums.append(ca.vertcat(wrench[list(coordinates.rows)], torque[list(coordinates.moving)]))
     return sums[0] - sums[1]
 

@@ -14,10 +14,12 @@ from tests.planner.models.test_symbolic_model import evaluate, to_pinocchio
 from tests.robots.example_robots import INSTALLED
 from tests.robots.limbed_robots import LIGHT_QUADRUPED, humanoid, quadruped, slider
 
+from aloft.planner.models.coordinates import full_coordinates, mirrored_coordinates
 from aloft.planner.models.euler_angles import rotation
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.models.symbolic_model import SymbolicModel, centroidal_momentum
+from aloft.planner.models.symmetry import mirrored_pairs, symmetrised
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.robots.welding import welded
 
@@ -49,10 +51,10 @@ def test_dynamics_agree(name: str) -> None:
     forces = np.random.default_rng(4).uniform(-50.0, 50.0, (contacts, 3))
     symbols = [ca.SX.sym(x, model.size) for x in "qva"] + [ca.SX.sym("f", 3 * contacts)]
     named = {c.name: symbols[3][3 * i : 3 * i + 3] for i, c in enumerate(robot.contacts)}
-    base, limbs, torque = model.inverse_dynamics(*symbols[:3], named)
+    base, passed, torque = model.inverse_dynamics(*symbols[:3], named)
     _, linear, angular = centroidal_momentum(model, *symbols[:2])
     found = evaluate(
-        [ca.vertcat(base + sum(limbs.values()), torque), linear, angular, model.com(symbols[0])],
+        [ca.vertcat(model.base_wrench(base, passed, 1), torque), linear, angular, model.com(symbols[0])],
         symbols, [q, v, a, forces.ravel()],
     )  # fmt: skip
     peer = ExactDynamics(robot)
@@ -125,7 +127,7 @@ def test_the_torque_of_a_held_joint_is_the_whole_robots() -> None:
     model = SymbolicModel(part.robot, part.loads)
     q, v, a = motion(model.size)
     symbols = [ca.SX.sym(x, model.size) for x in "qva"]
-    found = evaluate(model.held_torques(*symbols), symbols, [q, v, a])[0]
+    found = evaluate(model.held_torques(*symbols, {}), symbols, [q, v, a])[0]
     peer = ExactDynamics(robot)
     pq, pv, pa = (np.zeros(n) for n in (peer.model.nq, peer.model.nv, peer.model.nv))
     for whole, own, base in zip((pq, pv, pa), to_pinocchio(q, v, a), (7, 6, 6), strict=True):
@@ -134,3 +136,35 @@ def test_the_torque_of_a_held_joint_is_the_whole_robots() -> None:
     torque = pin.rnea(peer.model, peer.data, pq, pv, pa)[6 + part.held[0]]
     assert abs(found.item() - torque) < 1e-10
     assert np.allclose(rotation(np.zeros(3)), np.eye(3))
+
+
+@pytest.mark.skipif(not INSTALLED, reason="G1 needs example-robot-data")
+@pytest.mark.parametrize("coordinates", [full_coordinates, mirrored_coordinates])
+def test_the_torque_of_a_held_joint_counts_the_arms_that_move_on_it(coordinates) -> None:  # type: ignore[no-untyped-def]
+    g1 = find_robot("g1")
+    arms = ("shoulder_pitch_joint", "elbow_joint")
+    robot = g1.changed(held={n: x for n, x in g1.held.items() if not n.endswith(arms)})
+    part = welded(robot)
+    pairs = mirrored_pairs(part.robot)
+    assert pairs is not None and len(pairs) == 2  # legs and arms
+    model = SymbolicModel(symmetrised(part.robot, pairs), part.loads)
+    chosen = coordinates(model)
+    q, v, a = motion(chosen.size)
+    symbols = [ca.SX.sym(x, chosen.size) for x in "qva"]
+    whole = [chosen.expand(x) for x in symbols]
+    passed = model.inverse_dynamics(*whole, {}, chosen.limbs)[1]
+    held = model.held_torques(*whole, passed, chosen.limbs, chosen.twins)
+    found = evaluate([ca.vertcat(*held), *whole], symbols, [q, v, a])
+    peer = ExactDynamics(robot)
+    pq, pv, pa = (np.zeros(n) for n in (peer.model.nq, peer.model.nv, peer.model.nv))
+    moved = to_pinocchio(*(x.ravel() for x in found[1:]))
+    for each, own, base in zip((pq, pv, pa), moved, (7, 6, 6), strict=True):
+        each[:base] = own[:base]
+        each[base:] = part.expand(own[base:], held=part.angles if base == 7 else None)
+    torque = pin.rnea(peer.model, peer.data, pq, pv, pa)[6:]
+    links = model.frames(whole[0], chosen.limbs)
+    known = [load for load in part.loads if load.link in links]
+    waist = [robot.joints[load.joint].name for load in known if len(load.carried) == 2]
+    assert waist == ["waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint"]
+    expected = torque[[load.joint for load in known]]
+    assert found[0].ravel() == pytest.approx(expected, abs=5e-3 * np.abs(expected).max())
