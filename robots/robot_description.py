@@ -445,12 +445,12 @@ class RobotDescription(Part):
         held them. Joints that are free already stay so.
 
         Raises:
-            LookupError: a name or pattern fits no joint; the message names those that are held.
+            LookupError: a name or pattern fits no joint; the message names those that it holds.
         """
         for pattern in names:
             if not any(fnmatchcase(joint.name, pattern) for joint in self.joints):
                 held = ", ".join(self.held) or "none"
-                raise LookupError(f"{self.name} has no joint {pattern!r}; held are {held}")
+                raise LookupError(f"{self.name} has no joint {pattern!r}; it holds {held}")
         freed = [name for name in self.held if any(fnmatchcase(name, p) for p in names)]
         if not freed:
             return self
