@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...robots.capsules import arms, capsule_ends, capsule_gaps, lacking, legs
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
-    from_base_outwards,
     link_poses,
 )
 from ...robots.welding import welded
@@ -67,21 +67,6 @@ def ground_height(
     return np.asarray(found)
 
 
-def capsule_ends(
-    robot: RobotDescription, poses: LinkPoses, link: str
-) -> list[tuple[Array, Array, float]]:
-    """Both ends (n, 3) and the radius of every capsule of a link."""
-    position, rotation = poses.of(link)
-    return [
-        (
-            position + rotation @ np.array(shape.start),
-            position + rotation @ np.array(shape.end),
-            shape.radius,
-        )
-        for shape in robot.link(link).shapes
-    ]
-
-
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
@@ -121,17 +106,27 @@ def body_heights(
     return found
 
 
-def legs(robot: RobotDescription) -> list[list[str]]:
-    """The links of every leg, from the base outwards, legs in the order of the feet."""
-    parent = {joint.child: joint.parent for _, joint in from_base_outwards(robot)}
-    found = []
-    for foot in robot.feet:
-        chain, link = [foot.link], foot.link
-        while parent[link] != robot.base:
-            link = parent[link]
-            chain.append(link)
-        found.append(chain[::-1])
-    return found
+def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[Array, str] | None:
+    """The same as ``leg_lack`` between each of the ``arms`` and all that is no part of it; and which link lacks most.
+    ``None`` where no arm has shapes that could touch."""
+    parent = {joint.child: joint.parent for joint in robot.joints}
+    lack: Array | None = None
+    worst_link, most = "", -np.inf
+    for arm in arms(robot):
+        for link in arm:
+            for other in robot.links:
+                if other.name in arm:
+                    continue
+                own, others = (capsule_ends(robot, poses, name) for name in (link, other.name))
+                pairs = [(*one, *two) for one in own for two in others]
+                if not pairs:
+                    continue
+                near = capsule_gaps(pairs)
+                found = lacking(near, wanted, 0, carried=other.name == parent[link])
+                lack = found if lack is None else np.maximum(lack, found)
+                if found.max() > most:
+                    most, worst_link = float(found.max()), f"{link} at {other.name}"
+    return None if lack is None else (lack, worst_link)
 
 
 def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
@@ -140,7 +135,7 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
     two legs have shapes."""
     lack: Array | None = None
     for gap in _gaps(robot, poses):
-        found = (np.minimum(wanted, gap[:, :1]) - gap).max(axis=0)
+        found = lacking(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
@@ -156,37 +151,7 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
             pairs = [(*one, *two) for one in chain for two in other]
             if not pairs:
                 continue
-            a, b, radius, c, d, other_radius = (np.array(part) for part in zip(*pairs, strict=True))
-            yield segment_distance(a, b, c, d) - (radius + other_radius)[:, None]
-
-
-def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """The distance (...) between the segments a-b and c-d, all (..., 3).
-
-    The closest points are the crossing of the two lines where it lies in both segments, else an
-    end of one of them and what is closest to it on the other.
-    """
-    along, across, between = b - a, d - c, a - c
-    aa, cc = _dot(along, along), _dot(across, across)
-    ac, ab, cb = _dot(along, across), _dot(along, between), _dot(across, between)
-    determinant = aa * cc - ac * ac
-    crossing = np.where(
-        determinant > 1e-12 * aa * cc,
-        (ac * cb - cc * ab) / np.where(determinant > 0.0, determinant, 1.0),
-        0.5,
-    )
-    best = np.full(aa.shape, np.inf)
-    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(aa.shape), np.ones(aa.shape)):
-        t = np.clip((cb + s * ac) / np.where(cc > 0.0, cc, 1.0), 0.0, 1.0)
-        s = np.clip((t * ac - ab) / np.where(aa > 0.0, aa, 1.0), 0.0, 1.0)
-        gap = between + s[..., None] * along - t[..., None] * across
-        best = np.minimum(best, np.sqrt(_dot(gap, gap)))
-    return best
-
-
-def _dot(x: Array, y: Array) -> Array:
-    # A sum over an axis of three costs several times as much.
-    return np.asarray(x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2])
+            yield capsule_gaps(pairs)
 
 
 @per_robot

@@ -7,14 +7,12 @@ import pytest
 from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
-    capsule_ends,
     ground_height,
     leg_lack,
-    legs,
-    segment_distance,
     step_edge,
 )
 from aloft.planner.task.task import make_task
+from aloft.robots.capsules import capsule_ends, legs, segment_distance
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import link_poses
 from aloft.robots.pinocchio_model import build_pinocchio_model

@@ -91,7 +91,9 @@ def test_held_joints_that_take_part() -> None:
     assert moves.equipped(moves.equipped(robot)) == moves.equipped(robot)
     assert moves.start_joints(moves.equipped(robot)) == still.start_joints(robot)
     wrong = make_task({"name": "a", "rise": 0.1, "moving": ["*_elbow"]})
-    with pytest.raises(JumpTaskError, match=r"moving: bruce has no joint '\*_elbow'; it holds left"):
+    with pytest.raises(
+        JumpTaskError, match=r"moving: bruce has no joint '\*_elbow'; it holds left"
+    ):
         wrong.equipped(robot)
 
 
