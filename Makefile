@@ -55,7 +55,7 @@ test: $(COMPLETE)  ## run the tests, without the long ones
 	@$(CACHED) $(SINGLE) $(BIN)/python -m pytest $(WORKERS) -m "not long"
 
 test-all: $(COMPLETE)  ## run all tests
-	@$(CACHED) $(SINGLE) $(BIN)/python -m pytest $(WORKERS)
+	@$(CACHED) $(SINGLE) $(BIN)/python -m pytest $(WORKERS) --durations 40
 
 lint: $(COMPLETE)  ## check style and types
 	@$(BIN)/ruff check .

@@ -24,18 +24,23 @@ def reach(
     out: Annotated[
         Path | None, typer.Option(help="Folder for the results; by default results/reach/NAME.")
     ] = None,
+    minutes: Annotated[
+        float,
+        typer.Option(min=0.1, help="On two free cores; what is found by then is told."),
+    ] = 10.0,
     workers: Workers = 0,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Search how far a robot jumps in every direction: planned, landed, and by its motors alone.
 
-    It takes about ten minutes on four cores, and continues after an interruption. A picture shows it
+    It also says what binds: of the robot in the last plan, and in the last run. Searches that the time ends are
+    told with a plus; more minutes go on from there, as it does after an interruption. A picture shows the robot
     beside BRUCE, in lengths of the legs of each.
     """
     from ...robots.description import path_of, read
     from ...runtime.graph import load
     from ...studies.batch.seeds import parse_seeds
-    from ...studies.reach.charts import reach_chart
+    from ...studies.reach.charts import save_reach_chart
     from ...studies.reach.reach import SEEDS, bruce_reach
     from ...studies.reach.reach import reach as find_reach
     from ...studies.reach.search import JumpGraph
@@ -55,18 +60,18 @@ def reach(
         folder = out or Path("results") / "reach" / robot.name
         compile_functions(robot, folder, screen)
         told = find_reach(
-            robot, graph, folder, seeds=chosen, workers=workers,
+            robot, graph, folder, seeds=chosen, workers=workers, minutes=minutes,
             progress=lambda text: say(screen, text),
         )  # fmt: skip
-        picture = folder / "reach.svg"
-        picture.write_text(reach_chart(told, bruce_reach()), encoding="utf-8")
+        pictures = save_reach_chart(told, bruce_reach(), folder)
         (folder / "reach.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
     show(told, screen)
-    say(screen, f"drawn to {picture}")
+    say(screen, f"drawn to {pictures[0]} and {pictures[1].name}")
     landed = any(each["reached"] for each in told["directions"])
     if as_json:
         why = "jumps land" if landed else "no jump lands"
-        print_json({"success": landed, "reason": why, **told, "picture": str(picture)})
+        drawn = {"picture": str(pictures[0]), "picture_png": str(pictures[1])}
+        print_json({"success": landed, "reason": why, **told, **drawn})
     raise typer.Exit(ExitCode.SUCCESS if landed else ExitCode.NOT_SUCCESSFUL)
 
 
@@ -84,19 +89,24 @@ def compile_functions(robot: Any, folder: Path, screen: Console) -> None:
 
 
 def show(told: dict[str, Any], screen: Console) -> None:
-    """Print a row for every direction."""
+    """Print a row for every direction, and what ended the searches."""
     rows = []
     for each in told["directions"]:
-        values = [f"{each[key]:g} {each['unit']}" for key in ("reached", "planned", "theory")]
-        for k, key in enumerate(("planned", "theory"), start=1):
-            values[k] += "" if each[f"{key}_ended"] else " or more"
+        values = [
+            f"{each[key]:g}{'' if each[f'{key}_ended'] else '+'} {each['unit']}"
+            for key in ("reached", "planned", "theory")
+        ]
         fails = "" if each["fails_at"] is None else f"{each['fails_at']:g}: {each['why']}"
         rows.append(
-            (each["name"], *values, f"{each['in_legs']['reached']:.2f}", each["binds"] or each["beyond"],
-             fails)
+            (each["name"], *values, f"{each['in_legs']['reached']:.2f}", each["planned_binds"],
+             each["binds"] or each["beyond"], fails)
         )  # fmt: skip
     columns = (
-        "direction", ">lands", ">planned", ">theory", ">in legs", "what binds in theory", "what fails beyond",
+        "direction", ">lands", ">planned", ">theory", ">in legs", "what binds in the plan", "and in theory",
+        "what fails beyond",
     )  # fmt: skip
     title = f"{told['robot']}, {told['mass_kg']:.4g} kg, legs of {told['leg_length_m']:.3g} m"
     screen.print(table(title, columns, rows))
+    spent = told["cpu_s"]
+    say(screen, f"{spent:.0f} s of processor time for plans and runs of {len(told['seeds'])} seeds"
+        + ("; + stands where the time ran out: --minutes gives more" if told["ended"] else ""))  # fmt: skip

@@ -33,6 +33,8 @@ from .evidence import (
 )
 from .replay import held_joints, replay
 
+HIT_TOLERANCE = 0.05
+"""m/s by which feet may be faster at touchdown than the margins say."""
 SHORTEST_IMPACT = 0.004
 """s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
 bounds its impulse at touchdown."""
@@ -272,7 +274,7 @@ def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
     ):
         if most is not None:
             text = f"how fast a point hits the ground {what}"
-            yield PlanTestResult(name, float(found), most + 0.05, "m/s", text)
+            yield PlanTestResult(name, float(found), most + HIT_TOLERANCE, "m/s", text)
 
 
 def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
@@ -398,11 +400,19 @@ NEAR_LIMIT = 0.01
 """rad; the same for a joint's limit."""
 LEAST_TIME = 0.02
 """Of the plan's instants, how many must be at a limit for it to be named."""
+LEAST_GAP = 0.002
+"""m that calves keep from the ground where the task's margins say nothing."""
+SIDES = {
+    "left": "", "right": "", "l": "", "r": "",
+    **dict.fromkeys(("fl", "fr", "lf", "rf"), "fore"), **dict.fromkeys(("rl", "rr", "hl", "hr", "lh", "rh"), "hind"),
+}  # fmt: skip
+"""How names of joints and motors begin by their leg, and what is left of it."""
 
 
 def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]:
-    """The motors whose torque or speed, and the joints whose limits, the plan reaches, by their
-    names without the side, in the robot's order; friction comes last."""
+    """What the plan uses to the full: the motors whose torque or speed, and the joints whose limits, it reaches,
+    by their names without the side, in the robot's order; then clearances, how fast the feet touch down, and
+    friction."""
     robot = plan.task.equipped(robot)
     evidence = Evidence(plan, robot, replay(plan, robot))
     effort, motors = evidence.effort, evidence.motors
@@ -426,6 +436,14 @@ def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]
     for k, joint in enumerate(robot.joints):
         if near[:, k].mean() > LEAST_TIME and joint.name not in robot.held:
             found.append(f"{_short(joint.name)} joint limit")
+    found += [f"{name} clearance" for name in _narrow(evidence)]
+    knots = [touchdown for _, touchdown in evidence.replay.flights]
+    if plan.task.impact:
+        found += [
+            test.name.replace("_", " ")
+            for test in _hits(evidence, knots)
+            if test.value > NEAR * (test.limit - HIT_TOLERANCE)
+        ]
     force = evidence.forces
     loaded = force[:, :, 2] > 1.0
     used = np.hypot(force[:, :, 0], force[:, :, 1]) / np.maximum(force[:, :, 2], 1e-9)
@@ -434,8 +452,32 @@ def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]
     return tuple(dict.fromkeys(found))
 
 
+def _narrow(e: Evidence) -> Iterator[str]:
+    """Between what the plan keeps no more than the gap that the task asks for: ``foot`` and ground in the middle of
+    the flight, ``ground`` and the lowest part of the body, ``base`` and the height that counts as a fall, ``leg`` and
+    leg. What starts as near does not count."""
+    robot, task = e.robot, e.plan.task
+    gap = (task.margins or Margins()).step
+    at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
+    if e.point_height[at].min() < task.foot_clearance + MILLIMETRE:
+        yield "foot"
+    heights = body_heights(robot, task, e.poses, e.progress).values()
+    lowest = np.min(list(heights), axis=0) if heights else np.full(1, np.inf)
+    for name, height, least in (
+        ("ground", lowest, LEAST_GAP if gap is None else gap),
+        ("base", e.base_height, fall_height(robot) + (gap or 0.0)),
+    ):
+        if height.min() < least + MILLIMETRE < height[0]:
+            yield name
+    lacking = leg_lack(robot, e.poses, task.leg_clearance)
+    if lacking is not None and lacking[0] < -MILLIMETRE < lacking.max():
+        yield "leg"
+
+
 def _short(name: str) -> str:
-    """A name without its side: both sides bind alike more often than not."""
+    """A name without its side: both sides bind alike more often than not. Of four legs it says which pair."""
     name = name.removesuffix("_motor").removesuffix("_joint")
     side, _, rest = name.partition("_")
-    return rest.replace("_", " ") if side in ("left", "right", "l", "r") and rest else name
+    if not rest or side.lower() not in SIDES:
+        return name
+    return f"{SIDES[side.lower()]} {rest.replace('_', ' ')}".strip()

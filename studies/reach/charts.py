@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from ...plotting import COLOURS, FAINT, INK, PALE, new_figure, style, svg_text
+from ...plotting import COLOURS, FAINT, INK, PALE, image, new_figure, style, svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 KINDS = (
     ("theory", "theory: full motors, no margins", PALE, 0.78),
@@ -30,10 +34,8 @@ def frontier_chart(found: Sequence[Mapping[str, Any]]) -> str:
             for row, bar in enumerate(bars):
                 bar.set_gid(f"{key}-{row}")
         for row, each in enumerate(found):
-            more = "" if each["theory_ended"] else " or more"
-            values = " / ".join(f"{each[key]:g}" for key in ("reached", "planned", "theory"))
             axes.annotate(
-                f"{values}{more} {each['unit']}", (1.0, row), (8, 0),
+                f"{_values(each)} {each['unit']}", (1.0, row), (8, 0),
                 xycoords=axes.get_yaxis_transform(), textcoords="offset points", va="center",
                 fontsize=8, color=FAINT,
             )  # fmt: skip
@@ -48,43 +50,60 @@ def frontier_chart(found: Sequence[Mapping[str, Any]]) -> str:
         return svg_text(figure)
 
 
-def reach_chart(found: Mapping[str, Any], beside: Mapping[str, Any]) -> str:
-    """The chart of ``reach`` as SVG text: one row a direction, the robot's bars above those of the robot
-    ``beside`` it, in lengths of the legs of each; a turn of 90 degrees counts as one."""
+def save_reach_chart(
+    found: Mapping[str, Any], beside: Mapping[str, Any], folder: Path
+) -> tuple[Path, Path]:
+    """Draw the chart of ``reach`` into ``reach.svg`` and ``reach.png`` of a folder: one row a direction, the robot's
+    bars above those of the robot ``beside`` it, in lengths of the legs of each; a turn of 90 degrees counts as one."""
+    drawn, pixels = folder / "reach.svg", folder / "reach.png"
+    with style():
+        figure = _reach_figure(found, beside)
+        drawn.write_text(svg_text(figure), encoding="utf-8")
+        image(figure).save(pixels, format="PNG")
+    return drawn, pixels
+
+
+def _reach_figure(found: Mapping[str, Any], beside: Mapping[str, Any]) -> Figure:
     rows = found["directions"]
     others = {each["name"]: each for each in beside["directions"]}
-    with style():
-        title = f"How far {found['robot']} and {beside['robot']} reach"
-        figure = new_figure(9.0, 1.6 + 0.6 * max(len(rows), 1), title)
-        axes = figure.add_subplot()
-        axes.grid(axis="y", visible=False)
-        for key, label, colour, width in KINDS:
-            for robot, shift, scale, alpha in ((rows, -0.18, 0.42, 1.0), (others, 0.22, 0.3, 0.45)):
-                ours = robot is rows
-                each = [row if ours else others.get(row["name"], {}) for row in rows]
-                bars = axes.barh(
-                    [k + shift for k in range(len(rows))],
-                    [one.get("in_legs", {}).get(key, 0.0) for one in each],
-                    width * scale / KINDS[0][3], color=colour, alpha=alpha,
-                    label=label if ours else None,
-                )  # fmt: skip
-                for row, bar in enumerate(bars):
-                    bar.set_gid(f"{'' if ours else 'beside-'}{key}-{row}")
-        for k, each in enumerate(rows):
-            values = " / ".join(f"{each[key]:g}" for key in ("reached", "planned", "theory"))
-            axes.annotate(
-                f"{values} {each['unit']}", (1.0, k - 0.18), (8, 0),
-                xycoords=axes.get_yaxis_transform(), textcoords="offset points", va="center",
-                fontsize=8, color=FAINT,
+    title = f"How far {found['robot']} and {beside['robot']} reach"
+    figure = new_figure(9.0, 1.6 + 0.6 * max(len(rows), 1), title)
+    axes = figure.add_subplot()
+    axes.grid(axis="y", visible=False)
+    for key, label, colour, width in KINDS:
+        for robot, shift, scale, alpha in ((rows, -0.18, 0.42, 1.0), (others, 0.22, 0.3, 0.45)):
+            ours = robot is rows
+            each = [row if ours else others.get(row["name"], {}) for row in rows]
+            bars = axes.barh(
+                [k + shift for k in range(len(rows))],
+                [one.get("in_legs", {}).get(key, 0.0) for one in each],
+                width * scale / KINDS[0][3], color=colour, alpha=alpha,
+                label=label if ours else None,
             )  # fmt: skip
-        axes.set_yticks(range(len(rows)), [each["name"] for each in rows], color=INK)
-        axes.tick_params(axis="y", length=0)
-        axes.spines["left"].set_visible(False)
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.set_xlim(left=0.0)
-        axes.set_xlabel(
-            "lengths of the legs (thigh and shank), or turns of 90 deg; "
-            f"{found['robot']} above, {beside['robot']} below it, paler"
-        )
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8)
-        return svg_text(figure)
+            for row, bar in enumerate(bars):
+                bar.set_gid(f"{'' if ours else 'beside-'}{key}-{row}")
+    for k, each in enumerate(rows):
+        axes.annotate(
+            f"{_values(each)} {each['unit']}", (1.0, k - 0.18), (8, 0),
+            xycoords=axes.get_yaxis_transform(), textcoords="offset points", va="center",
+            fontsize=8, color=FAINT,
+        )  # fmt: skip
+    axes.set_yticks(range(len(rows)), [each["name"] for each in rows], color=INK)
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel(
+        "lengths of the legs (thigh and shank), or turns of 90 deg; "
+        f"{found['robot']} above, {beside['robot']} below it, paler"
+    )
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=8)
+    return figure
+
+
+def _values(each: Mapping[str, Any]) -> str:
+    """A direction's ends; the time ran out before there was an end to those with a plus."""
+    return " / ".join(
+        f"{each[key]:g}{'' if each[f'{key}_ended'] else '+'}"
+        for key in ("reached", "planned", "theory")
+    )

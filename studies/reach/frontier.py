@@ -42,6 +42,7 @@ from .search import (
     do,
     enough,
     explore,
+    of_runs,
     required,
 )
 
@@ -72,6 +73,7 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
         "reached": way.value(tries.reached),
         "landed": landed,
         "runs": len(best),
+        "reached_ended": tries.reached_ended,
         "ci_low": low,
         "ci_high": high,
         "fails_at": None if fails_at is None else way.value(fails_at),
@@ -89,6 +91,7 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
         "cpu_s": {
             "planned": _seconds(tries.recipe.values()),
             "theory": _seconds(tries.loosest.values()),
+            "runs": _seconds(of_runs(tries)),
         },
         "rungs": [
             {

@@ -2,7 +2,7 @@
 
 The directions are BRUCE's at the robot's size (``directions.single_directions``). Upwards comes first,
 because the other jumps rise by no more than half of what can be planned there. Each direction gets so much
-processor time (``PLANNED_CPU``, ``THEORY_CPU``) and few runs, so what is told is a first look: the benchmark
+processor time (``PLANNED_CPU``, ``RUNS_CPU``, ``THEORY_CPU``) and few runs, so what is told is a first look: the benchmark
 ``frontier`` shows with more seeds and rung by rung what holds.
 """
 
@@ -20,8 +20,11 @@ from .frontier import frontier
 from .search import RATE, Effort, JumpGraph
 
 SEEDS = tuple(range(9000, 9004))
-PLANNED_CPU, THEORY_CPU = 40.0, 20.0
-"""s; after so much processor time no further solve is begun along one direction."""
+MINUTES = 10.0
+"""Of two cores, for all directions; the shares below are for these."""
+PLANNED_CPU, RUNS_CPU, THEORY_CPU = 45.0, 75.0, 30.0
+"""s; after so much processor time no further solve, or run, is begun along one direction. The rest of the ten minutes
+is for those that are under way then, and for what is compiled first."""
 QUARTER_TURN = 90.0
 """deg; counts as one length of a leg."""
 BRUCE = Path(__file__).with_name("bruce.json")
@@ -35,16 +38,19 @@ def reach(
     *,
     seeds: Sequence[int] = SEEDS,
     workers: int = 0,
+    minutes: float = MINUTES,
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
     """How far the robot jumps in every direction, as plain data.
 
     Returns:
-        ``robot``, ``mass_kg``, ``leg_length_m``, ``seeds``, ``rate`` and ``directions``: what
+        ``robot``, ``mass_kg``, ``leg_length_m``, ``seeds``, ``rate``, ``minutes``, the processor time ``cpu_s`` that was
+        spent, ``ended``: the searches that the time ended, and ``directions``: what
         ``frontier.result_of`` says of each, and ``in_legs``: its ends in lengths of the legs, or in turns of
         90 degrees. Where no rise can be planned, upwards is the only direction.
     """
-    effort = Effort(len(seeds), PLANNED_CPU, THEORY_CPU, quick=True)
+    share = minutes / MINUTES
+    effort = Effort(len(seeds), share * PLANNED_CPU, share * THEORY_CPU, True, share * RUNS_CPU)
     bruce = find_robot("bruce")
     name = "" if robot.name == bruce.name else robot.name
     legs = leg_length(robot)
@@ -67,6 +73,14 @@ def reach(
         "leg_length_m": legs,
         "seeds": list(seeds),
         "rate": RATE,
+        "minutes": minutes,
+        "cpu_s": round(sum(sum(each["cpu_s"].values()) for each in found), 1),
+        "ended": [
+            f"{each['name']}, {key}"
+            for each in found
+            for key in ("reached", "planned", "theory")
+            if not each[f"{key}_ended"]
+        ],
         "directions": found,
     }
 

@@ -8,7 +8,8 @@ in processes of their own.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+import math
+from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -87,6 +88,7 @@ class Effort:
         runs: of a rung.
         planned_cpu, theory_cpu: s; after so much processor time no further solve is begun in the search
             for what is planned, and for the theoretical bound.
+        runs_cpu: s; the same for the runs in the search for what lands.
         quick: whether the ladder is climbed from further down, as nobody knows where it ends, and what
             lands is looked for by bisection, not rung by rung.
     """
@@ -95,6 +97,7 @@ class Effort:
     planned_cpu: float
     theory_cpu: float
     quick: bool = False
+    runs_cpu: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -176,7 +179,9 @@ def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:
     for seed in job.seeds:
         if enough(done, failed, job.of):
             break
+        started = cpu_time()
         outcome = job.graph.run(job.task, job.folder, seed)
+        outcome.metrics["cpu_s"] = cpu_time() - started
         done, failed = done + 1, failed + (not outcome.success)
         found.append((seed, outcome))
     return found
@@ -199,8 +204,9 @@ class Ask:
 
 @dataclass
 class Tries:
-    """What was tried along a direction by its rung, and where each search ended. ``planned_ended``
-    and ``theory_ended`` are false where the effort's time stopped the search, which might go further."""
+    """What was tried along a direction by its rung, and where each search ended. ``planned_ended``,
+    ``reached_ended`` and ``theory_ended`` are false where the effort's time stopped the search, which might go
+    further."""
 
     direction: Direction
     recipe: dict[int, Outcome] = field(default_factory=dict)
@@ -210,6 +216,7 @@ class Tries:
     reached: int = 0
     theory: int = 0
     planned_ended: bool = True
+    reached_ended: bool = True
     theory_ended: bool = True
 
 
@@ -220,7 +227,7 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
     search = furthest(max(1, way.start // 2) if effort.quick else way.start, way.most)
     rung = next(search)
     try:
-        while _spent(tries.recipe) < effort.planned_cpu:
+        while _spent(tries.recipe.values()) < effort.planned_cpu:
             yield Ask("recipe", rung)
             tries.planned = max([k for k, v in tries.recipe.items() if v.success], default=0)
             rung = search.send(tries.recipe[rung].success)
@@ -232,7 +239,7 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
         walk = (furthest if effort.quick else outward)(start, tries.planned)
         rung = next(walk)
         try:
-            while True:
+            while _spent(of_runs(tries)) < effort.runs_cpu:
                 if rung not in tries.recipe:
                     yield Ask("recipe", rung)
                 good = False
@@ -240,7 +247,9 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
                     yield Ask("run", rung)
                     landed = sum(run.success for run in tries.runs[rung])
                     good = landed >= required(effort.runs)
+                    tries.reached = max(tries.reached, rung if good else 0)
                 rung = walk.send(good)
+            tries.reached_ended = False
         except StopIteration as end:
             tries.reached = end.value
     tries.theory = tries.planned  # its plan keeps the looser limits as well
@@ -248,7 +257,7 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
     search = furthest(tries.planned + 1, way.most, tries.planned)
     try:
         rung = next(search)
-        while _spent(tries.loosest) < effort.theory_cpu:
+        while _spent(tries.loosest.values()) < effort.theory_cpu:
             yield Ask("loosest", rung, near)
             if tries.loosest[rung].success:
                 tries.theory, near = rung, way.loosest(rung)
@@ -258,5 +267,10 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
         tries.theory = end.value
 
 
-def _spent(outcomes: dict[int, Outcome]) -> float:
-    return sum(float(outcome.metrics.get("cpu_s", 0.0)) for outcome in outcomes.values())
+def of_runs(tries: Tries) -> list[Outcome]:
+    """What all runs along a direction came to."""
+    return [run for runs in tries.runs.values() for run in runs]
+
+
+def _spent(outcomes: Iterable[Outcome]) -> float:
+    return sum(float(outcome.metrics.get("cpu_s", 0.0)) for outcome in outcomes)

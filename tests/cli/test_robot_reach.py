@@ -43,11 +43,16 @@ def test_a_table_a_picture_and_figures(monkeypatch: pytest.MonkeyPatch, tmp_path
     up = found["directions"][0]
     assert (up["reached"], up["landed"], up["planned"]) == (20.0, 2, 20.0)
     assert Path(found["picture"]).read_text().count("<svg") == 1
+    assert Path(found["picture_png"]).read_bytes().startswith(b"\x89PNG")
+    assert up["planned_binds"] == "knee" and found["minutes"] == 10.0 and not found["ended"]
     assert (tmp_path / "results" / "reach" / "bruce" / "reach.json").is_file()
     text = run_here(*words).stdout
     row = next(line for line in text.splitlines() if line.startswith(" up "))
     assert row.split()[:7] == ["up", "20", "cm", "20", "cm", "20", "cm"]
     assert "up 21 cm: no plan (motor torque)" in text, "progress is said"
+    little = run_here(*words, "--minutes", "0.5", "--out", "little").stdout
+    row = next(line for line in little.splitlines() if line.startswith(" up "))
+    assert row.split()[3].endswith("+") and "--minutes gives more" in little
 
 
 def test_what_cannot_jump_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

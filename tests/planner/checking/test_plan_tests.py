@@ -26,6 +26,7 @@ from aloft.planner.checking.replay import held_joints, replay
 from aloft.planner.checking.validity import PlanTest, check_plan
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.task.margins import Margins
 from aloft.planner.task.plan import PlannedJump, read_plan
 from aloft.robots.description import find_robot
 
@@ -355,6 +356,8 @@ def test_the_landing_may_have_another_effort() -> None:
         ("r_hip_roll", "hip roll"),
         ("waist_yaw_joint", "waist_yaw"),
         ("front_left_knee", "front_left_knee"),
+        ("FL_calf_joint", "fore calf"),
+        ("rh_kfe_joint", "hind kfe"),
         ("knee", "knee"),
     ],
 )
@@ -388,6 +391,18 @@ def test_less_friction_makes_friction_a_limit_and_the_last_one(by_hand: PlannedJ
         limits = active_limits(scaled(by_hand, friction=float(friction)), ROBOT)
         assert ("friction" in limits) == binds
         assert not binds or limits[-1] == "friction"
+
+
+def test_clearances_and_the_speed_of_touchdown_are_named(by_hand: PlannedJump) -> None:
+    evidence = Evidence(by_hand, ROBOT, replay(by_hand, ROBOT))
+    middle = int(np.abs(evidence.progress - 0.5).argmin())
+    high = float(evidence.point_height[middle].min())
+    names = ("foot clearance", "leg clearance", "ground clearance")
+    assert not set(names) & set(active_limits(scaled(by_hand, foot_clearance=high - 0.01), ROBOT))
+    assert "foot clearance" in active_limits(scaled(by_hand, foot_clearance=high), ROBOT)
+    low = body_heights(ROBOT, by_hand.task, evidence.poses, evidence.progress)
+    lowest = min(float(heights.min()) for heights in low.values())
+    assert "ground clearance" in active_limits(scaled(by_hand, margins=Margins(step=lowest)), ROBOT)
 
 
 def test_less_effort_makes_motors_a_limit_the_more_the_less(by_hand: PlannedJump) -> None:

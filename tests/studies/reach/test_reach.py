@@ -14,7 +14,7 @@ from aloft.robots.robot_description import RobotDescription
 from aloft.studies.batch.jobs import JobResult, attempt
 from aloft.studies.journal import Outcome
 from aloft.studies.reach import frontier
-from aloft.studies.reach.charts import reach_chart
+from aloft.studies.reach.charts import save_reach_chart
 from aloft.studies.reach.directions import (
     JumpSizes,
     leg_length,
@@ -68,7 +68,8 @@ class StandIn:
     def __call__(self, job: PlanJob | RunJob) -> Outcome | list[tuple[int, Outcome]]:
         if isinstance(job, RunJob):
             good = (job.task.rise or 0.0) < 0.151
-            return [(seed, Outcome(good, "" if good else "fell")) for seed in job.seeds]
+            spent = {"cpu_s": 5.0}
+            return [(seed, Outcome(good, "" if good else "fell", "", spent)) for seed in job.seeds]
         self.near.append((job.task.name, job.near.name if job.near else ""))
         if not possible(job.task):
             return Outcome(False, "motor torque", metrics={"cpu_s": 2.0})
@@ -111,8 +112,33 @@ def test_a_robot_s_reach(bruce: RobotDescription, stand_in: StandIn, tmp_path: P
     assert ahead["in_legs"]["reached"] == pytest.approx(0.30 / 0.3445, abs=1e-4)
     assert "up 15 cm: 2 of 2 land" in lines and "up 21 cm: no plan (motor torque)" in lines
     assert stand_in.near[0] == ("up 11", ""), "half of where BRUCE's search begins"
-    chart = reach_chart(found, bruce_reach())
+    assert found["ended"] == []
+    drawn, pixels = save_reach_chart(found, bruce_reach(), tmp_path)
+    chart = drawn.read_text()
     assert 'id="reached-0"' in chart and 'id="beside-reached-0"' in chart
+    assert "15 / 20 / 25 cm" in chart and pixels.read_bytes().startswith(b"\x89PNG")
+
+
+def test_when_the_time_runs_out_the_best_so_far_is_told(
+    bruce: RobotDescription, stand_in: StandIn, tmp_path: Path
+) -> None:
+    """Plans take 1 s and runs 5 s each: after some of each along every direction no more are begun."""
+    from aloft.planner.library.library import shipped_folder
+
+    graph = JumpGraph("bruce", shipped_folder() / "jump.yaml", {})
+    found = reach(bruce, graph, tmp_path, seeds=(1, 2), minutes=0.5)
+    up = found["directions"][0]
+    assert 0.0 < up["planned"] < 20.0 and not up["planned_ended"]
+    assert "up, planned" in found["ended"]
+    found = reach(bruce, graph, tmp_path, seeds=(1, 2), minutes=3.0)
+    up = found["directions"][0]
+    assert (up["planned"], up["planned_ended"]) == (20.0, True), "it goes on from there"
+    assert 0.0 < up["reached"] < 15.0 and not up["reached_ended"]
+    assert found["cpu_s"] == sum(sum(each["cpu_s"].values()) for each in found["directions"])
+    chart = save_reach_chart(found, bruce_reach(), tmp_path)[0].read_text()
+    assert f"{up['reached']:g}+ / {up['planned']:g} /" in chart
+    more = reach(bruce, graph, tmp_path, seeds=(1, 2), minutes=10.0)["directions"][0]
+    assert (more["reached"], more["planned"], more["planned_ended"]) == (15.0, 20.0, True)
 
 
 def test_bruce_s_own_reach_has_every_direction() -> None:
