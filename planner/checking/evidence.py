@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ...robots.capsules import arms, capsule_ends, capsule_gaps, lacking, legs
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
-    link_poses,
 )
 from ...robots.welding import welded
+from ..models.capsules import arms, capsule_ends, gaps_between, lacking, legs
 from ..models.euler_angles import euler_angles
+from ..models.exact_dynamics import dynamics_of
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
-from ..task.sequence import edge_of, ground_axes
+from ..task.sequence import LEVEL, edge_of, ground_axes
 from ..task.task import JumpTask
 from .replay import Replay
 
@@ -52,6 +52,8 @@ def ground_height(
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
+    if all(place.z == 0.0 and place.slope == LEVEL for place in places):
+        return np.zeros(x.shape)
     done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
     levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
     nearest = np.floor(done + 0.5).astype(np.int64)
@@ -118,10 +120,9 @@ def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[
                 if other.name in arm:
                     continue
                 own, others = (capsule_ends(robot, poses, name) for name in (link, other.name))
-                pairs = [(*one, *two) for one in own for two in others]
-                if not pairs:
+                if not (own and others):
                     continue
-                near = capsule_gaps(pairs)
+                near = gaps_between(own, others)
                 found = lacking(near, wanted, 0, carried=other.name == parent[link])
                 lack = found if lack is None else np.maximum(lack, found)
                 if found.max() > most:
@@ -148,10 +149,8 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
     ]
     for number, chain in enumerate(chains):
         for other in chains[number + 1 :]:
-            pairs = [(*one, *two) for one in chain for two in other]
-            if not pairs:
-                continue
-            yield capsule_gaps(pairs)
+            if chain and other:
+                yield gaps_between(chain, other)
 
 
 @per_robot
@@ -224,18 +223,21 @@ class Evidence:
         """The sample nearest to the middle of every interval that lasts."""
         time, samples = self.plan.time, self.replay.samples
         lasting = np.flatnonzero(np.diff(time) > 0.0)
-        found = []
-        for k in lasting:
-            rows = np.flatnonzero(samples.knot == k)
-            middle = 0.5 * (time[k] + time[k + 1])
-            found.append(int(rows[np.abs(samples.time[rows] - middle).argmin()]))
-        return np.array(found, np.int64)
+        first = np.searchsorted(samples.knot, lasting)
+        behind = np.searchsorted(samples.knot, lasting, side="right")
+        middle = 0.5 * (time[lasting] + time[lasting + 1])
+        return np.array(
+            [
+                i + int(np.abs(samples.time[i:j] - m).argmin())
+                for i, j, m in zip(first.tolist(), behind.tolist(), middle.tolist(), strict=True)
+            ],
+            np.int64,
+        )
 
     @cached_property
     def poses(self) -> LinkPoses:
         """The links at the samples."""
-        q = self.replay.samples.position
-        return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
+        return dynamics_of(self.robot).link_poses(self.replay.samples.position)
 
     @cached_property
     def progress(self) -> Array:

@@ -25,12 +25,12 @@ from ...plotting import (
     style,
     svg_text,
 )
-from ...robots.capsules import legs
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
 from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
+from ..models.capsules import legs
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...robots.capsules import arms, capsule_ends, capsule_gaps, lacking, legs
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
+from ..models.capsules import arms, capsule_ends, gaps_between, lacking, legs
 from ..task.scaling import per_robot
 
 POSES = 6000
@@ -93,12 +93,8 @@ def _clear(
             inside = np.minimum(side * start_of[:, 1], side * end_of[:, 1]) - radius
             clear &= lacking(inside[None], 0.5 * gap, here) <= 0.0
         for other in trunk:
-            pairs = [
-                (*one, *two)
-                for one in capsule_ends(robot, poses, link)
-                for two in capsule_ends(robot, poses, other)
-            ]
-            if pairs:
-                short = lacking(capsule_gaps(pairs), gap, here, carried=other == carrier[link])
-                clear &= short <= 0.0
+            own, body = (capsule_ends(robot, poses, name) for name in (link, other))
+            if own and body:
+                gaps = gaps_between(own, body)
+                clear &= lacking(gaps, gap, here, carried=other == carrier[link]) <= 0.0
     return np.asarray(clear.reshape(grid.shape[:-1]))

@@ -9,12 +9,12 @@ from tests.robots.limbed_robots import CORNERS, HUMANOID, STANDING, TWO, Y, legg
 
 from aloft.planner.checking.evidence import arm_lack
 from aloft.planner.checking.validity import check_plan
+from aloft.planner.models.capsules import arms
 from aloft.planner.problem.arm_range import arm_ranges
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import JumpTask, make_task
-from aloft.robots.capsules import arms
 from aloft.robots.description import RobotDescription, Shape
 from aloft.robots.kinematics import link_poses
 

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..mathematics.arrays import Array
-from .description import RobotDescription
-from .kinematics import LinkPoses, from_base_outwards
+from ...mathematics.arrays import Array
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.segment_distances import capsule_gaps
+from ...robots.description import RobotDescription
+from ...robots.kinematics import LinkPoses, from_base_outwards
+from .exact_dynamics import run_compiled
 
 Capsule = tuple[Array, Array, float]
 """Both ends (n, 3) and the radius."""
@@ -52,39 +55,14 @@ def arms(robot: RobotDescription) -> list[list[str]]:
     return found
 
 
-def capsule_gaps(pairs: Sequence[tuple[Array, Array, float, Array, Array, float]]) -> Array:
-    """The distances (pairs, n) between pairs of capsules."""
-    a, b, radius, c, d, other_radius = (np.array(part) for part in zip(*pairs, strict=True))
-    return segment_distance(a, b, c, d) - (radius + other_radius)[:, None]
-
-
-def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """The distance (...) between the segments a-b and c-d, all (..., 3).
-
-    The closest points are the crossing of the two lines where it lies in both segments, else an
-    end of one of them and what is closest to it on the other.
-    """
-    along, across, between = b - a, d - c, a - c
-    aa, cc = _dot(along, along), _dot(across, across)
-    ac, ab, cb = _dot(along, across), _dot(along, between), _dot(across, between)
-    determinant = aa * cc - ac * ac
-    crossing = np.where(
-        determinant > 1e-12 * aa * cc,
-        (ac * cb - cc * ab) / np.where(determinant > 0.0, determinant, 1.0),
-        0.5,
-    )
-    best = np.full(aa.shape, np.inf)
-    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(aa.shape), np.ones(aa.shape)):
-        t = np.clip((cb + s * ac) / np.where(cc > 0.0, cc, 1.0), 0.0, 1.0)
-        s = np.clip((t * ac - ab) / np.where(aa > 0.0, aa, 1.0), 0.0, 1.0)
-        gap = between + s[..., None] * along - t[..., None] * across
-        best = np.minimum(best, np.sqrt(_dot(gap, gap)))
-    return best
-
-
-def _dot(x: Array, y: Array) -> Array:
-    # A sum over an axis of three costs several times as much.
-    return np.asarray(x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2])
+def gaps_between(some: Sequence[Capsule], others: Sequence[Capsule]) -> Array:
+    """The distances (n_some n_others, n) between some capsules and others; of all pairs of these."""
+    if not some or not others:
+        return np.zeros((0, 0))
+    stacked = [np.array(part) for each in (some, others) for part in zip(*each, strict=True)]
+    gaps = np.zeros((len(some) * len(others), len(some[0][0])))
+    run_compiled(KernelCall(capsule_gaps, *stacked, gaps))
+    return gaps
 
 
 def lacking(gaps: Array, wanted: float, at: int, *, carried: bool = False) -> Array:
