@@ -16,12 +16,12 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
-from ..models.exact_dynamics import dynamics_of
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
+from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
 from .evidence import DEGREE, MILLIMETRE, Evidence, PlanTestResult, body_heights, leg_lack, worst
-from .replay import held_joints, replay
+from .replay import replay
 
 HIT_TOLERANCE = 0.05
 """m/s by which feet may be faster at touchdown than the margins say."""
@@ -271,10 +271,9 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
         return math.inf, np.zeros(len(e.robot.joints))
-    dynamics = dynamics_of(e.robot)
-    q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
-    exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
-    moved = np.abs(plan.position[knot + 1] - q).max()
+    exact, kept = e.replay.impacts[knot]
+    kept = kept.copy()
+    moved = np.abs(plan.position[knot + 1] - plan.position[knot]).max()
     error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
     kept[[joint.name in e.robot.held for joint in e.robot.joints]] = 0.0
     return float(error), np.abs(e.robot.torque_to_motor @ kept)
@@ -335,6 +334,9 @@ def allowed_motor_torque(e: Evidence, effort: float | Array) -> Array:
     return np.asarray(effort * motors.peak_torque * np.clip(fall, 0.0, 1.0))
 
 
+_fall_height = per_robot(fall_height)
+
+
 def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
     robot, task = e.robot, e.plan.task
@@ -354,7 +356,7 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
         sample = int(heights[link].argmin())
         yield PlanTestResult("body_on_ground", -float(heights[link][sample]), 0.0, "m",
                     "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
-    low = fall_height(robot) - e.base_height
+    low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
     lacking = leg_lack(robot, e.poses, task.leg_clearance)

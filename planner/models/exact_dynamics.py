@@ -26,16 +26,19 @@ from ...mathematics.whole_body_motion import (
     evaluate_motion,
     follow_turns,
     motion_memory,
+    place_at_instants,
     turn_memory,
 )
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet, body_tree
+from ...robots.kinematics import LinkPoses, ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
 from ..task.scaling import per_robot
 from .euler_angles import cross, times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Where the parts xx, yy, zz, xy, xz, yz of an inertia stand in its matrix."""
+KEPT_CALLS = 32
+"""Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
 """Joint angles, velocities and accelerations."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
@@ -119,6 +122,9 @@ class ExactDynamics:
         self._rotors = robot.rotor_matrix
         self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
         self._fixed = self._fixed_points(robot)
+        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
+        self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
+        self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
@@ -299,29 +305,54 @@ class ExactDynamics:
         """
         return self._evaluate(self._fixed, position, velocity, bend, force)
 
+    def link_poses(self, position: Array) -> LinkPoses:
+        """Where the links are in n states (n, n_positions), the base first."""
+        place = np.zeros((len(position), len(self._links), 3))
+        rotation = np.zeros((*place.shape[:2], 9))
+        run_compiled(
+            KernelCall(
+                place_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
+            )
+        )  # fmt: skip
+        return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
+
     def _evaluate(
         self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
     ) -> MotionTerms:  # fmt: skip
-        count, joints, points = len(position), len(self._rotors), (len(fixed.body), 3)
-        bend = np.zeros((count, joints)) if bend is None else bend
-        force = np.zeros((count, 0, 3)) if force is None else force
-        given = GivenMotion(*map(np.ascontiguousarray, (position, velocity, bend, force)))
-        place, of_points = (count, 3), (count, *points)
+        count, joints = len(position), len(self._rotors)
+        pushes = (count, 0, 3) if force is None else force.shape
+        key = fixed is self._fixed, pushes
+        if key not in self._calls:
+            if len(self._calls) >= KEPT_CALLS:
+                self._calls.clear()
+            self._calls[key] = self._evaluation(fixed, joints, pushes)
+        call, given, terms = self._calls[key]
+        given.position[:], given.velocity[:] = position, velocity
+        given.bend[:] = 0.0 if bend is None else bend
+        if force is not None:
+            given.force[:] = force
+        call.run()
+        found = MotionTerms(*(array.copy() for array in terms))
+        found.torque[:] += given.bend @ self._rotors.T
+        return found
+
+    def _evaluation(
+        self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
+    ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
+        """The call for so many instants, with its memory: to make a call takes longer than to run it."""
+        count, points = pushes[0], (len(fixed.body), 3)
         shapes = (
-            place,
-            place,
-            place,
-            (count, 6),
-            of_points,
-            of_points,
-            of_points,
-            (count, 6),
-            bend.shape,
-        )
+            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
+            (count, *points), (count, 6), (count, joints),
+        )  # fmt: skip
+        given = GivenMotion(
+            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
+            np.zeros(pushes),
+        )  # fmt: skip
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        _run(KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms))
-        terms.torque[:] += bend @ self._rotors.T
-        return terms
+        call = KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms)
+        compile_calls([call])
+        return call, given, terms
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """The centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint angles, as
@@ -337,8 +368,7 @@ class ExactDynamics:
         )
         position[:, 6] = 1.0
         position[:, 7:], velocity[:, 6:] = angles, speeds
-        fixed = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        return self._evaluate(fixed, position, velocity, None, None)
+        return self._evaluate(self._centres, position, velocity, None, None)
 
     def mass_matrix(self, q: Array) -> Array:
         """The joint-space inertia with all rotors."""
@@ -444,7 +474,7 @@ class ExactDynamics:
             inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
             base[:, 3:7].copy(), momentum, moment,
         )  # fmt: skip
-        _run(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
+        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
         # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
         time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
@@ -465,7 +495,7 @@ class ExactDynamics:
         )
 
 
-def _run(call: KernelCall) -> None:
+def run_compiled(call: KernelCall) -> None:
     """Make a call as machine code where that can be."""
     compile_calls([call])
     call.run()

@@ -19,6 +19,7 @@ from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
 from .imus import imus
+from .left_out import left_out
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
 from .package_files import find_file
@@ -85,6 +86,12 @@ def read_model(path: Path) -> RawModel:
             notes.append(
                 f"joint {name} has no lower and upper limit in the URDF and turns freely here"
             )
+    if not file.is_urdf:
+        tied = _tied_joints(spec)
+        mimics += tuple(tied)
+        for name, leader in tied.items():
+            notes.append(f"joint {name} {leader} in the file and is fixed here")
+        notes += left_out(model, spec)
     names = [model.body(k).name for k in range(model.nbody)]
     bodies = {}
     for k in range(1, model.nbody):
@@ -128,6 +135,17 @@ def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
             listing(loops),
             "describe the mechanism by its transmission: transmission: {motors, joint_to_motor}",
         )
+
+
+def _tied_joints(spec: Any) -> dict[str, str]:
+    """Joints that an equality of MJCF ties to another one or to a value, and which."""
+    import mujoco
+
+    return {
+        eq.name1: f"follows {eq.name2}" if eq.name2 else "is held"
+        for eq in spec.equalities
+        if eq.type == mujoco.mjtEq.mjEQ_JOINT and eq.active
+    }
 
 
 def _one_line(error: Exception) -> str:
@@ -240,8 +258,9 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     }
     name, dof = model.joint(j).name, int(model.jnt_dofadr[j])
     lower, upper = (float(value) for value in model.jnt_range[j])
-    effort = _motor_torque(model, j)
-    speed, free = math.nan, False
+    effort, speed = _motor_torque(model, j), _servo_speed(model, j)
+    rotor, drag = _geared(model, j, "armature"), _geared(model, j, "damping")
+    free = False
     if name in urdf:
         effort, speed = urdf[name].effort, urdf[name].speed
         free = urdf[name].range in ("free", "none")
@@ -253,10 +272,49 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
         (lower, upper) if model.jnt_limited[j] and not free else None,
         effort,
         speed,
-        float(model.dof_armature[dof]),
-        float(np.max(model.dof_damping[dof])),
+        float(model.dof_armature[dof]) + rotor,
+        float(np.max(model.dof_damping[dof])) + drag,
         float(model.dof_frictionloss[dof]),
     )
+
+
+def _actuators_on(model: Any, j: int) -> list[int]:
+    """The MJCF actuators that drive a joint."""
+    import mujoco
+
+    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return [
+        k
+        for k in range(model.nactuator)
+        if int(model.actuator_trntype[k]) in on_joint and model.actuator_trnid[k][0] == j
+    ]
+
+
+def _geared(model: Any, j: int, what: str) -> float:
+    """What the ``armature`` or ``damping`` of actuators, at their side of the gear, is at the joint."""
+    values = getattr(model, f"actuator_{what}")
+    return sum(
+        float(values[k]) * float(model.actuator_gear[k][0]) ** 2 for k in _actuators_on(model, j)
+    )
+
+
+def _servo_speed(model: Any, j: int) -> float:
+    """The largest speed [rad/s] that a velocity servo on a joint is commanded to; NaN without one."""
+    import mujoco
+
+    found = math.nan
+    for k in _actuators_on(model, j):
+        stiffness, damping = (float(value) for value in model.actuator_biasprm[k][1:3])
+        servo = (
+            int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
+            and stiffness == 0.0
+            and damping < 0.0
+        )
+        if servo and model.actuator_ctrllimited[k]:
+            ratio = abs(float(model.actuator_gainprm[k][0]) / damping)
+            most = ratio * float(np.max(np.abs(model.actuator_ctrlrange[k])))
+            found = float(np.fmax(found, most / abs(float(model.actuator_gear[k][0]) or 1.0)))
+    return found
 
 
 def _motor_torque(model: Any, j: int) -> float:
@@ -264,10 +322,7 @@ def _motor_torque(model: Any, j: int) -> float:
     import mujoco
 
     found = 0.0
-    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    for k in range(model.nu):
-        if int(model.actuator_trntype[k]) not in on_joint or model.actuator_trnid[k][0] != j:
-            continue
+    for k in _actuators_on(model, j):
         gear, gain = abs(float(model.actuator_gear[k][0])), abs(float(model.actuator_gainprm[k][0]))
         is_motor = int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE)
         if model.actuator_forcelimited[k]:

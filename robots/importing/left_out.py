@@ -1,0 +1,161 @@
+"""What an MJCF file says and a description has no place for, one sentence each, with where it may be written instead.
+
+A description holds what a robot is. Friction and softness of contacts belong to the simulated ground, gains to the
+controller, and gravity to the world: what a file says of them is reported and not taken over. What is as MuJoCo
+has it by default is no statement of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ...files.problems import listing
+from ...mathematics.constants import GRAVITY
+
+FRICTION = (1.0, 0.005, 0.0001)
+"""Sliding, torsional and rolling friction where a file gives none."""
+SOLREF, SOLIMP = (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
+"""Softness of contacts where a file gives none: time constant [s] and damping ratio, and the impedance."""
+MOST = 4
+"""Names that a sentence lists."""
+
+
+def left_out(model: Any, spec: Any) -> Iterator[str]:
+    """The sentences for a compiled MJCF model and what it was compiled from."""
+    yield from _contacts(model)
+    yield from _joints(model)
+    yield from _servos(model)
+    yield from _tied(model, spec)
+    if abs(float(np.linalg.norm(model.opt.gravity)) - GRAVITY) > 0.02:
+        yield f"left out: a gravity of {_numbers(model.opt.gravity)} m/s^2; gravity is {GRAVITY:g} m/s^2 downwards"
+
+
+def _contacts(model: Any) -> Iterator[str]:
+    """Contact parameters of what touches, by value."""
+    touching = [
+        g for g in range(model.ngeom)
+        if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
+    ]  # fmt: skip
+    bodies = [model.body(int(model.geom_bodyid[g])).name for g in touching]
+
+    def given(values: Any, usual: Iterable[float]) -> str:
+        rows = [_numbers(values[g]) for g in touching]
+        return _by_value(rows, bodies, _numbers(tuple(usual)))
+
+    slide = given(model.geom_friction[:, :1], FRICTION[:1])
+    if slide:
+        yield (
+            f"left out: friction coefficient {slide}; friction is the ground's, robot.friction in a "
+            "graph or trial"
+        )
+    twist = given(model.geom_friction[:, 1:], FRICTION[1:])
+    condim = given(model.geom_condim[:, None], (3.0,))
+    if twist or condim:
+        both = " and ".join(
+            text for text in (twist and f"torsional and rolling friction {twist}", condim and f"condim {condim}")
+            if text
+        )  # fmt: skip
+        yield f"left out: {both}; contacts here have normal force and sliding friction, condim 3"
+    solref, solimp = given(model.geom_solref, SOLREF), given(model.geom_solimp, SOLIMP)
+    if solref:
+        yield (
+            f"left out: softness of contacts, solref {solref}; robot.soles in a graph or "
+            "trial makes soles soft"
+        )
+    if solimp:
+        yield f"left out: impedance of contacts, solimp {solimp}; it is the simulator's own for all"
+    margin = given(model.geom_margin[:, None], (0.0,))
+    if margin:
+        yield f"left out: contact margin {margin}; contacts begin where shapes touch"
+
+
+def _joints(model: Any) -> Iterator[str]:
+    """Springs and damping that grows with speed."""
+    names = [model.joint(j).name for j in range(model.njnt)]
+    springs = _by_value([f"{value:g}" for value in model.jnt_stiffness], names, "0")
+    if springs:
+        yield f"left out: springs of joints, stiffness {springs} N m/rad; joints here have none"
+    poly = [_numbers(model.dof_dampingpoly[int(model.jnt_dofadr[j])]) for j in range(model.njnt)]
+    growing = _by_value(poly, names, _numbers(np.zeros(model.dof_dampingpoly.shape[1])))
+    if growing:
+        yield f"left out: damping that grows with speed, coefficients {growing}; that of low speed stays"
+    held = [model.body(k).name for k in range(model.nbody) if model.body_gravcomp[k]]
+    if held:
+        yield f"left out: gravcomp of {listing(held, MOST)}; gravity acts on all links"
+
+
+def _servos(model: Any) -> Iterator[str]:
+    """Gains of servos, dynamics of actuators, and actuators that move no single joint."""
+    import mujoco
+
+    kinds, bias, dyn = mujoco.mjtTrn, mujoco.mjtBias, mujoco.mjtDyn
+    rows, joints, slow, others, curved = [], [], [], [], []
+    for k in range(model.nactuator):
+        kind = int(model.actuator_trntype[k])
+        if kind == int(kinds.mjTRN_SITE):
+            continue  # thrusters, of which read_model tells
+        target = int(model.actuator_trnid[k][0])
+        if kind not in (int(kinds.mjTRN_JOINT), int(kinds.mjTRN_JOINTINPARENT)):
+            others.append(model.actuator(k).name or f"number {k + 1}")
+            continue
+        name = model.joint(target).name
+        if int(model.actuator_biastype[k]) == int(bias.mjBIAS_AFFINE):
+            _, stiffness, damping = (0.0 - float(value) for value in model.actuator_biasprm[k][:3])
+            gear = float(model.actuator_gear[k][0]) ** 2
+            rows.append(f"kp {gear * stiffness:g}, kv {gear * damping:g}")
+            joints.append(name)
+        elif int(model.actuator_biastype[k]) != int(bias.mjBIAS_NONE):
+            curved.append(name)
+        if int(model.actuator_dyntype[k]) != int(dyn.mjDYN_NONE):
+            slow.append(name)
+    gains = _by_value(rows, joints, "")
+    if gains:
+        yield (
+            f"left out: gains of servos, {gains} at the joint; gains follow from inertia and motor, and "
+            "joint_pd.flight_stiffness in a graph sets them"
+        )
+    if curved:
+        yield f"left out: how the torque of actuators on {listing(curved, MOST)} depends on their motion"
+    if slow:
+        yield f"left out: activation dynamics of the actuators on {listing(slow, MOST)}; motors here give their torque at once"
+    if others:
+        yield f"left out: actuators {listing(others, MOST)}, which drive no single joint; write them as transmission"
+
+
+def _tied(model: Any, spec: Any) -> Iterator[str]:
+    """What ties or sets apart bodies and joints beside the tree."""
+    import mujoco
+
+    if model.ntendon:
+        names = [model.tendon(k).name or f"number {k + 1}" for k in range(model.ntendon)]
+        yield f"left out: tendons {listing(names, MOST)}"
+    known = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_JOINT)
+    ties = [eq.name or f"of {eq.name1}" for eq in spec.equalities if eq.type not in known]
+    if ties:
+        yield f"left out: equalities {listing(ties, MOST)}"
+    if len(spec.pairs):
+        yield f"left out: {len(spec.pairs)} contact pairs with parameters of their own"
+    if len(spec.excludes):
+        pairs = [f"{each.bodyname1} and {each.bodyname2}" for each in spec.excludes]
+        yield (
+            f"left out: that {listing(pairs, MOST)} do not touch; what overlaps in the standing pose, and links of "
+            "one limb, do not here"
+        )
+    if model.nflex:
+        yield f"left out: {model.nflex} deformable bodies"
+
+
+def _by_value(rows: list[str], names: list[str], usual: str) -> str:
+    """Each value that is not the usual one, with the names that have it; empty where all are usual."""
+    found: dict[str, dict[str, None]] = {}
+    for row, name in zip(rows, names, strict=True):
+        if row != usual:
+            found.setdefault(row, {})[name] = None
+    return "; ".join(f"{row} ({listing([*owners], MOST)})" for row, owners in found.items())
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(f"{float(value):g}" for value in values)

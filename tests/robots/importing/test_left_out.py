@@ -1,0 +1,80 @@
+"""What an MJCF file says beside a description's content: it is read where there is a place, else named."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from aloft.robots.description import ReadRobot, read
+
+from .model_files import ONE_LEG
+
+DEFAULTS = '<default><default class="foot"><geom friction="0.8 0.02 0.01" condim="6" solref="0.01 1"/></default></default>'
+SAID = (
+    ONE_LEG.replace("<worldbody>", DEFAULTS + '<option gravity="0 0 -1.6"/><worldbody>')
+    .replace('<geom type="sphere" size=".035"', '<geom class="foot" type="sphere" size=".035"')
+    .replace('range="0 120"', 'range="0 120" stiffness="7"')
+    .replace('kp="100"', 'kp="100" kv="3" gear="2" armature="0.004" damping="0.05" timeconst="0.02"')
+    .replace(
+        "<actuator>",
+        '<contact><exclude body1="torso" body2="shank"/></contact>'
+        '<tendon><fixed name="rope"><joint joint="knee" coef="1"/></fixed></tendon>'
+        '<actuator><motor name="winch" tendon="rope"/>',
+    )
+)  # fmt: skip
+
+
+def read_text(folder: Path, text: str) -> ReadRobot:
+    path = folder / "robot.xml"
+    path.write_text(text)
+    return read(path)
+
+
+def test_a_file_that_says_nothing_more_is_told_of_nothing(tmp_path: Path) -> None:
+    notes = [note for note in read_text(tmp_path, ONE_LEG).notes if note.startswith("left out")]
+    assert len(notes) == 1
+    assert notes[0].startswith("left out: gains of servos, kp 100, kv 0 (knee) at the joint;")
+
+
+@pytest.mark.parametrize("said", [
+    "friction coefficient 0.8 (foot); friction is the ground's, robot.friction",
+    "torsional and rolling friction 0.02 0.01 (foot) and condim 6 (foot)",
+    "solref 0.01 1 (foot); robot.soles",
+    "springs of joints, stiffness 7 (knee)",
+    "gains of servos, kp 400, kv 12 (knee)",
+    "activation dynamics of the actuators on knee",
+    "actuators winch, which drive no single joint",
+    "tendons rope",
+    "that torso and shank do not touch",
+    "a gravity of 0 0 -1.6 m/s^2",
+])  # fmt: skip
+def test_what_has_no_place_is_named(said: str, tmp_path: Path) -> None:
+    assert any(said in note for note in read_text(tmp_path, SAID).notes)
+
+
+def test_rotor_and_damping_of_an_actuator_are_those_behind_its_gear(tmp_path: Path) -> None:
+    motors = read_text(tmp_path, SAID).description.motors
+    assert motors.rotor_inertia.tolist() == pytest.approx([0.01, 0.004 * 4.0])
+    assert motors.damping.tolist() == pytest.approx([0.0, 0.05 * 4.0])
+    assert motors.peak_torque[1] == pytest.approx(80.0)
+
+
+def test_the_range_of_a_velocity_servo_is_a_speed_limit(tmp_path: Path) -> None:
+    servo = '<velocity joint="hip" kv="5" gear="2" ctrlrange="-30 24" forcerange="-9 9"/>'
+    text = ONE_LEG.replace('<motor joint="hip" gear="50" ctrlrange="-1 1"/>', servo)
+    motors = read_text(tmp_path, text).description.motors
+    assert motors.no_load_speed[0] == pytest.approx(15.0)
+    assert motors.no_load_speed[1] != pytest.approx(15.0)
+
+
+def test_a_joint_that_an_equality_ties_is_fixed(tmp_path: Path) -> None:
+    tie = '<equality><joint joint1="knee" joint2="hip" polycoef="0 2 0 0 0"/></equality><actuator>'
+    text = ONE_LEG.replace("<actuator>", tie)
+    found = read_text(tmp_path, text)
+    assert [joint.name for joint in found.description.joints] == ["hip"]
+    assert "joint knee follows hip in the file and is fixed here" in found.notes
+    inactive = read_text(tmp_path, text.replace("<joint joint1", '<joint active="false" joint1'))
+    assert len(inactive.description.joints) == 2
+    assert math.isfinite(found.description.total_mass)
