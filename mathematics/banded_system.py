@@ -12,14 +12,14 @@ import math
 from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .kernel import kernel
 
-TOGETHER = 2
+TOGETHER = 4
 """Columns that are eliminated together."""
 
 
 @kernel
 def assemble_normal(
     starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
-    place: Indices1D, equations: int, band: Array2D, last: Indices1D,
+    place: Indices1D, equations: int, band: Array2D, last: Indices1D, chosen: Indices1D,
 ) -> bool:  # fmt: skip
     """A W^-1 A' of the chosen rows of a sparse matrix, in columns with ascending rows.
 
@@ -28,8 +28,9 @@ def assemble_normal(
         inverse_weights: the diagonal of W^-1, one for each column.
         place: which equation a row is, ascending, and -1 of those left out.
         equations: how many are chosen.
+        chosen: scratch, of the length of ``place``.
 
-    Returns whether all of it is inside of the band, of which the last diagonal stays zero.
+    Returns whether all of it is inside of the band, with a margin of ``TOGETHER`` - 1 diagonals.
     """
     for j in range(equations):
         last[j] = j
@@ -50,14 +51,20 @@ def assemble_normal(
         for k in range(reach - j + 1):
             band[j, k] = 0.0
     for column in range(inverse_weights.shape[0]):
+        # Most rows of a column are inequalities that are left out.
+        count = 0
         for a in range(starts[column], starts[column + 1]):
-            j = place[rows[a]]
-            if j >= 0 and values[a] != 0.0:
+            if place[rows[a]] >= 0:
+                chosen[count] = a
+                count += 1
+        for first in range(count):
+            a = chosen[first]
+            if values[a] != 0.0:
+                j = place[rows[a]]
                 value = values[a] * inverse_weights[column]
-                for b in range(a, starts[column + 1]):
-                    i = place[rows[b]]
-                    if i >= 0:
-                        band[j, i - j] += value * values[b]
+                for second in range(first, count):
+                    b = chosen[second]
+                    band[j, place[rows[b]] - j] += value * values[b]
     return True
 
 
@@ -66,10 +73,10 @@ def factorise_band(equations: int, regularisation: float, band: Array2D, last: I
     """The Cholesky factor, in place. To its diagonal the matrix gets that share of it. An equation without
     a variable that may change, whose diagonal is zero, holds nothing.
 
-    Two columns are eliminated together, so that a row of the band is read and written once for both. Each entry
+    Four columns are eliminated together, so that a row of the band is read and written once for all. Each entry
     loses their products in the same order as one by one.
 
-    Of ``band`` the last diagonal must be zero, and wherever ``assemble_normal`` writes zeros.
+    Of ``band`` must be zero wherever ``assemble_normal`` writes zeros.
 
     Returns whether all pivots are positive.
     """
@@ -99,11 +106,14 @@ def factorise_band(equations: int, regularisation: float, band: Array2D, last: I
             return True
         # Sums of numbers that are not negative, so that no index can count from the end.
         for k in range(1, end - stop + 2):
-            one, two = band[first, k + 1], band[first + 1, k]
-            if one != 0.0 or two != 0.0:
+            one, two = band[first, k + 3], band[first + 1, k + 2]
+            three, four = band[first + 2, k + 1], band[first + 3, k]
+            if one != 0.0 or two != 0.0 or three != 0.0 or four != 0.0:
                 for m in range(end - stop - k + 2):
-                    value = band[first + 1 + k, m] - one * band[first, k + 1 + m]
-                    band[first + 1 + k, m] = value - two * band[first + 1, k + m]
+                    value = band[first + 3 + k, m] - one * band[first, k + 3 + m]
+                    value = value - two * band[first + 1, k + 2 + m]
+                    value = value - three * band[first + 2, k + 1 + m]
+                    band[first + 3 + k, m] = value - four * band[first + 3, k + m]
     return True
 
 
@@ -126,7 +136,8 @@ def solve_band(equations: int, band: Array2D, last: Indices1D, vector: Array1D) 
 def smallest_correction(
     starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
     place: Indices1D, equations: Indices1D, regularisation: float,
-    band: Array2D, last: Indices1D, vector: Array1D, out: Array1D, factorised: Flags1D, found: Flags1D,
+    band: Array2D, last: Indices1D, chosen: Indices1D, vector: Array1D, out: Array1D,
+    factorised: Flags1D, found: Flags1D,
 ) -> None:  # fmt: skip
     """The x with the smallest x'Wx whose chosen rows of A x are the ``vector``, which becomes y.
 
@@ -136,7 +147,9 @@ def smallest_correction(
     count = equations[0]
     found[0] = False
     if not factorised[0]:
-        if not assemble_normal(starts, rows, values, inverse_weights, place, count, band, last):
+        if not assemble_normal(
+            starts, rows, values, inverse_weights, place, count, band, last, chosen
+        ):
             return
         if not factorise_band(count, regularisation, band, last):
             return

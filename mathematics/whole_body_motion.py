@@ -116,6 +116,22 @@ def evaluate_motion(
 
 
 @kernel
+def place_at_instants(
+    tree: BodyTree, position: Array2D, motion: BodyMotion, place: Array3D, rotation: Array3D
+) -> None:
+    """Where all bodies are at n positions (n, 7 + n_joints): their origins (n, n_bodies, 3) and their rotations to
+    the world, row by row (n, n_bodies, 9)."""
+    for i in range(position.shape[0]):
+        to_matrix(position[i, 3:7], motion.rotation[0])
+        place_bodies(tree, position[i, 7:], motion)
+        for body in range(place.shape[1]):
+            for row in range(3):
+                place[i, body, row] = position[i, row] + motion.place[body, row]
+                for column in range(3):
+                    rotation[i, body, 3 * row + column] = motion.rotation[body, row, column]
+
+
+@kernel
 def place_and_move(
     tree: BodyTree, position: Array1D, velocity: Array1D, bend: Array1D, memory: MotionMemory
 ) -> None:

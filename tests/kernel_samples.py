@@ -221,21 +221,25 @@ TURNING = PushedTurns(
     np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
     np.array([0, 2]), np.array([[0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 3)), NORMAL((1, 3)),
 )  # fmt: skip
+CAPSULES = NORMAL((2, 3, 3)), NORMAL((2, 3, 3)), np.array([0.05, 0.1])
 UNUSED = {
+    "aloft.mathematics.segment_distances.bounded": (1.5,),
+    "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
+    "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
-        np.zeros((3, 3)), np.zeros(3, dtype=np.int64),
+        np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64),
     ),
     "aloft.mathematics.banded_system.factorise_band": (
-        3, 1e-3, np.array([[3.0, 0.5, 0.0], [4.0, -0.7, 0.0], [2.0, 0.0, 0.0]]), np.array([1, 2, 2]),
+        6, 1e-3, np.tile([3.0, 0.5, -0.2, 0.0, 0.0, 0.0], (6, 1)), np.array([2, 3, 4, 5, 5, 5]),
     ),
     "aloft.mathematics.banded_system.solve_band": (
         3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
     ),
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
-        np.array([3]), 1e-12, np.zeros((3, 3)), np.zeros(3, dtype=np.int64), NORMAL(3),
+        np.array([3]), 1e-12, np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
     "aloft.mathematics.ground_surface.height_of_slope": (
@@ -258,6 +262,9 @@ UNUSED = {
     ),
     "aloft.mathematics.whole_body_motion.evaluate_motion": (
         TREE, SOLES_OF_TREE, AT_TWO, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.place_at_instants": (
+        TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),
     ),
     "aloft.mathematics.whole_body_motion.place_and_move": (
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),

@@ -16,21 +16,23 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
+from ...mathematics.segment_distances import capsule_gaps
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
     from_base_outwards,
-    link_poses,
 )
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
+from ..models.exact_dynamics import dynamics_of, run_compiled
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
-from ..task.sequence import edge_of, ground_axes
+from ..task.sequence import LEVEL, edge_of, ground_axes
 from ..task.task import JumpTask
 from .replay import Replay
 
@@ -52,6 +54,8 @@ def ground_height(
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
+    if all(place.z == 0.0 and place.slope == LEVEL for place in places):
+        return np.zeros(x.shape)
     done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
     levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
     nearest = np.floor(done + 0.5).astype(np.int64)
@@ -151,42 +155,12 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
         [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
         for chain in legs(robot)
     ]
-    for number, chain in enumerate(chains):
-        for other in chains[number + 1 :]:
-            pairs = [(*one, *two) for one in chain for two in other]
-            if not pairs:
-                continue
-            a, b, radius, c, d, other_radius = (np.array(part) for part in zip(*pairs, strict=True))
-            yield segment_distance(a, b, c, d) - (radius + other_radius)[:, None]
-
-
-def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """The distance (...) between the segments a-b and c-d, all (..., 3).
-
-    The closest points are the crossing of the two lines where it lies in both segments, else an
-    end of one of them and what is closest to it on the other.
-    """
-    along, across, between = b - a, d - c, a - c
-    aa, cc = _dot(along, along), _dot(across, across)
-    ac, ab, cb = _dot(along, across), _dot(along, between), _dot(across, between)
-    determinant = aa * cc - ac * ac
-    crossing = np.where(
-        determinant > 1e-12 * aa * cc,
-        (ac * cb - cc * ab) / np.where(determinant > 0.0, determinant, 1.0),
-        0.5,
-    )
-    best = np.full(aa.shape, np.inf)
-    for s in (np.clip(crossing, 0.0, 1.0), np.zeros(aa.shape), np.ones(aa.shape)):
-        t = np.clip((cb + s * ac) / np.where(cc > 0.0, cc, 1.0), 0.0, 1.0)
-        s = np.clip((t * ac - ab) / np.where(aa > 0.0, aa, 1.0), 0.0, 1.0)
-        gap = between + s[..., None] * along - t[..., None] * across
-        best = np.minimum(best, np.sqrt(_dot(gap, gap)))
-    return best
-
-
-def _dot(x: Array, y: Array) -> Array:
-    # A sum over an axis of three costs several times as much.
-    return np.asarray(x[..., 0] * y[..., 0] + x[..., 1] * y[..., 1] + x[..., 2] * y[..., 2])
+    stacked = [tuple(map(np.array, zip(*chain, strict=True))) for chain in chains if chain]
+    for number, chain in enumerate(stacked):
+        for other in stacked[number + 1 :]:
+            gaps = np.zeros((len(chain[2]) * len(other[2]), len(poses.position)))
+            run_compiled(KernelCall(capsule_gaps, *chain, *other, gaps))
+            yield gaps
 
 
 @per_robot
@@ -259,18 +233,21 @@ class Evidence:
         """The sample nearest to the middle of every interval that lasts."""
         time, samples = self.plan.time, self.replay.samples
         lasting = np.flatnonzero(np.diff(time) > 0.0)
-        found = []
-        for k in lasting:
-            rows = np.flatnonzero(samples.knot == k)
-            middle = 0.5 * (time[k] + time[k + 1])
-            found.append(int(rows[np.abs(samples.time[rows] - middle).argmin()]))
-        return np.array(found, np.int64)
+        first = np.searchsorted(samples.knot, lasting)
+        behind = np.searchsorted(samples.knot, lasting, side="right")
+        middle = 0.5 * (time[lasting] + time[lasting + 1])
+        return np.array(
+            [
+                i + int(np.abs(samples.time[i:j] - m).argmin())
+                for i, j, m in zip(first.tolist(), behind.tolist(), middle.tolist(), strict=True)
+            ],
+            np.int64,
+        )
 
     @cached_property
     def poses(self) -> LinkPoses:
         """The links at the samples."""
-        q = self.replay.samples.position
-        return link_poses(self.robot, q[:, :3], q[:, 3:7], q[:, 7:])
+        return dynamics_of(self.robot).link_poses(self.replay.samples.position)
 
     @cached_property
     def progress(self) -> Array:

@@ -19,6 +19,7 @@ from ...robots.kinematics import fall_height
 from ..models.exact_dynamics import dynamics_of
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
+from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
 from .evidence import DEGREE, MILLIMETRE, Evidence, PlanTestResult, body_heights, leg_lack, worst
 from .replay import held_joints, replay
@@ -335,6 +336,9 @@ def allowed_motor_torque(e: Evidence, effort: float | Array) -> Array:
     return np.asarray(effort * motors.peak_torque * np.clip(fall, 0.0, 1.0))
 
 
+_fall_height = per_robot(fall_height)
+
+
 def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
     robot, task = e.robot, e.plan.task
@@ -354,7 +358,7 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
         sample = int(heights[link].argmin())
         yield PlanTestResult("body_on_ground", -float(heights[link][sample]), 0.0, "m",
                     "how deep the body is in the ground", f"{link} {e.moment(sample)}")  # fmt: skip
-    low = fall_height(robot) - e.base_height
+    low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
     lacking = leg_lack(robot, e.poses, task.leg_clearance)

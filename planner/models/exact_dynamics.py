@@ -26,10 +26,11 @@ from ...mathematics.whole_body_motion import (
     evaluate_motion,
     follow_turns,
     motion_memory,
+    place_at_instants,
     turn_memory,
 )
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet, body_tree
+from ...robots.kinematics import LinkPoses, ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
 from ..task.scaling import per_robot
 from .euler_angles import cross, times, times_transposed
@@ -119,6 +120,7 @@ class ExactDynamics:
         self._rotors = robot.rotor_matrix
         self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
         self._fixed = self._fixed_points(robot)
+        self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
@@ -299,6 +301,17 @@ class ExactDynamics:
         """
         return self._evaluate(self._fixed, position, velocity, bend, force)
 
+    def link_poses(self, position: Array) -> LinkPoses:
+        """Where the links are in n states (n, n_positions), the base first."""
+        place = np.zeros((len(position), len(self._links), 3))
+        rotation = np.zeros((*place.shape[:2], 9))
+        run_compiled(
+            KernelCall(
+                place_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
+            )
+        )  # fmt: skip
+        return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
+
     def _evaluate(
         self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
     ) -> MotionTerms:  # fmt: skip
@@ -319,7 +332,7 @@ class ExactDynamics:
             bend.shape,
         )
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        _run(KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms))
+        run_compiled(KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms))
         terms.torque[:] += bend @ self._rotors.T
         return terms
 
@@ -444,7 +457,7 @@ class ExactDynamics:
             inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
             base[:, 3:7].copy(), momentum, moment,
         )  # fmt: skip
-        _run(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
+        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
         # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
         time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
@@ -465,7 +478,7 @@ class ExactDynamics:
         )
 
 
-def _run(call: KernelCall) -> None:
+def run_compiled(call: KernelCall) -> None:
     """Make a call as machine code where that can be."""
     compile_calls([call])
     call.run()

@@ -76,7 +76,7 @@ class Corrector:
             smallest_correction,
             np.array(pattern.colind(), dtype=np.int64), np.array(pattern.row(), dtype=np.int64),
             self._values, self._inverse, self._place, self._count, REGULARISATION,
-            np.zeros((rows, BAND)), np.zeros(rows, dtype=np.int64), self._vector, self._step,
+            np.zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), self._vector, self._step,
             self._factorised, self._found,
         )  # fmt: skip
         compile_calls([self._call])

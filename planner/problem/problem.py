@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,9 @@ from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
+from .leg_rows import body_points, fore_and_hind
 from .obstacles import step_parameters
-from .stage_functions import StageFunction, body_points, parameter_sizes
+from .stage_functions import StageFunction, parameter_sizes
 from .structure import Structure
 
 BODY_CLEARANCE = 0.002
@@ -430,8 +432,9 @@ class ProblemBuilder:
         here = self.structure.places[place]
         low = self._ground_of_air(k, here) if self.leans else here.z
         if not self.of_knot[k].flies:
+            others = 2 * len(points) + len(self._leg_gaps)
             self._rows("air", k, [("ground clearance", len(points), low, np.inf),
-                                  ("ground clearance", 2 * len(points), -np.inf, np.inf)])  # fmt: skip
+                                  ("ground clearance", others, -np.inf, np.inf)])  # fmt: skip
             return
         share = self.structure.flight_share(k)
         step, edge = self.structure.step_under(k)
@@ -455,7 +458,19 @@ class ProblemBuilder:
             free,
             *(("leg clearance", 1, 0.5 * task.leg_clearance if side else -np.inf, np.inf)
               for _, _, side in points),
+            *(("leg clearance", 1, gap, np.inf) for gap in self._leg_gaps),
         ])  # fmt: skip
+
+    @cached_property
+    def _leg_gaps(self) -> list[float]:
+        """The least gaps [m] between fore and hind legs: those of the standing robot where it has less than asked for."""
+        count = len(fore_and_hind(self.model, self.coordinates))
+        if not count:
+            return []
+        standing = self.coordinates.reduce(self.stances[0].coordinates)
+        level = np.zeros(sum(self.sizes["air"].values()))
+        gaps = np.array(self.pieces["air"].value(standing, level)[1]).ravel()[-count:]
+        return [min(self.task.leg_clearance, gap) for gap in gaps.tolist()]
 
     def _ground_of_air(self, k: int, place: StanceLocation) -> float:
         """Let the piece's heights count from the ground under a place; that height is 0 then."""

@@ -19,7 +19,7 @@ reduced coordinates of ``Coordinates``:
 ``take_off`` z = q, v.          Rows: apex height, vertical speed, angular momentum (3).
 ``air``     z = q.              Rows: height of the points of feet and calves, how far ahead they
             are, and how far on their own leg's side of the torso's middle plane, each point's
-            height and side less its radius.
+            height and side less its radius; then the gaps along the torso of ``fore_and_hind``.
 ``obstacle`` z = q.             Rows: how high the points of ``obstacle_points`` are above ground
             with a step, rounded, less their radii.
 
@@ -65,7 +65,8 @@ from ..models.coordinates import (
     mirrored_coordinates,
     sagittal_coordinates,
 )
-from ..models.symbolic_model import Expression, SymbolicModel, base_rotation, centroidal_momentum
+from ..models.symbolic_model import Expression, SymbolicModel, centroidal_momentum
+from .leg_rows import air_rows
 from .obstacles import heights_above_step, touching_sphere
 
 
@@ -311,13 +312,13 @@ def piece_expressions(
         z, cost, rows = _impact(model, coordinates, q, v, w)
     elif name == "contact":
         errors = _place_errors(model, coordinates, q, w)
-        rows = [ca.jtimes(errors, q, v) + DRIFT_RATE * errors, errors]
+        rows = [_contact_velocities(model, coordinates, q, v, w, errors), errors]
     elif name == "take_off":
         whole = centroidal_momentum(model, coordinates.expand(q), coordinates.expand(v))
         rise = whole.linear[2] / model.robot.total_mass
         rows = [whole.com[2] + rise * rise / (2.0 * GRAVITY), rise, whole.angular]
     elif name == "air":
-        z, rows = [q], _air_rows(model, coordinates, q, w)
+        z, rows = [q], air_rows(model, coordinates, q, w)
     else:
         z, rows = [q], heights_above_step(model, coordinates, q, w)
     rows_of_all = ca.vertcat(*rows)
@@ -519,53 +520,35 @@ def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, w: Map
     return ca.vertcat(*errors)
 
 
-def _air_rows(
-    model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
-) -> list[Any]:
-    """Heights, distances ahead and sides of the points."""
+def _contact_velocities(
+    model: SymbolicModel, coordinates: Coordinates, q: Any, v: Any, w: Mapping[str, Any],
+    errors: Any,
+) -> Any:  # fmt: skip
+    """The velocities of the place errors, which die out at ``DRIFT_RATE``. Out of the sagittal plane those of a ball
+    along the ground are the velocities of its material where it touches: how far it has rolled follows from no
+    attitude then, and a leg that yaws while its knee stretches would slip by the difference."""
     import casadi as ca
 
-    whole = coordinates.expand(q)
-    frames = model.frames(whole, coordinates.limbs)
-    left = base_rotation(whole[3:6])[:, 1]
-    points = body_points(model, coordinates)
-    places = [model.point(frames, *point) for point, _, _ in points]
-    heights = [
-        place[2] - radius - (ca.dot(w["ground"], ca.vertcat(1.0, place[:2])) if w else 0.0)
-        for place, (_, radius, _) in zip(places, points, strict=True)
-    ]
-    sides = [
-        sign * ca.dot(left, place - whole[0:3]) - radius
-        for place, (_, radius, sign) in zip(places, points, strict=True)
-    ]
-    return [*heights, *(place[0] for place in places), *sides]
-
-
-HIP_JOINTS = 3
-"""Joints above the knee. Of a leg with fewer than five the thigh counts, too: it ends in a ball, and its knee folds down."""
-
-
-def body_points(model: SymbolicModel, coordinates: Coordinates
-                ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
-    """The points of the legs that must not touch anything in flight, from the knee down: (link, place),
-    radius and +1 for a left leg, -1 for a right one. Contact points first; only balls have a radius
-    there."""
-    robot = model.robot
+    rates = ca.jtimes(errors, q, v)
+    if 1 not in coordinates.axes:
+        return rates + DRIFT_RATE * errors
+    robot, rows = model.robot, ca.vertsplit(rates + DRIFT_RATE * errors)
+    frames = model.frames(coordinates.expand(q), coordinates.limbs)
     link_of = {foot.name: foot.link for foot in robot.feet}
-    found = []
-    for c in coordinates.contacts:
-        contact = robot.contacts[c]
+    axes = ca.reshape(w["axes"], 3, 3).T if "axes" in w else None
+    heading = w["heading"]
+    for i, c in enumerate(coordinates.contacts):
         place, radius = touching_sphere(robot, c)
-        found.append(((link_of[contact.foot], place), radius))
-    for limb in coordinates.limbs:
-        joints = model.limbs[limb]
-        for index in joints[min(HIP_JOINTS, len(joints) - 2) : -1]:
-            link = robot.link(robot.joints[index].child)
-            for shape in link.shapes:
-                found += [((link.name, shape.start), shape.radius)]
-                found += [((link.name, shape.end), shape.radius)]
-    sides = {
-        limb: float(np.sign(robot.joints[model.limbs[limb][0]].origin[1]))
-        for limb in range(len(model.limbs))
-    }
-    return [(point, radius, sides[model.limb_of_link[point[0]]]) for point, radius in found]
+        if not radius:
+            continue
+        link = link_of[robot.contacts[c].foot]
+        rotation = frames[link][0]
+        turning = ca.mtimes(ca.reshape(ca.jtimes(ca.vec(rotation), q, v), 3, 3), rotation.T)
+        centre = ca.jtimes(model.point(frames, link, place), q, v)
+        slip = centre - radius * ca.vertcat(turning[0, 2], turning[1, 2], 0.0)
+        if axes is None:
+            along = heading[0] * slip[0] + heading[1] * slip[1]
+            rows[3 * i], rows[3 * i + 1] = along, heading[0] * slip[1] - heading[1] * slip[0]
+        else:
+            rows[3 * i], rows[3 * i + 1] = ca.vertsplit(ca.mtimes(axes[:2, :], slip))
+    return ca.vertcat(*rows)

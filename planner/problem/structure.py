@@ -29,6 +29,7 @@ from ..task.sequence import Hop, StanceLocation, edge_of, ground_axes, step_of
 from ..task.task import JumpTask
 from .assembly import Knot
 from .layout import ProblemPhase, layout
+from .leg_rows import fore_and_hind
 from .obstacles import ObstacleRows
 from .stage_functions import StageFunction
 
@@ -164,6 +165,7 @@ class Structure:
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
+        self._leg_gaps = len(fore_and_hind(model, coordinates))
         self.given: dict[int, list[tuple[int, float, str]]] = {}
         self._kept: dict[ProblemPhase, NDArray[np.int64]] = {}
         self.knots = self._knots()
@@ -302,14 +304,15 @@ class Structure:
 
     def _air_rows(self, k: int) -> NDArray[np.int64]:
         """Which rows are needed: how far ahead only where there is an edge."""
-        points = self.pieces["air"].rows // 3
+        rows = self.pieces["air"].rows
+        points = (rows - self._leg_gaps) // 3
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
         if self.hops[self.of_knot[k].place].rotation:
-            return np.arange(2 * points, 3 * points)
+            return np.arange(2 * points, rows)
         if not self.over_step(k)[1]:
             ahead = ahead[:0]
-        return np.concatenate([np.arange(points), ahead, np.arange(2 * points, 3 * points)])
+        return np.concatenate([np.arange(points), ahead, np.arange(2 * points, rows)])
 
     def phase_at(self, k: int) -> ProblemPhase:
         """The phase of the interval that begins with a knot; at the end that of the last one."""

@@ -46,6 +46,7 @@ SOURCES = (
     "models/symmetry.py",
     "models/coordinates.py",
     "problem/stage_functions.py",
+    "problem/leg_rows.py",
     "problem/obstacles.py",
 )
 KINDS = ("value", "jacobian", "hessian")

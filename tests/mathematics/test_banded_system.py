@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aloft.mathematics.banded_system import smallest_correction
+from aloft.mathematics.banded_system import TOGETHER, smallest_correction
 
 BLOCKS, WIDTH, HEIGHT = 6, 5, 3
 
@@ -17,14 +17,14 @@ def chain(rng: np.random.Generator) -> np.ndarray:
     return matrix
 
 
-def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT + 1, then=None):
+def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT + TOGETHER - 1, then=None):
     rows, columns = np.nonzero(matrix.T)[::-1]
     starts = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
     place = np.where(chosen, np.cumsum(chosen) - 1, -1)
     count, height = np.array([chosen.sum()]), len(matrix)
     vector, out, found = np.zeros(height), np.zeros(matrix.shape[1]), np.zeros(1, dtype=np.bool_)
     values, factorised = matrix.T[columns, rows], np.zeros(1, dtype=np.bool_)
-    memory = np.zeros((height, band)), np.zeros(height, dtype=np.int64)
+    memory = np.zeros((height, band)), *np.zeros((2, height), dtype=np.int64)
     for one in [wanted] if then is None else [wanted, then]:
         vector[: count[0]] = one[chosen]
         smallest_correction(

@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from aloft.mathematics.segment_distances import segment_gap
 from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
@@ -11,9 +12,9 @@ from aloft.planner.checking.evidence import (
     ground_height,
     leg_lack,
     legs,
-    segment_distance,
     step_edge,
 )
+from aloft.planner.models.exact_dynamics import dynamics_of
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import link_poses
@@ -25,7 +26,7 @@ def test_segments_against_brute_force() -> None:
     s = np.linspace(0.0, 1.0, 101)[None, :, None]
     first, second = a[:, None] + s * (b - a)[:, None], c[:, None] + s * (d - c)[:, None]
     brute = np.linalg.norm(first[:, :, None] - second[:, None], axis=3).min(axis=(1, 2))
-    found = segment_distance(a, b, c, d)
+    found = np.array([segment_gap(*four) for four in zip(a, b, c, d, strict=True)])
     assert np.all(found <= brute + 1e-12)
     assert np.abs(found - brute).max() < 5e-3
 
@@ -35,7 +36,8 @@ def test_parallel_crossing_and_point_segments() -> None:
     b = np.array([[1.0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0]])
     c = np.array([[0.2, 0.3, 0], [2, 0, 0], [0.5, -1, 0.1], [0, 3, 4]])
     d = np.array([[0.7, 0.3, 0], [3, 0, 0], [0.5, 1, 0.1], [0, 3, 4]])
-    np.testing.assert_allclose(segment_distance(a, b, c, d), [0.3, 1.0, 0.1, 5.0], atol=1e-12)
+    found = [segment_gap(*four) for four in zip(a, b, c, d, strict=True)]
+    np.testing.assert_allclose(found, [0.3, 1.0, 0.1, 5.0], atol=1e-12)
 
 
 def test_where_the_ground_changes() -> None:
@@ -133,6 +135,34 @@ def test_ends_of_capsules_move_with_their_link() -> None:
                 np.testing.assert_allclose(start[k], place.act(np.array(shape.start)), atol=1e-12)
                 np.testing.assert_allclose(end[k], place.act(np.array(shape.end)), atol=1e-12)
                 assert radius == shape.radius
+
+
+@pytest.mark.parametrize("name", ["bruce", "go2"])
+def test_compiled_distances_of_legs_are_those_of_their_capsules_one_by_one(name: str) -> None:
+    robot, random = find_robot(name), np.random.default_rng(4)
+    count, joints = 5, len(robot.joints)
+    quaternion = random.normal(size=(count, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
+    place = random.normal(size=(count, 3))
+    angles = robot.standing_position + random.uniform(-0.3, 0.3, (count, joints))
+    plain = link_poses(robot, place, quaternion, angles)
+    compiled = dynamics_of(robot).link_poses(np.hstack([place, quaternion, angles]))
+    for link in compiled.names:
+        for found, expected in zip(compiled.of(link), plain.of(link), strict=True):
+            np.testing.assert_allclose(found, expected, atol=1e-12)
+    gaps = list(_gaps(robot, compiled))
+    chains = [
+        [c for link in chain for c in capsule_ends(robot, plain, link)] for chain in legs(robot)
+    ]
+    pairs = [(one, two) for i, one in enumerate(chains) for two in chains[i + 1 :]]
+    assert len(gaps) == len(pairs)
+    for found, (one, other) in zip(gaps, pairs, strict=True):
+        expected = [
+            [segment_gap(a[k], b[k], c[k], d[k]) - (r + s) for k in range(count)]
+            for a, b, r in one
+            for c, d, s in other
+        ]
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_bodies_over_a_step_are_as_high_as_their_lowest_point() -> None:
