@@ -7,7 +7,7 @@ to the base's at the zero pose; quantities are in SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -441,6 +441,25 @@ class RobotDescription(Part):
             there = ", ".join(self.profiles)
             raise LookupError(f"{self.name} has no actuator profile {name!r}; there is {there}")
         return self if name == self.motors.profile else self.changed(profile=name)
+
+    def freed(self, names: Sequence[str]) -> Self:
+        """The same robot with those held joints, by name or pattern, free to move; it stands with them as it
+        held them. Joints that are free already stay so.
+
+        Raises:
+            LookupError: a name or pattern fits no joint; the message names those that it holds.
+        """
+        for pattern in names:
+            if not any(fnmatchcase(joint.name, pattern) for joint in self.joints):
+                held = ", ".join(self.held) or "none"
+                raise LookupError(f"{self.name} has no joint {pattern!r}; it holds {held}")
+        freed = [name for name in self.held if any(fnmatchcase(name, p) for p in names)]
+        if not freed:
+            return self
+        return self.changed(
+            held={name: angle for name, angle in self.held.items() if name not in freed},
+            standing={**self.standing, **{name: self.held[name] for name in freed}},
+        )
 
     def changed(self, **fields: Any) -> Self:
         """A copy with other values in some fields, which are not validated again."""

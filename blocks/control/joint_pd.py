@@ -148,7 +148,8 @@ class JointPD(Block):
     During HANG all joints have the flight gains towards the planned angles.
 
     **Other joints.** Joints that the robot's description holds always have tau_ff and the flight
-    gains towards their held angle. Joints that belong to no leg and are not held, or that are
+    gains towards the planned angle, which is their held angle unless the plan moves them, or towards their held angle if
+    no plan is wired. Joints that belong to no leg and are not held, or that are
     ``released``, follow the whole-body controller while any leg stands; while all legs swing they have the flight gains
     towards the planned angles, or towards the standing pose if no plan is wired.
 
@@ -245,7 +246,7 @@ class JointPD(Block):
             n = wbc.torque.shape[0]
             acceleration = wbc.acceleration[wbc.acceleration.shape[0] - n :]
             integrate_accelerations(acceleration, joints, follower, params.leak, period)
-        find_stance_targets(legs, joints, follower, params, constants, scratch)
+        find_stance_targets(legs, joints, reference, follower, params, constants, scratch)
         hangs = phase.phase == Phase.HANG
         find_flight_targets(legs, reference, hangs, constants, scratch)
         command.mode = CommandMode.ACTIVE
@@ -374,15 +375,18 @@ def integrate_accelerations(
 def find_stance_targets(
     legs: JointTarget,
     joints: JointState,
+    reference: JumpReference,
     follower: JointFollower,
     params: JointPDParams,
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The measured joints at rest, the legs' targets, or integrated accelerations."""
+    """The measured joints at rest, the legs' targets, or integrated accelerations; held joints have the plan's."""
     position, velocity = scratch.stance_position, scratch.stance_velocity
     for i in range(constants.held.shape[0]):
-        if constants.held[i]:
+        if constants.held[i] and constants.planned:
+            position[i], velocity[i] = reference.joint_position[i], reference.joint_velocity[i]
+        elif constants.held[i]:
             position[i], velocity[i] = constants.held_angle[i], 0.0
         elif params.stance_targets == "measured":
             position[i], velocity[i] = joints.position[i], 0.0
@@ -400,13 +404,13 @@ def find_flight_targets(
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The legs' targets, the held angles, and the plan or the standing pose for joints of no leg, or for
-    all joints of a robot that hangs."""
+    """The legs' targets, and for held joints, those of no leg, or all joints of a robot that hangs the plan;
+    without a plan the held angles and the standing pose."""
     position, velocity = scratch.flight_position, scratch.flight_velocity
     for i in range(constants.held.shape[0]):
-        if constants.held[i]:
+        if constants.held[i] and not constants.planned:
             position[i], velocity[i] = constants.held_angle[i], 0.0
-        elif not constants.free[i] and not hangs:
+        elif not (constants.held[i] or constants.free[i] or hangs):
             position[i], velocity[i] = legs.position[i], legs.velocity[i]
         elif constants.planned:
             position[i], velocity[i] = reference.joint_position[i], reference.joint_velocity[i]

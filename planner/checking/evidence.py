@@ -16,18 +16,16 @@ from numpy.typing import NDArray
 
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.segment_distances import capsule_gaps
 from ...robots.description import Motors, RobotDescription
 from ...robots.kinematics import (
     LinkPoses,
     ball_feet,
-    from_base_outwards,
 )
 from ...robots.welding import welded
+from ..models.capsules import arms, capsule_ends, gaps_between, lacking, legs
 from ..models.euler_angles import euler_angles
-from ..models.exact_dynamics import dynamics_of, run_compiled
+from ..models.exact_dynamics import dynamics_of
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
@@ -71,21 +69,6 @@ def ground_height(
     return np.asarray(found)
 
 
-def capsule_ends(
-    robot: RobotDescription, poses: LinkPoses, link: str
-) -> list[tuple[Array, Array, float]]:
-    """Both ends (n, 3) and the radius of every capsule of a link."""
-    position, rotation = poses.of(link)
-    return [
-        (
-            position + rotation @ np.array(shape.start),
-            position + rotation @ np.array(shape.end),
-            shape.radius,
-        )
-        for shape in robot.link(link).shapes
-    ]
-
-
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
@@ -125,17 +108,26 @@ def body_heights(
     return found
 
 
-def legs(robot: RobotDescription) -> list[list[str]]:
-    """The links of every leg, from the base outwards, legs in the order of the feet."""
-    parent = {joint.child: joint.parent for _, joint in from_base_outwards(robot)}
-    found = []
-    for foot in robot.feet:
-        chain, link = [foot.link], foot.link
-        while parent[link] != robot.base:
-            link = parent[link]
-            chain.append(link)
-        found.append(chain[::-1])
-    return found
+def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[Array, str] | None:
+    """The same as ``leg_lack`` between each of the ``arms`` and all that is no part of it; and which link lacks most.
+    ``None`` where no arm has shapes that could touch."""
+    parent = {joint.child: joint.parent for joint in robot.joints}
+    lack: Array | None = None
+    worst_link, most = "", -np.inf
+    for arm in arms(robot):
+        for link in arm:
+            for other in robot.links:
+                if other.name in arm:
+                    continue
+                own, others = (capsule_ends(robot, poses, name) for name in (link, other.name))
+                if not (own and others):
+                    continue
+                near = gaps_between(own, others)
+                found = lacking(near, wanted, 0, carried=other.name == parent[link])
+                lack = found if lack is None else np.maximum(lack, found)
+                if found.max() > most:
+                    most, worst_link = float(found.max()), f"{link} at {other.name}"
+    return None if lack is None else (lack, worst_link)
 
 
 def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
@@ -144,7 +136,7 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
     two legs have shapes."""
     lack: Array | None = None
     for gap in _gaps(robot, poses):
-        found = (np.minimum(wanted, gap[:, :1]) - gap).max(axis=0)
+        found = lacking(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
@@ -155,12 +147,10 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
         [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
         for chain in legs(robot)
     ]
-    stacked = [tuple(map(np.array, zip(*chain, strict=True))) for chain in chains if chain]
-    for number, chain in enumerate(stacked):
-        for other in stacked[number + 1 :]:
-            gaps = np.zeros((len(chain[2]) * len(other[2]), len(poses.position)))
-            run_compiled(KernelCall(capsule_gaps, *chain, *other, gaps))
-            yield gaps
+    for number, chain in enumerate(chains):
+        for other in chains[number + 1 :]:
+            if chain and other:
+                yield gaps_between(chain, other)
 
 
 @per_robot

@@ -16,13 +16,22 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
-from ..models.exact_dynamics import dynamics_of
+from ..models.capsules import arms
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
-from .evidence import DEGREE, MILLIMETRE, Evidence, PlanTestResult, body_heights, leg_lack, worst
-from .replay import held_joints, replay
+from .evidence import (
+    DEGREE,
+    MILLIMETRE,
+    Evidence,
+    PlanTestResult,
+    arm_lack,
+    body_heights,
+    leg_lack,
+    worst,
+)
+from .replay import replay
 
 HIT_TOLERANCE = 0.05
 """m/s by which feet may be faster at touchdown than the margins say."""
@@ -40,6 +49,12 @@ def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
     middle = np.append(e.replay.soles[0].mean(axis=0), e.replay.heading[0].mean())
     yield PlanTestResult("origin", float(np.abs(middle).max()), MILLIMETRE, "m or rad",
                 "the first knot's distance from the origin between the soles")  # fmt: skip
+    ends, moved = e.plan.task.end_joints(e.robot), [link for arm in arms(e.robot) for link in arm]
+    if free := [k for k, joint in enumerate(e.robot.joints) if joint.child in moved]:
+        missed = np.abs(plan.position[-1, 7:] - [ends[name] for name in joints])[free]
+        yield PlanTestResult("end", missed.max(), 1e-3, "rad",
+                    "the last knot's distance from the stance, of joints in no leg",
+                    joints[free[int(missed.argmax())]])  # fmt: skip
     for name, knot in (("rest_at_start", 0), ("rest_at_end", -1)):
         speeds = np.abs(plan.velocity[knot])
         yield PlanTestResult(name, speeds.max(), 1e-2, "m/s or rad/s", "the largest velocity")
@@ -272,10 +287,9 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
     plan = e.plan
     if knot + 1 >= len(plan.time) or plan.time[knot + 1] > plan.time[knot]:
         return math.inf, np.zeros(len(e.robot.joints))
-    dynamics = dynamics_of(e.robot)
-    q, v, impulse = plan.position[knot], plan.velocity[knot], plan.contact_force[knot]
-    exact, kept = dynamics.velocity_after_impact(q, v, impulse, held_joints(plan, knot))
-    moved = np.abs(plan.position[knot + 1] - q).max()
+    exact, kept = e.replay.impacts[knot]
+    kept = kept.copy()
+    moved = np.abs(plan.position[knot + 1] - plan.position[knot]).max()
     error = max(np.abs(exact - plan.velocity[knot + 1]).max(), moved)
     kept[[joint.name in e.robot.held for joint in e.robot.joints]] = 0.0
     return float(error), np.abs(e.robot.torque_to_motor @ kept)
@@ -362,11 +376,17 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
     lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is None:
-        return  # no two legs have shapes that could touch
-    sample = int(lacking.argmax())
-    yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
-                "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
+    if lacking is not None:  # else no two legs have shapes that could touch
+        sample = int(lacking.argmax())
+        yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
+                    "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
+    swung = arm_lack(robot, e.poses, task.leg_clearance) if task.moving else None
+    if swung is not None:
+        lacking, link = swung
+        sample = int(lacking.argmax())
+        yield PlanTestResult("arm_clearance", float(lacking[sample]), MILLIMETRE, "m",
+                    "what moving arms lack of that gap to the rest of the body",
+                    f"{link} {e.moment(sample)}")  # fmt: skip
 
 
 PLAN_TESTS: tuple[Callable[[Evidence], Iterator[PlanTestResult]], ...] = (

@@ -64,6 +64,8 @@ class Replay:
         com, com_velocity, angular_momentum: at the knots, by Pinocchio.
         soles, heading: sole centres [m] (N, n_feet, 3) and unwrapped headings [rad] (N, n_feet).
         flights: the knots where every flight begins and ends, before any impact.
+        impacts: by knot the velocities behind its impulse and the impulses of held joints, see
+            ``ExactDynamics.velocity_after_impact``.
     """
 
     samples: ReplaySamples
@@ -77,6 +79,7 @@ class Replay:
     soles: Array
     heading: Array
     flights: tuple[tuple[int, int], ...]
+    impacts: dict[int, tuple[Array, Array]]
 
 
 def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
@@ -98,7 +101,13 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     )  # fmt: skip
     # Behind the flights every lasting interval has its middle and its end.
     first = int(behind[-1])
-    defect = _defects(plan, dynamics, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
+    impacts = {
+        k: dynamics.velocity_after_impact(
+            plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
+        )
+        for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()
+    }
+    defect = _defects(plan, impacts, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
     grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
     half = 0.5 * np.diff(plan.time)[lasting[grounded]]
@@ -117,7 +126,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         terms.com[knots], terms.com_velocity[knots], terms.momentum[knots],
         terms.points[knots, contacts:],
         np.unwrap(np.arctan2(ahead[:, :, 1], ahead[:, :, 0]), axis=0),
-        flights,
+        flights, impacts,
     )  # fmt: skip
 
 
@@ -183,16 +192,15 @@ def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
 
 
 def _defects(
-    plan: PlannedJump, dynamics: ExactDynamics, lasting: NDArray[np.int64], places: Array, rates: Array
+    plan: PlannedJump, impacts: dict[int, tuple[Array, Array]], lasting: NDArray[np.int64],
+    places: Array, rates: Array,
 ) -> Array:  # fmt: skip
     """How far exact dynamics from each knot misses the next, see ``Replay``; ``places`` and ``rates`` are
     the ends of the lasting intervals."""
     reached, moving = plan.position[:-1, :7].copy(), plan.velocity[:-1, :6].copy()
     reached[lasting], moving[lasting] = places[:, :7], rates[:, :6]
-    for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist():
-        moving[k] = dynamics.velocity_after_impact(
-            plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
-        )[0][:6]
+    for k, (behind, _) in impacts.items():
+        moving[k] = behind[:6]
     missed, slip = reached - plan.position[1:, :7], moving - plan.velocity[1:, :6]
     return np.column_stack(
         [

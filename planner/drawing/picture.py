@@ -27,9 +27,10 @@ from ...plotting import (
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..checking.evidence import Evidence, legs
+from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
+from ..models.capsules import legs
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ nevertheless receives these variables, which agree with the planned forces.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.euler_angles import (
@@ -167,9 +168,7 @@ def _between(
     """Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
     base position, Euler angles and joints between two knots."""
     angles = euler_angles(plan.position[:, 3:7])
-    turns = np.array(
-        [dynamics.pin.Quaternion(row).toRotationMatrix() for row in plan.position[:, 3:7]]
-    )
+    turns = matrices_of_quaternions(plan.position[:, 3:7])
     places = np.hstack([plan.position[:, :3], angles])
     rates = np.hstack(
         [times(turns, plan.velocity[:, :3]), euler_rates(angles, plan.velocity[:, 3:6])]
@@ -180,12 +179,27 @@ def _between(
     joints = joint_motions(plan.position, plan.velocity, plan.time, knot).at(passed)
     turn = rotation(place[:, 3:])
     spin, bent = angular_motion(place[:, 3:], rate[:, 3:], bend[:, 3:])
-    quaternions = np.array([dynamics.pin.Quaternion(each).coeffs() for each in turn]).reshape(-1, 4)
+    quaternions = pinocchio_quaternions(dynamics.pin, turn)
     return (
         np.hstack([place[:, :3], quaternions, joints[0]]),
         np.hstack([times_transposed(turn, rate[:, :3]), spin, joints[1]]),
         np.hstack([bent, joints[2]]),
     )
+
+
+def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
+    """Pinocchio's quaternions (n, 4) of rotation matrices (n, 3, 3), with its bits; all with a positive trace, as those
+    of an upright base, at once."""
+    trace = turns[:, 0, 0] + (turns[:, 1, 1] + turns[:, 2, 2])
+    root = np.sqrt(np.maximum(trace, 0.0) + 1.0)
+    share = 0.5 / root
+    found = np.stack(
+        [*((turns[:, i, j] - turns[:, j, i]) * share for i, j in ((2, 1), (0, 2), (1, 0))), 0.5 * root],
+        axis=1,
+    )  # fmt: skip
+    for row in np.flatnonzero(~(trace > 0.0)).tolist():
+        found[row] = pin.Quaternion(turns[row]).coeffs()
+    return found
 
 
 def _middle_values(

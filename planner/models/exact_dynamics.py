@@ -37,6 +37,8 @@ from .euler_angles import cross, times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Where the parts xx, yy, zz, xy, xz, yz of an inertia stand in its matrix."""
+KEPT_CALLS = 32
+"""Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
 """Joint angles, velocities and accelerations."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
@@ -120,6 +122,8 @@ class ExactDynamics:
         self._rotors = robot.rotor_matrix
         self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
         self._fixed = self._fixed_points(robot)
+        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
+        self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
 
@@ -315,26 +319,40 @@ class ExactDynamics:
     def _evaluate(
         self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
     ) -> MotionTerms:  # fmt: skip
-        count, joints, points = len(position), len(self._rotors), (len(fixed.body), 3)
-        bend = np.zeros((count, joints)) if bend is None else bend
-        force = np.zeros((count, 0, 3)) if force is None else force
-        given = GivenMotion(*map(np.ascontiguousarray, (position, velocity, bend, force)))
-        place, of_points = (count, 3), (count, *points)
+        count, joints = len(position), len(self._rotors)
+        pushes = (count, 0, 3) if force is None else force.shape
+        key = fixed is self._fixed, pushes
+        if key not in self._calls:
+            if len(self._calls) >= KEPT_CALLS:
+                self._calls.clear()
+            self._calls[key] = self._evaluation(fixed, joints, pushes)
+        call, given, terms = self._calls[key]
+        given.position[:], given.velocity[:] = position, velocity
+        given.bend[:] = 0.0 if bend is None else bend
+        if force is not None:
+            given.force[:] = force
+        call.run()
+        found = MotionTerms(*(array.copy() for array in terms))
+        found.torque[:] += given.bend @ self._rotors.T
+        return found
+
+    def _evaluation(
+        self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
+    ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
+        """The call for so many instants, with its memory: to make a call takes longer than to run it."""
+        count, points = pushes[0], (len(fixed.body), 3)
         shapes = (
-            place,
-            place,
-            place,
-            (count, 6),
-            of_points,
-            of_points,
-            of_points,
-            (count, 6),
-            bend.shape,
-        )
+            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
+            (count, *points), (count, 6), (count, joints),
+        )  # fmt: skip
+        given = GivenMotion(
+            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
+            np.zeros(pushes),
+        )  # fmt: skip
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        run_compiled(KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms))
-        terms.torque[:] += bend @ self._rotors.T
-        return terms
+        call = KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms)
+        compile_calls([call])
+        return call, given, terms
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """The centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint angles, as
@@ -350,8 +368,7 @@ class ExactDynamics:
         )
         position[:, 6] = 1.0
         position[:, 7:], velocity[:, 6:] = angles, speeds
-        fixed = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        return self._evaluate(fixed, position, velocity, None, None)
+        return self._evaluate(self._centres, position, velocity, None, None)
 
     def mass_matrix(self, q: Array) -> Array:
         """The joint-space inertia with all rotors."""

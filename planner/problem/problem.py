@@ -25,6 +25,7 @@ from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
 from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
+from .arm_range import arm_ranges
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
 from .leg_rows import body_points, fore_and_hind
@@ -134,6 +135,7 @@ class ProblemBuilder:
         self._of_motors: dict[float, list[Rows]] = {}
         self._body_points = body_points(model, coordinates)
         self._fall_height = fall_height(self.exact.robot)
+        self._arm_ranges = arm_ranges(model.robot, task.leg_clearance)
 
     def build(self) -> FullProblem:
         """The problem with its bounds and parameters."""
@@ -209,6 +211,8 @@ class ProblemBuilder:
         stretch, knot = self.of_knot[k], self.assembly.knots[k]
         if k:
             limits = joint_bounds(self.model.robot, self.margins, stretch.place > 0)
+            for joint, (low, high) in self._arm_ranges.items():
+                limits[joint] = max(limits[joint, 0], low), min(limits[joint, 1], high)
             limits = limits[list(self.coordinates.moving)]
             self.lower[start + base : start + n] = limits[:, 0]
             self.upper[start + base : start + n] = limits[:, 1]

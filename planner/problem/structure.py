@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 from ...robots.description import RobotDescription
+from ...robots.limb import chain_to
 from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
@@ -160,6 +161,7 @@ class Structure:
     ) -> None:
         self.coordinates, self.pieces = coordinates, pieces
         self.n, self.forces = coordinates.size, coordinates.forces
+        self._in_legs = {k for f in model.robot.feet for k in chain_to(model.robot, f.link)}
         self._lead(task, stances)
         self.stretches = layout(task, model.robot)
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
@@ -212,10 +214,12 @@ class Structure:
         return [*knots, last]
 
     def _given_at_the_end(self) -> list[tuple[int, float, str]]:
-        """There the robot stands still."""
+        """There the robot stands still, its base and what is in no leg where they are in the stance; the legs follow
+        from base and feet."""
         at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
         base = len(self.coordinates.free_base)
-        values = [(i, float(at_rest[i]), "stance") for i in range(base)]
+        free = [base + i for i, k in enumerate(self.coordinates.moving) if k not in self._in_legs]
+        values = [(i, float(at_rest[i]), "stance") for i in (*range(base), *free)]
         return values + [(self.n + i, 0.0, "stance") for i in range(self.n)]
 
     def moved(self, task: JumpTask, stances: Sequence[Stance]) -> Structure:

@@ -234,7 +234,30 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     return values
 
 
-_evaluators: dict[int, tuple[SymbolicModel, Any, Any]] = {}
+class _Evaluator:
+    """A function of one instant at a fixed number of instants, on memory that is kept: CasADi's own call of it for many
+    makes matrices and a function of many instants each time."""
+
+    def __init__(self, function: Any, count: int) -> None:
+        of_all = function.map(count)
+        self._given = [np.zeros((count, function.size1_in(i))) for i in range(function.n_in())]
+        self._found = np.zeros((count, function.size1_out(0)))
+        self._buffer, self._run = of_all.buffer()
+        for number, array in enumerate(self._given):
+            self._buffer.set_arg(number, array.data)
+        self._buffer.set_res(0, self._found.data)
+
+    def __call__(self, *given: Array) -> Array:
+        """The results (count, n) of rows (count, n) for each argument."""
+        for own, values in zip(self._given, given, strict=True):
+            own[:] = values
+        self._run()
+        return self._found.copy()
+
+
+_evaluators: dict[tuple[int, int], tuple[SymbolicModel, _Evaluator, _Evaluator]] = {}
+KEPT = 32
+"""Evaluators that are kept, of a model and a number of instants."""
 
 
 def _evaluate(
@@ -243,23 +266,39 @@ def _evaluate(
 ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
     """Centre of mass, its velocity and the angular momentum at the knots; joint torques in the
     middle of the intervals."""
+    key = id(model), len(q)
+    if key not in _evaluators:
+        if len(_evaluators) >= KEPT:
+            _evaluators.clear()
+        states, torques = _functions(model, force.shape[1])
+        _evaluators[key] = model, _Evaluator(states, len(q)), _Evaluator(torques, len(q))
+    _, states_of, torques_of = _evaluators[key]
+    found = states_of(q, v)
+    return (
+        found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy(),
+        torques_of(middle, moving, bend, force),
+    )  # fmt: skip
+
+
+_of_models: dict[int, tuple[SymbolicModel, Any, Any]] = {}
+
+
+def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
+    """What ``_evaluate`` gives, of one instant: of a state, and joint torques under ``pushed`` forces."""
     import casadi as ca
 
-    if id(model) not in _evaluators:
+    if id(model) not in _of_models:
         place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
-        pushes = ca.SX.sym("F", force.shape[1])
+        pushes = ca.SX.sym("F", pushed)
         whole = centroidal_momentum(model, place, rate)
         named = {c.name: pushes[3 * i : 3 * i + 3] for i, c in enumerate(model.robot.contacts)}
         torque = model.inverse_dynamics(place, rate, bend_of, named)[2]
         of_state = ca.vertcat(whole.com, whole.linear / model.robot.total_mass, whole.angular)
-        _evaluators[id(model)] = (
+        _of_models[id(model)] = (
             model,
-            ca.Function("states", [place, rate], [of_state], {"cse": True}),
-            ca.Function("torques", [place, rate, bend_of, pushes], [torque], {"cse": True}),
+            ca.Function("states", [place, rate], [ca.densify(of_state)], {"cse": True}),
+            ca.Function(
+                "torques", [place, rate, bend_of, pushes], [ca.densify(torque)], {"cse": True}
+            ),
         )
-    _, states, torques = _evaluators[id(model)]
-    found = np.array(states(q.T, v.T)).T
-    return (
-        found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy(),
-        np.array(torques(middle.T, moving.T, bend.T, force.T)).T.copy(),
-    )  # fmt: skip
+    return _of_models[id(model)][1:]

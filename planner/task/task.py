@@ -216,6 +216,11 @@ class JumpTask(FreeTimes):
     margins: Margins | None = parameter(
         None, text="room that the plan leaves to the feedback; None: only 5 mrad at the joints"
     )
+    moving: tuple[str, ...] | None = parameter(
+        None, min_length=1,
+        text="held joints that take part in the jump, such as arms, by name or pattern: [\"*_shoulder_pitch_joint\"]; "
+        "None: those that the robot's description holds stay held",
+    )  # fmt: skip
     initial: Mapping[str, float] = parameter(
         {}, unit="rad", text="joint angles at the start, by name; others as the robot stands"
     )
@@ -361,19 +366,28 @@ class JumpTask(FreeTimes):
         return _stance(robot, self.final, "final")
 
     def equipped(self, robot: RobotDescription) -> RobotDescription:
-        """The robot with the task's actuator profile in use.
+        """The robot with the task's actuator profile in use, and the joints free that take part.
 
         Raises:
-            JumpTaskError: the robot has no such profile; the message names those that it has.
+            JumpTaskError: the robot has no such profile or joint; the message names those that it has.
         """
         try:
-            return robot.with_profile(self.profile) if self.profile else robot
+            robot = robot.with_profile(self.profile) if self.profile else robot
         except LookupError as error:
             raise JumpTaskError(f"profile: {error.args[0]}") from error
+        return self._freed(robot)
+
+    def _freed(self, robot: RobotDescription) -> RobotDescription:
+        """The robot with the joints free that take part."""
+        try:
+            return robot.freed(self.moving or ())
+        except LookupError as error:
+            raise JumpTaskError(f"moving: {error.args[0]}") from error
 
     def resolved(self, robot: RobotDescription) -> JumpTask:
         """The task with all that it leaves unsaid: what the ``recipe`` chooses for task and robot,
         times and weights that suit the robot's size (``scaling``), the actuator profile in use."""
+        robot = self._freed(robot)
         found = chosen_fields(self, choices(self, robot))
         changed = found | scaled_defaults(self.model_copy(update=found), robot)
         if not self.profile:

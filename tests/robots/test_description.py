@@ -151,3 +151,15 @@ def test_what_cannot_be_read(tmp_path: Path) -> None:
     assert caught.value.faults[0].found.startswith("byte 0xff")
     with pytest.raises(RobotError, match=r"cannot read .*: No such file"):
         PlacedYaml.read(tmp_path / "nowhere.yaml")
+
+
+def test_held_joints_that_are_freed() -> None:
+    robot = find_robot("bruce").changed(held={"left_knee": -0.3, "right_knee": -0.4})
+    freed = robot.freed(["left_*", "right_hip_yaw"])
+    assert dict(freed.held) == {"right_knee": -0.4}
+    assert freed.standing["left_knee"] == -0.3, "it stands as it was held"
+    assert (freed.standing_position == robot.changed(
+        standing={**robot.standing, "left_knee": -0.3}).standing_position).all()  # fmt: skip
+    assert freed.freed(["left_*"]) is freed and robot.freed([]) is robot
+    with pytest.raises(LookupError, match="bruce has no joint 'left_elbow'; it holds left_knee, "):
+        robot.freed(["left_elbow"])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
-from typing import NamedTuple
 
 import numpy as np
 
-from ....mathematics.arrays import Array1D, Flags1D, Indices1D
+from ....mathematics.arrays import Indices1D
 from ....mathematics.kernel import kernel
 from ....robots.description import RobotDescription
 from ....robots.limb import chain_to
@@ -37,19 +36,11 @@ class PostureParameters(PostureGains):
     )
 
 
-class PostureJoints(NamedTuple):
-    """The ``joint`` (n,) of each row, and where it is ``held`` (n,) its ``angle`` (n,) [rad]."""
-
-    joint: Indices1D
-    held: Flags1D
-    angle: Array1D
-
-
 class Posture(FeedbackTask):
     """Joints accelerate by q_ref'' + K_p (q_ref - q) + K_d (q_ref' - q'), one row a joint.
 
-    Joints that the robot's description holds stand still at their angle; others follow the
-    target's joint angles. By default the task is for the joints that belong to no leg, so that the
+    They follow the target's joint angles; a plan keeps those that the robot's description holds at their angle,
+    unless its task lets them move. By default the task is for the joints that belong to no leg, so that the
     program does not swing the arms to balance. With ``joints: ["*"]`` and a small weight it chooses
     one of the many solutions of a redundant robot.
     """
@@ -75,18 +66,17 @@ class Posture(FeedbackTask):
 
     def setup(self) -> None:
         n = len(self.rows.desired)
-        self.chosen = PostureJoints(np.zeros(n, np.int64), np.zeros(n, np.bool_), np.zeros(n))
+        self.chosen = np.zeros(n, np.int64)
 
     def prepare(self) -> None:
         params, joints = self.params, self.robot.joints
-        weights, held = params.posture_weight, self.robot.held
+        weights = params.posture_weight
         patterns = weights if isinstance(weights, dict) else {"*": weights}
         self.weight[:] = 0.0
         self.stiffness[:], self.damping[:] = params.posture_stiffness, params.posture_damping
         for row, joint in enumerate(chosen_joints(self.robot, params)):
             name = joints[joint].name
-            self.chosen.joint[row] = joint
-            self.chosen.held[row], self.chosen.angle[row] = name in held, held.get(name, 0.0)
+            self.chosen[row] = joint
             for pattern, weight in patterns.items():
                 if fnmatchcase(name, pattern):
                     self.weight[row] = weight
@@ -97,27 +87,23 @@ class Posture(FeedbackTask):
         terms: DynamicsTerms,
         joints: JointState,
         target: WholeBodyTarget,
-        chosen: PostureJoints,
+        chosen: Indices1D,
         e: TaskError,
     ) -> None:
         first = terms.velocity.shape[0] - joints.position.shape[0]
-        for row in range(chosen.joint.shape[0]):
-            joint = chosen.joint[row]
-            angle, rate, feedforward = chosen.angle[row], 0.0, 0.0
-            if not chosen.held[row]:
-                angle, rate = target.joint_position[joint], target.joint_velocity[joint]
-                feedforward = target.joint_acceleration[joint]
-            e.value[row] = angle - joints.position[joint]
-            e.rate[row] = rate - terms.velocity[first + joint]
-            e.feedforward[row] = feedforward
+        for row in range(chosen.shape[0]):
+            joint = chosen[row]
+            e.value[row] = target.joint_position[joint] - joints.position[joint]
+            e.rate[row] = target.joint_velocity[joint] - terms.velocity[first + joint]
+            e.feedforward[row] = target.joint_acceleration[joint]
 
     @kernel
     @staticmethod
-    def jacobian(joints: JointState, chosen: PostureJoints, j: TaskJacobian) -> None:
+    def jacobian(joints: JointState, chosen: Indices1D, j: TaskJacobian) -> None:
         first = j.matrix.shape[1] - joints.position.shape[0]
         j.matrix[:, :] = 0.0
-        for row in range(chosen.joint.shape[0]):
-            j.matrix[row, first + chosen.joint[row]] = 1.0
+        for row in range(chosen.shape[0]):
+            j.matrix[row, first + chosen[row]] = 1.0
 
 
 def chosen_joints(robot: RobotDescription, params: PostureParameters) -> list[int]:

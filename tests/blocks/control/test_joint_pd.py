@@ -203,13 +203,21 @@ def test_without_gains_every_joint_gets_some_by_its_inertia_and_its_motor():
     assert limited.any() and not limited.all()
 
 
-def test_held_joints_are_held_on_the_ground_and_in_the_air():
+@pytest.mark.parametrize("planned", [False, True])
+def test_held_joints_are_held_on_the_ground_and_in_the_air(planned):
+    """At their angle, or where the plan has them, as a task may let them move."""
     held = ROBOT.changed(held={"left_hip_yaw": 0.3})
-    bench = make(robot=held)
+    if planned:
+        bench, wanted = make(robot=held), (0.7, -0.2)
+        bench.set("reference", joint_position=np.full(10, 0.7), joint_velocity=np.full(10, -0.2))
+    else:
+        wired = ["wbc", "legs", "phase", "joints"]
+        bench, wanted = BlockBench(JointPD, GAINS, robot=held, wired=wired), (0.3, 0.0)
+        bench.set("wbc", torque=np.arange(1.0, 11.0))
     for phase, stance in ((Phase.STAND, True), (Phase.FLIGHT, False)):
         command = settle(bench, phase, stance)
         assert command.stiffness[5] == 40.0 and command.damping[5] == 1.0
-        assert command.position[5] == 0.3 and command.velocity[5] == 0.0
+        assert (command.position[5], command.velocity[5]) == wanted
     assert settle(bench, Phase.STAND, True).torque[5] == 6.0
 
 

@@ -8,12 +8,11 @@ from aloft.mathematics.segment_distances import segment_gap
 from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
-    capsule_ends,
     ground_height,
     leg_lack,
-    legs,
     step_edge,
 )
+from aloft.planner.models.capsules import capsule_ends, legs
 from aloft.planner.models.exact_dynamics import dynamics_of
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

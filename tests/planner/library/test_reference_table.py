@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import pinocchio
 import pytest
 
+from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.planner.library.jump_table import JumpTable
 from aloft.planner.library.library import SHIPPED, PlanLibrary
-from aloft.planner.library.reference_table import reference_table
+from aloft.planner.library.reference_table import pinocchio_quaternions, reference_table
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
@@ -129,3 +131,14 @@ def test_torques_are_the_plans_in_the_middle_of_every_interval(
     # Rows are up to 2 ms apart, and torques bend at the middles.
     inner = steps > 0.004
     np.testing.assert_allclose(found[inner], plan.joint_torque[:-1][inner], atol=0.4)
+
+
+def test_quaternions_of_many_turns_have_the_bits_of_pinocchio() -> None:
+    quaternions = np.random.default_rng(0).normal(size=(300, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    turns = np.array([pinocchio.Quaternion(row).toRotationMatrix() for row in quaternions])
+    traces = np.trace(turns, axis1=1, axis2=2)
+    assert traces.min() < 0.0 < traces.max(), "both ways are tried"
+    np.testing.assert_array_equal(turns, matrices_of_quaternions(quaternions))
+    expected = np.array([pinocchio.Quaternion(turn).coeffs() for turn in turns])
+    np.testing.assert_array_equal(pinocchio_quaternions(pinocchio, turns), expected)

@@ -206,3 +206,19 @@ def test_two_steps_over_an_interval_are_exact_enough() -> None:
     _, exact, moving = dynamics.integrate(q, v, joints, force, 0.0005)[-1]
     np.testing.assert_allclose(place, exact, atol=1e-6)
     np.testing.assert_allclose(speed, moving, atol=1e-4)
+
+
+def test_what_one_call_gave_stays_as_it_is_in_the_next(dynamics: ExactDynamics) -> None:
+    """The memory of calls is kept, with and without forces and accelerations."""
+    (q, v), (other, moving) = (random_state(dynamics, seed) for seed in (11, 12))
+    bend, force = np.ones((1, 10)), np.full((1, 4, 3), 5.0)
+    first = dynamics.motion(q[None], v[None], bend, force)
+    before = [array.copy() for array in first]
+    dynamics.motion(other[None], moving[None], 2.0 * bend, 2.0 * force)
+    bare = dynamics.motion(q[None], v[None])
+    for found, expected in zip(first, before, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    still = dynamics.motion(q[None], v[None], np.zeros((1, 10)), np.zeros((1, 4, 3)))
+    for found, expected in zip(bare, still, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert np.abs(bare.torque - first.torque).max() > 1e-3

@@ -82,6 +82,21 @@ def test_an_unknown_joint_of_a_stance_is_named() -> None:
     assert task.start_joints(find_robot("bruce"))["left_knee"] == -0.8
 
 
+def test_held_joints_that_take_part() -> None:
+    robot = find_robot("bruce").changed(held={"left_hip_yaw": 0.1, "right_hip_yaw": -0.1})
+    still = make_task({"name": "a", "rise": 0.1})
+    moves = make_task({"name": "a", "rise": 0.1, "moving": ["*_hip_yaw"]})
+    assert "moving" not in still.content() and still.hash(robot) != moves.hash(robot)
+    assert still.equipped(robot) is robot and not moves.equipped(robot).held
+    assert moves.equipped(moves.equipped(robot)) == moves.equipped(robot)
+    assert moves.start_joints(moves.equipped(robot)) == still.start_joints(robot)
+    wrong = make_task({"name": "a", "rise": 0.1, "moving": ["*_elbow"]})
+    with pytest.raises(
+        JumpTaskError, match=r"moving: bruce has no joint '\*_elbow'; it holds left"
+    ):
+        wrong.equipped(robot)
+
+
 def test_the_hash_follows_what_decides_the_plan() -> None:
     robot = find_robot("bruce")
     base = JumpTask(name="a", rise=0.15)

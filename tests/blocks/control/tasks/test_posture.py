@@ -9,7 +9,6 @@ import pytest
 
 from aloft.blocks.control.tasks.posture import (
     Posture,
-    PostureJoints,
     PostureParameters,
     chosen_joints,
 )
@@ -24,7 +23,7 @@ BRUCE = find_robot("bruce")
 RANDOM = np.random.default_rng(7)
 
 
-def test_a_joint_accelerates_by_feedforward_and_feedback_and_a_held_one_stands_still():
+def test_a_joint_accelerates_by_feedforward_and_feedback():
     index = np.array([1, 4, 2])
     position, velocity = RANDOM.normal(size=5), RANDOM.normal(size=11)
     reference = RANDOM.normal(size=(3, 5))
@@ -32,16 +31,14 @@ def test_a_joint_accelerates_by_feedforward_and_feedback_and_a_held_one_stands_s
         joint_position=reference[0], joint_velocity=reference[1], joint_acceleration=reference[2]
     )
     terms, joints = SimpleNamespace(velocity=velocity), SimpleNamespace(position=position)
-    chosen = PostureJoints(index, np.array([False, False, True]), np.array([7.0, 8.0, 0.4]))
     rows = TaskRows(np.ones((3, 11)), np.zeros(3), np.zeros(3))
     gains = (np.array([2.0, 3.0, 4.0]), np.full(3, 100.0), np.full(3, 20.0))
     e, j = TaskError(*np.zeros((3, 3))), TaskJacobian(rows.jacobian, np.zeros(3))
-    Posture.error(terms, joints, target, chosen, e)
-    Posture.jacobian(joints, chosen, j)
+    Posture.error(terms, joints, target, index, e)
+    Posture.jacobian(joints, index, j)
     feedback_rows(e, j.drift, *gains, rows)
     assert (rows.jacobian == np.eye(11)[[7, 10, 8]]).all()
     angle, rate, feedforward = reference[:, index]
-    angle[2], rate[2], feedforward[2] = 0.4, 0.0, 0.0
     assert rows.desired == pytest.approx(
         feedforward + 100.0 * (angle - position[index]) + 20.0 * (rate - velocity[[7, 10, 8]])
     )
@@ -54,8 +51,8 @@ def test_by_default_it_is_for_joints_of_no_leg_and_held_ones():
     assert chosen_joints(held, PostureParameters()) == [5]
 
 
-def test_only_held_joints_stay_at_their_angle_and_weights_go_by_pattern():
-    robot = BRUCE.changed(held={"left_hip_yaw": 0.1})
+def test_weights_go_by_pattern():
+    robot = BRUCE
     params = PostureParameters(
         joints=["left_hip_*"], posture_weight={"*": 1.0, "*_yaw": 3.0}, posture_stiffness=50.0
     )
@@ -69,8 +66,6 @@ def test_only_held_joints_stay_at_their_angle_and_weights_go_by_pattern():
     Posture.prepare(task)
     assert n > 1 and "left_hip_yaw" in names
     for row, name in enumerate(names):
-        held = name == "left_hip_yaw"
-        assert task.chosen.held[row] == held and task.chosen.angle[row] == (0.1 if held else 0.0)
         assert task.weight[row] == (3.0 if name.endswith("_yaw") else 1.0)
     assert task.stiffness.tolist() == [50.0] * n
 
