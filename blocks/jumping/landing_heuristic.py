@@ -39,6 +39,7 @@ from ...runtime.language.signals import Field
 from ..signals import DynamicsTerms, FootTarget, JumpReference, Phase, PhaseState
 from .landing_prediction import (
     LAST,
+    MOST_LEAD,
     PredictionConstants,
     PredictionGains,
     PredictionMemory,
@@ -168,6 +169,10 @@ class LandingHeuristic(Block):
     the change of the legs' length, and the tilt of the torso at touchdown that the momenta lead to.
     ``docs/landing.md`` has this law in full. p_max applies as above.
 
+    With ``lead_by: fall`` feet are ahead of their planned way by as much as the soles come down sooner than
+    planned: a robot that lifts off too slowly, or whose toes point up, otherwise lands while its feet are still on
+    the way to their place.
+
     The foot moves there from its position at lift-off, along x and y with minimum jerk over
     ``reach_share`` of the predicted flight. Its height follows the plan (paper, V), and near
     touchdown the foot moves upwards at the speed ``retraction``, to land softly.
@@ -266,6 +271,10 @@ class LandingHeuristic(Block):
             drawn_in = 0.0  # the plan itself draws the feet in
         lift, lift_rate = retraction(left, drawn_in, params.retraction_time)
         lowest, lead = lowest_height(terms.foot_position), params.lead_time
+        if params.lead_by == "fall":
+            if flying and params.law == "predicted" and not overdue:
+                memory.early = come_early(reference, terms, left, memory, scratch)
+            lead += memory.early
         turn_frame(reference, terms, params, overdue, memory, scratch)
         if params.limits_about == "stance":
             turn_places(constants.stance, yaw(memory.orientation), scratch.centre)
@@ -348,6 +357,7 @@ def feed_back(
 def lift_off(terms: DynamicsTerms, memory: LandingMemory) -> None:
     """Begin a flight: note how far the feet are from their plan."""
     memory.flight_time = 0.0
+    memory.early = 0.0
     memory.shift[:] = 0.0
     memory.offset[:] = terms.foot_position - terms.com - memory.planned
 
@@ -381,6 +391,26 @@ def predict(
         choose_shift_of_feet(plan, terms, left, memory, params, constants, scratch, program)
         later = fall_time(speed, memory.shift[3])
     return max(left + later, 0.0)
+
+
+@kernel
+def come_early(
+    plan: JumpReference,
+    terms: DynamicsTerms,
+    left: float,
+    memory: LandingMemory,
+    scratch: LandingScratch,
+) -> float:
+    """By how much sooner than planned the lowest point of the soles comes down [s], at most ``MOST_LEAD``.
+
+    ``left`` [s] is the time until soles that are level touch. The point of a sole that is not level is lower than
+    its centre, by what the fall takes some milliseconds for.
+    """
+    if plan.lift_off_time != memory.lift_off_time:
+        return memory.early
+    drop = lowest_height(terms.foot_position) - lowest_height(terms.contact_position)
+    early = plan.touchdown_time - plan.time - left + drop / scratch.fall_speed
+    return min(max(early, 0.0), MOST_LEAD)
 
 
 @kernel

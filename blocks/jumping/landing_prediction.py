@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from ...mathematics.landing_law import (
 )
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
-from ...runtime.language.parameters import Parameters, live_parameter
+from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference
 
+MOST_LEAD = 0.03
+"""What the fall adds to the lead at most [s]."""
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
 
@@ -85,6 +87,10 @@ class PredictionGains(Parameters):
         le=0.05,
         text="by how much the feet are ahead of their planned way, ahead and aside",
     )
+    lead_by: Literal["time", "fall"] = parameter(
+        "time",
+        text="the lead is `lead_time`, or that and by how much sooner than the plan the soles come down",
+    )
     stretch_damping: float = live_parameter(
         0.06, gt=0.0, text="damping where a leg is nearly stretched, in standing heights"
     )
@@ -117,6 +123,7 @@ class PredictionMemory(Signal):
     shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
     planned_touchdown = Field(3, unit="m", frame="world", text="planned com at touchdown")
     flight_time = Field(unit="s", text="lift-off to touchdown with the planned length of the legs")
+    early = Field(unit="s", text="by how much sooner than planned the soles come down")
 
 
 class PredictionScratch(Signal):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Flags1D
+from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import hypot, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
@@ -46,7 +48,7 @@ from ..signals import (
     PlanPart,
     PlanRequest,
 )
-from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
+from ..signals.steering import PLAN_ROWS
 from .moved_landing import (
     AHEAD,
     ASIDE,
@@ -68,6 +70,7 @@ from .plan_progress import (
     keep_in_time,
     read_plan,
 )
+from .received_plan import BEHIND, FollowedPlan, ReceivedPlan, receive
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
@@ -77,23 +80,8 @@ MOST_BIAS = 0.02
 """The largest error of place [m] that is taken for the robot's own, and not for a push."""
 SAME_TURN = 0.02
 """A difference of heading [rad] that is none."""
-BEHIND = 10.0
-"""Rows behind the last one of a plan repeat it, so far apart [s]."""
-
-
-class ReceivedPlan(PlanRows):
-    """The plan that is handed over, row by row."""
-
-    parts = Field(dtype="int64", text="parts that have come")
-    whole = Field(dtype="bool", text="whether all have come")
-
-
-class FollowedPlan(PlanRows):
-    """The plan that is followed."""
-
-    sums = Field((PLAN_ROWS, "plan_width"), text="integrals of the columns")
-    touchdowns = Field(1, unit="s", text="when landing begins")
-    began = Field(unit="s", text="time of the run at which it began")
+MOVED_TURN = 0.05
+"""A jump is asked for anew where the feet have turned by so much [rad]."""
 
 
 class SteeringState(Signal):
@@ -118,6 +106,8 @@ class SteeringState(Signal):
     before_level = Field(unit="m", text="the height there")
     taken = Field(dtype="int64", text="number of the last command that was taken")
     requests = Field(dtype="int64", text="requests so far")
+    asked_from = Field(2, unit="m", frame="world", text="where the feet were at the last request")
+    asked_heading = Field(unit="rad", frame="world", text="their heading then")
     asked = Field(4, text="the last request: ahead, aside [m], turn [rad] and up [m]")
     jumps = Field(dtype="int64", text="plans begun so far")
     changed = Field(dtype="int64", text="commands that moved the landing of a jump under way")
@@ -144,7 +134,9 @@ class SteeredPlan(Block):
     ``replaces`` takes the place of the one that was taken, and the jump is asked for anew. The ``request`` is the way from where the feet *are* to that goal, so a
     landing that missed its place is corrected by the next jump. ``OnlinePlanner``, which works in the
     background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
-    ``rest_time``, the plan begins at the measured place and heading of the feet. The plan of a jump
+    ``rest_time`` and is at rest, the plan begins at the measured place and heading of the feet. It is at rest where its capture
+    point c + c' / w, seen from the middle of the feet, is within ``rest_offset`` of where the plan has it; for that it waits by ``rest_limit`` at
+    most. A robot that has taken a step, or slid by ``ask_again``, since the jump was asked for asks anew. The plan of a jump
     that cannot be done goes to the nearest place that can; from then on the goal is there.
 
     A command that ``replaces`` still moves the landing of the jump under way (``moved_landing``), as often as it likes. Until ``retarget_time`` before lift-off
@@ -192,7 +184,18 @@ class SteeredPlan(Block):
         rest_time: float = parameter(
             0.3, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
         )
-
+        rest_offset: float = parameter(
+            0.05, gt=0.0,
+            text="a plan begins when the capture point is so near to the feet's planned middle, in heights of "
+            "the centre of mass",
+        )  # fmt: skip
+        rest_limit: float = parameter(
+            2.0, unit="s", ge=0.0, text="how much longer than `rest_time` it waits for that at most"
+        )
+        ask_again: float = parameter(
+            0.01, unit="m", gt=0.0,
+            text="a jump is asked for anew where the feet have moved so far since, or have turned by 0.05 rad",
+        )  # fmt: skip
         learning: float = parameter(
             0.5, ge=0.0, le=1.0,
             text="share of the last landing's error of place that later jumps are aimed against",
@@ -216,7 +219,7 @@ class SteeredPlan(Block):
     constants: SteeringConstants
     command = Input(JumpCommand, text="the next jump")
     part = Input(PlanPart, text="the planner's answer")
-    phase = Input(PhaseState, text="the phase; wire it with a delay of 1")
+    phase = Input(PhaseState, text="the phase, with steps; wire it with a delay of 1")
     terms = Input(DynamicsTerms, text="the measured motion")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
@@ -316,7 +319,14 @@ class SteeredPlan(Block):
             ask(command, scratch.place, heading, memory)
             received.parts = 0
             received.whole = False
-        rested = stands or (rests and phase.time_in_phase >= params.rest_time)
+        elif rests and memory.waits and has_moved(scratch.place, heading, params.ask_again, memory):
+            request_way(scratch.place, heading, memory)
+            received.parts = 0
+            received.whole = False
+        rested = stands
+        if rests and phase.time_in_phase >= params.rest_time:
+            rested = phase.time_in_phase >= params.rest_time + params.rest_limit
+            rested = rested or is_at_rest(terms, reference, params.rest_offset, scratch)
         if memory.waits and received.whole and rested:
             follow(received, followed, memory)
             moved.moves = 0
@@ -390,8 +400,16 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     else:
         move(memory, command.ahead, command.aside, command.turn, command.up)
     memory.taken = command.number
-    memory.requests += 1
     memory.waits = True
+    request_way(middle, heading, memory)
+
+
+@kernel
+def request_way(middle: Array1D, heading: float, memory: SteeringState) -> None:
+    """Ask for the jump from the feet's place to the goal."""
+    memory.requests += 1
+    memory.asked_from[:] = middle[:2]
+    memory.asked_heading = heading
     x, y = memory.goal[0] - middle[0], memory.goal[1] - middle[1]
     sine, cosine = sincos(heading)
     turn = memory.goal_heading - heading
@@ -403,6 +421,28 @@ def ask(command: JumpCommand, middle: Array1D, heading: float, memory: SteeringS
     memory.asked[1] = aside - memory.bias[memory.kind, 1]
     memory.asked[2] = wrap(turn)
     memory.asked[3] = memory.level - memory.before_level
+
+
+@kernel
+def has_moved(middle: Array1D, heading: float, way: float, memory: SteeringState) -> bool:
+    """Whether the feet stand elsewhere than where the jump was asked for: after a step, or having slid."""
+    x, y = middle[0] - memory.asked_from[0], middle[1] - memory.asked_from[1]
+    return hypot(x, y) > way or abs(wrap(heading - memory.asked_heading)) > MOVED_TURN
+
+
+@kernel
+def is_at_rest(
+    terms: DynamicsTerms, reference: JumpReference, offset: float, scratch: SteeredPlan.Scratch
+) -> bool:
+    """Whether the capture point is as near to where the plan has it as ``offset``, in heights of the centre of mass."""
+    middle_of(reference.foot_position, scratch.middle)
+    middle_of(terms.foot_position, scratch.middle_rate)
+    height = terms.com[2] - scratch.middle_rate[2]
+    rate = math.sqrt(GRAVITY / max(height, 0.05))
+    off = scratch.vector
+    off[:] = terms.com - scratch.middle_rate + terms.com_velocity / rate
+    off[:] = off - (reference.com - scratch.middle)
+    return hypot(off[0], off[1]) <= offset * height
 
 
 @kernel
@@ -502,35 +542,6 @@ def move(memory: SteeringState, ahead: float, aside: float, turn: float, up: flo
     memory.goal[1] += sine * ahead + cosine * aside
     memory.goal_heading += turn
     memory.level += up
-
-
-@kernel
-def receive(part: PlanPart, number: int, received: ReceivedPlan) -> None:
-    """Copy the part of the plan that comes next, if it is there."""
-    if received.whole or part.number != number or part.part != received.parts:
-        return
-    first = part.part * PART_ROWS
-    for row in range(PART_ROWS):
-        received.time[first + row] = part.time[row]
-        received.rows[first + row, :] = part.rows[row]
-        for point in range(part.contact.shape[1]):
-            received.contact[first + row, point] = part.contact[row, point]
-    received.parts += 1
-    if received.parts < part.parts:
-        return
-    last = received.parts * PART_ROWS - 1
-    for row in range(last + 1, received.time.shape[0]):
-        received.time[row] = received.time[row - 1] + BEHIND
-        received.rows[row, :] = received.rows[last]
-        for point in range(part.contact.shape[1]):
-            received.contact[row, point] = received.contact[last, point]
-    received.marks[:] = part.marks
-    received.jumps[0, :] = part.jump
-    received.toes_first[0] = part.toes_first
-    received.outcome = part.outcome
-    received.done[0], received.done[1] = part.ahead, part.aside
-    received.done[2], received.done[3] = part.turn, part.up
-    received.whole = True
 
 
 @kernel

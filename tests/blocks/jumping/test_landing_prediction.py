@@ -211,3 +211,30 @@ def test_a_late_touchdown_keeps_the_lead_of_the_last_instant():
     late = fly(bench, 0.301, 0.0)
     assert late.position == pytest.approx(before, abs=1e-9)
     assert late.velocity == pytest.approx(np.zeros((2, 3)), abs=1e-9)
+
+
+def test_feet_are_ahead_by_how_much_sooner_than_planned_the_soles_come_down():
+    def end(planned, drop, **more):
+        bench, _ = predicting(tilt_cost=[0.0, 0.0], retraction=0.0, **more)
+        speed = [0.7, 0.0, -1.0]
+        bench.set("reference", foot_velocity=[[1.2, 0.1, -1.0]] * 2, com_velocity=speed)
+        bench.set("reference", lift_off_time=0.0, touchdown_time=0.4 + planned, time=0.35)
+        bench.set("terms", com_velocity=speed, linear_momentum=MASS * np.array(speed))
+        points = places()["contact_position"].copy()
+        points[:, 2] = places()["foot_position"][:, 2].min() - drop
+        bench.set("terms", contact_position=points)
+        begin = fly(bench, 0.0, 0.3).position.copy()
+        return fly(bench, 0.25, 0.05).position - begin
+
+    by_time = end(0.0, 0.0)
+    assert end(0.012, 0.005) == pytest.approx(by_time, abs=1e-9), "only where it is asked for"
+    on_time = end(0.0, 0.0, lead_by="fall")
+    swing = np.tile([0.5, 0.1, 0.0], (2, 1))
+    assert on_time == pytest.approx(by_time, abs=1e-9)
+    late_plan = end(0.012, 0.0, lead_by="fall") - on_time
+    assert late_plan == pytest.approx(0.012 * swing, abs=1e-6)
+    fall_speed = 1.0 + GRAVITY * 0.05
+    toes_up = end(0.0, 0.005, lead_by="fall") - on_time
+    assert toes_up == pytest.approx(0.005 / fall_speed * swing, abs=1e-6)
+    most = end(0.2, 0.0, lead_by="fall") - on_time
+    assert most == pytest.approx(0.03 * swing, abs=1e-6)

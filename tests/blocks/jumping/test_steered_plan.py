@@ -21,13 +21,20 @@ ROBOT = find_robot("bruce")
 
 
 def at(
-    bench: BlockBench[SteeredPlan], x: float, y: float, heading: float, phase: Phase, **more: float
+    bench: BlockBench[SteeredPlan],
+    x: float,
+    y: float,
+    heading: float,
+    phase: Phase,
+    off: float = 0.0,
+    **more: float,
 ) -> None:
-    """Let the feet be there."""
+    """Let the feet be there, and the centre of mass ``off`` ahead of them."""
     cosine, sine = math.cos(heading), math.sin(heading)
     turn = [[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]
     feet = [[x + side * sine * 0.07, y - side * cosine * 0.07, 0.0] for side in (1.0, -1.0)]
-    bench.set("terms", foot_position=feet, foot_rotation=[turn, turn])
+    com = [x + off, y, 0.32]
+    bench.set("terms", foot_position=feet, foot_rotation=[turn, turn], com=com)
     bench.set("phase", phase=phase, **more)
 
 
@@ -165,6 +172,64 @@ def test_a_plan_begins_when_the_robot_rests_and_moves_the_frame() -> None:
     bench.step()
     assert float(frame.heading) == pytest.approx(0.3)
     assert float(bench.get("goal").heading) == pytest.approx(0.5)
+
+
+def test_a_plan_waits_until_the_capture_point_is_where_it_begins() -> None:
+    bench = standing()
+    bench.set("command", number=1, ahead=0.2)
+    bench.step()
+    hand_over(bench, 1, PlanOutcome.PLANNED)
+    bench.set("command", number=2, ahead=0.1)
+    at(bench, 0.2, 0.0, 0.0, Phase.LANDING, time_since_touchdown=0.2)
+    bench.step()
+    at(bench, 0.2, 0.0, 0.0, Phase.RECOVER, off=-0.034, time_in_phase=0.4)
+    hand_over(bench, 2, PlanOutcome.PLANNED)
+    assert int(bench.get("goal").number) == 1, "its centre of mass is still over the heels"
+    at(bench, 0.2, 0.0, 0.0, Phase.RECOVER, off=-0.034, time_in_phase=0.5)
+    bench.set("terms", com_velocity=[0.19, 0.0, 0.0])  # 0.034 m times the pendulum's 5.5 1/s
+    bench.step()
+    assert int(bench.get("goal").number) == 2
+
+
+def test_a_robot_that_never_rests_begins_after_the_limit() -> None:
+    bench = standing()
+    bench.set("command", number=1, ahead=0.2)
+    at(bench, 0.0, 0.0, 0.0, Phase.RECOVER, off=-0.034, time_in_phase=0.1)
+    bench.step()
+    hand_over(bench, 1, PlanOutcome.PLANNED)
+    bench.set("phase", time_in_phase=2.29)
+    bench.step()
+    assert int(bench.get("goal").number) == 0
+    bench.set("phase", time_in_phase=2.31)
+    bench.step()
+    assert int(bench.get("goal").number) == 1
+
+
+def test_a_step_after_the_request_has_the_jump_asked_for_anew() -> None:
+    bench = standing()
+    request, goal = bench.get("request"), bench.get("goal")
+    bench.set("command", number=1, ahead=0.2)
+    bench.step()
+    hand_over(bench, 1, PlanOutcome.PLANNED)
+    at(bench, 0.2, 0.0, 0.0, Phase.LANDING, time_since_touchdown=0.2)
+    bench.set("command", number=2, ahead=0.1)
+    bench.step()
+    assert float(request.ahead) == pytest.approx(0.1)
+    at(bench, 0.195, 0.0, 0.02, Phase.RECOVER, time_in_phase=0.1)
+    bench.step()
+    assert int(request.number) == 2, "what feet settle by is nothing"
+    at(bench, 0.14, 0.03, 0.1, Phase.RECOVER, time_in_phase=0.1)
+    bench.step()
+    assert int(request.number) == 3
+    cosine, sine = math.cos(0.1), math.sin(0.1)
+    way = [cosine * 0.16 - sine * 0.03, -sine * 0.16 - cosine * 0.03, -0.1]
+    asked = [float(request.ahead), float(request.aside), float(request.turn)]
+    assert asked == pytest.approx(way)
+    assert np.asarray(goal.position) == pytest.approx([0.3, 0.0]), "the goal stays"
+    hand_over(bench, 2, PlanOutcome.PLANNED)
+    bench.set("phase", time_in_phase=0.5)
+    bench.step()
+    assert int(goal.number) == 1, "the plan from the old place is not followed"
 
 
 def test_what_cannot_be_done_moves_the_goal_to_what_is_done() -> None:
