@@ -13,6 +13,7 @@ from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
 from .importing.package_files import SCHEME, find_file, package_of
 from .importing.xacro_text import XACRO
+from .plausible_size import wrong_size
 from .robot_description import (
     BASE_VELOCITIES,
     ActuatorProfile,
@@ -173,7 +174,8 @@ def read(path: Path) -> ReadRobot:
     faults = [*text.faults, *find_faults(data)]
     if faults:
         raise RobotError(str(path), [text.placed(fault) for fault in faults])
-    return ReadRobot(_with_places(RobotDescription.model_validate(data), path.parent), path)
+    robot = _with_places(RobotDescription.model_validate(data), path.parent)
+    return ReadRobot(robot, path, notes=wrong_size(robot))
 
 
 def _named_file(path: Path, text: PlacedYaml) -> Path:
@@ -223,7 +225,8 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
     robot = RobotDescription.model_validate(imported.data)
     robot = _with_places(robot, (added or path).parent)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
-    return ReadRobot(robot, added or path, path, (*guessed, *imported.notes, *more))
+    notes = (*guessed, *imported.notes, *more, *wrong_size(robot))
+    return ReadRobot(robot, added or path, path, notes)
 
 
 def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:

@@ -320,18 +320,20 @@ class Transmission(Part):
 
 
 class MountedSensorPart(Part):
-    """A sensor mounted on a ``link`` at ``position`` [m, link frame], its axes parallel to the link's.
+    """A sensor mounted on a ``link`` at ``position`` [m, link frame], its axes turned from the link's by ``orientation``
+    (a quaternion x, y, z, w).
 
     ``kind`` names what it is, or a class as ``module:Class``; that class knows the further settings.
     """
 
     model_config = ConfigDict(extra="allow")
 
-    later = ("position",)
+    later = ("position", "orientation")
 
     kind: str
     link: str
     position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
 
 class Sensors(Part):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..robots.plausible_size import wrong_size
 
 if TYPE_CHECKING:
     from ..robots.description import RobotDescription
@@ -26,6 +27,9 @@ SLENDER, WIDE = 0.1, 1.5
 """Radii of gyration, as shares of the farthest that a link's shapes reach from its centre of mass."""
 AWAY = 1.5
 """A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
+FAR = 4.0
+"""A joint farther from the middle of its parent's shapes than this times what both links reach is elsewhere; of the robots of
+``example-robot-data`` it is at most 1.7 times."""
 NEARLY_ALONG = math.radians(5.0)
 """An axis closer to a coordinate axis than this, and not along it, was measured or typed."""
 NEAR_LIMIT = 0.05
@@ -49,7 +53,7 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
     """The figures of a robot and the remarks about it, as plain data in SI units."""
     standing = standing_rows(robot)
     remarks = [
-        *_links(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
+        *_size(robot), *_links(robot), *_joints(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
         *_motors(robot, standing),
     ]  # fmt: skip
     return {
@@ -58,6 +62,26 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
         "motors": standing,
         "remarks": [vars(remark) for remark in remarks],
     }
+
+
+def _size(robot: RobotDescription) -> Iterator[Remark]:
+    """Mass and size of the whole robot."""
+    for found in wrong_size(robot):
+        yield Remark("the robot", found, "lengths in m and masses in kg")
+
+
+def _joints(robot: RobotDescription) -> Iterator[Remark]:
+    """Joints far from the links that they join."""
+    for joint in robot.joints:
+        parent, child = robot.link(joint.parent), robot.link(joint.child)
+        if not parent.shapes or not child.shapes:
+            continue
+        reach, middle = _extent(parent)
+        both = reach + _extent(child)[0]
+        away = float(np.linalg.norm(np.array(joint.origin) - middle))
+        if away > FAR * both:
+            yield Remark(f"joint {joint.name}", f"{away:.3g} m from the middle of {parent.name}'s shapes",
+                         f"less than {FAR * both:.2g} m, as far as shapes of {parent.name} and {child.name} reach")  # fmt: skip
 
 
 def _links(robot: RobotDescription) -> Iterator[Remark]:

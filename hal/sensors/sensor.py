@@ -23,6 +23,7 @@ In a robot's YAML a sensor has a name of its own::
 
 from __future__ import annotations
 
+import math
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -140,7 +141,7 @@ class Sensor(ABC):
 
 
 class MountedSensor(Sensor):
-    """A sensor that a robot's description mounts on a link; its axes are parallel to the link's.
+    """A sensor that a robot's description mounts on a link.
 
     Args:
         name: of the sensor, and of the robot's output.
@@ -151,6 +152,7 @@ class MountedSensor(Sensor):
 
     Attributes:
         link, position: where it is [m, link frame].
+        orientation: of its axes in the link's, a unit quaternion x, y, z, w.
         settings: what else the description sets.
     """
 
@@ -159,13 +161,20 @@ class MountedSensor(Sensor):
     def __init__(self, name: str, part: MountedSensorPart) -> None:
         super().__init__(name)
         self.link, self.position = part.link, part.position
+        length = math.sqrt(sum(x * x for x in part.orientation))
+        if not 0.0 < length < math.inf:
+            raise SensorError(
+                f"sensor {name}: orientation is a quaternion x, y, z, w that is not zero, not "
+                f"{list(part.orientation)}"
+            )
+        self.orientation = tuple(x / length for x in part.orientation)
         try:
             self.settings = self.Settings.model_validate(dict(part.model_extra or {}))
         except ValidationError as error:
             first = describe(error.errors(include_url=False)[0], self.Settings)
             known = ", ".join(self.Settings.model_fields)
             raise SensorError(
-                f"sensor {name}: {first}; {self.kind} has kind, link, position, {known}"
+                f"sensor {name}: {first}; {self.kind} has kind, link, position, orientation, {known}"
             ) from error
         for field in self.settings.noise:
             if field not in self.signal.fields:

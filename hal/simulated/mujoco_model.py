@@ -310,7 +310,8 @@ def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription, variation: Varia
         body = body_name(sensor.link)
         longer = variation.factor(variation.link_length, names.index(sensor.link))
         place = longer * np.array(sensor.position)
-        spec.body(body).add_site(name=sensor.site, pos=place)
+        x, y, z, w = sensor.orientation
+        spec.body(body).add_site(name=sensor.site, pos=place, quat=[w, x, y, z])
         sensor.add_to_model(spec, body)
 
 

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ...hal.sensors.sensor import MountedSensor, SensorError, mounted_sensors
+from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
 from .contacts import ARROW_RADIUS, force_arrows
 from .drawing import Moments, ScenePart
@@ -58,7 +59,8 @@ class SensorPart(ScenePart):
         for port, sensor in self._arrows.items():
             assert sensor.drawn is not None
             position, rotation = poses.of(sensor.link)
-            vector = np.einsum("nij,nj->ni", rotation, moments[f"{port}.{sensor.drawn.field}"])
+            axes = rotation @ matrices_of_quaternions(np.array(sensor.orientation))
+            vector = np.einsum("nij,nj->ni", axes, moments[f"{port}.{sensor.drawn.field}"])
             arrows = rr.Arrows3D.columns(
                 origins=position + rotation @ np.array(sensor.position),
                 vectors=force_arrows(self.robot, vector),

@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from ...files.problems import listing
+from ...mathematics.rotations import quaternions_of_matrices
+from ..plausible_size import wrong_size
 from ..robot_description import RobotDescription
 from ..validation import RobotError, find_faults
 from ..validation.faults import number, vector
-from .build import BodyFrame, LinkTree
+from .build import BodyFrame, LinkTree, tidy
 from .description_data import Imported, import_robot
 from .fit_to_ground import fit_to_ground
 from .raw_model import RawModel
@@ -40,7 +42,7 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
         raise RobotError(str(file), _placed(imported, faults))
     robot = RobotDescription.model_validate(imported.data)
     robot, fitted = fit_to_ground(robot, False, imported.model.pose)
-    notes = [*more, *imported.notes, *fitted]
+    notes = [*more, *imported.notes, *fitted, *wrong_size(robot)]
     name = os.path.relpath(file, target.parent)
     estimated = not any(joint.rotor_inertia for joint in imported.built.raw_joints.values())
     sensors = _sensors(robot, imported.model, imported.built)
@@ -79,6 +81,8 @@ def _placed(imported: Imported, faults: Any) -> list[Any]:
     return [placed_in_model(fault, imported.data, imported.model) for fault in faults]
 
 
+SAME_DIRECTION = 1e-6
+"""Sensors turned by about half of that [rad] or less are parallel to their link."""
 REACH = 0.1
 """By how much less than the farthest limb a foot reaches down, as a share."""
 LEVEL = 0.01
@@ -275,18 +279,26 @@ def _sensors(robot: RobotDescription, model: RawModel, built: LinkTree) -> list[
         f"  imu: {str(robot.sensors.imu).lower()}",
         f"  switches: {str(robot.sensors.switches).lower()}",
     ]
-    found = {name: imu for name, imu in model.imus.items() if imu.body in built.frames}
+    found = {name: each for name, each in model.sensors.items() if each.body in built.frames}
     if found:
-        lines.append(
-            "  # From the file: further IMUs, each an output of the robot, in its link's axes."
-        )
-    for name, imu in found.items():
-        frame = built.frames[imu.body]
-        turned = imu.turned or not np.allclose(frame.rotation, np.eye(3), atol=1e-6)
-        lines.append(
-            f"  {name}: {{kind: imu, link: {frame.link}, position: {vector(frame.point(imu.position))}}}"
-            + ("  # turned in the file" if turned else "")
-        )
+        lines.append("  # From the file: further sensors, each an output of the robot.")
+    feet = {foot.link for foot in robot.feet}
+    for name, sensor in found.items():
+        frame = built.frames[sensor.body]
+        entry = f"{name}: {{kind: {sensor.kind}, link: {frame.link}, position: {vector(frame.point(sensor.position))}"
+        turn = quaternions_of_matrices(frame.rotation @ sensor.rotation)
+        if np.abs(turn[:3]).max() > SAME_DIRECTION:
+            entry += f", orientation: {vector(tidy(turn, 9))}"
+        if sensor.noise:
+            each = ", ".join(f"{k}: {{noise: {number(v)}}}" for k, v in sensor.noise.items())
+            entry += f", noise: {{{each}}}"
+        if sensor.kind == "force_torque" and frame.link not in feet:
+            lines.append(
+                "  # Left out, as force_torque measures what a link's contacts with the ground give,"
+            )
+            lines.append(f"  # and this link is no foot's: {entry}}}")
+        else:
+            lines.append(f"  {entry}}}")
     return lines
 
 

@@ -93,13 +93,15 @@ class RawThruster:
 
 
 @dataclass(frozen=True)
-class RawImu:
-    """An inertial measurement unit at ``position`` [m] in the frame of a ``body``; ``turned`` says that its axes are
-    not parallel to the body's."""
+class RawSensor:
+    """A sensor of a ``kind`` of the description at ``position`` [m] in the frame of a ``body``, in which its axes have
+    ``rotation``; ``noise`` has the standard deviation by field, where the file gives one."""
 
+    kind: str
     body: str
     position: Array
-    turned: bool
+    rotation: Array
+    noise: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ class RawModel:
         names_world: whether the file itself has a link for the world, as it must in MJCF.
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
         thrusters: actuators that push at a place, by name.
-        imus: inertial measurement units, by name.
+        sensors: those that the file mounts on links, by name.
         mimics: joints that the file ties to another one, or leaves no range.
         notes: what could not be taken over, one sentence each.
     """
@@ -145,4 +147,4 @@ class RawModel:
     mimics: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     thrusters: Mapping[str, RawThruster] = field(default_factory=dict)
-    imus: Mapping[str, RawImu] = field(default_factory=dict)
+    sensors: Mapping[str, RawSensor] = field(default_factory=dict)

@@ -18,7 +18,7 @@ import numpy as np
 from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
-from .imus import imus
+from .file_sensors import file_sensors, unknown_sensors
 from .left_out import left_out
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
@@ -57,7 +57,7 @@ def read_model(path: Path) -> RawModel:
     except (ValueError, RuntimeError) as error:
         raise file.error(f"MuJoCo cannot read this: {_one_line(error)}") from error
     notes: list[str] = []
-    _name_everything(spec)
+    _name_everything(spec, file.is_urdf)
     _refuse_closed_loops(spec, file)
     inertials = _take_inertials(spec, file.is_urdf)
     meshes = _take_meshes(spec, path.parent, inertials, notes)
@@ -92,6 +92,7 @@ def read_model(path: Path) -> RawModel:
         for name, leader in tied.items():
             notes.append(f"joint {name} {leader} in the file and is fixed here")
         notes += left_out(model, spec)
+    notes += unknown_sensors(model, file)
     names = [model.body(k).name for k in range(model.nbody)]
     bodies = {}
     for k in range(1, model.nbody):
@@ -114,7 +115,7 @@ def read_model(path: Path) -> RawModel:
     names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
         name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics + still,
-        tuple(dict.fromkeys(notes)), thrusters, imus(model, file),
+        tuple(dict.fromkeys(notes)), thrusters, file_sensors(model, file),
     )  # fmt: skip
 
 
@@ -160,13 +161,14 @@ def _tidy(values: Array) -> Array:
     return np.where(np.abs(values - nearest) < 1e-10, nearest, values) + 0.0
 
 
-def _name_everything(spec: Any) -> None:
+def _name_everything(spec: Any, is_urdf: bool) -> None:
     for k, body in enumerate(spec.bodies):
         body.name = body.name or f"body_{k}"
         for i, joint in enumerate(body.joints):
             joint.name = joint.name or f"{body.name}_joint" + (f"_{i + 1}" if i else "")
     for k, geom in enumerate(spec.geoms):
-        geom.name = f"geom/{k}"
+        # A URDF may call several shapes the same; of MJCF sensors and contact pairs name geoms.
+        geom.name = f"geom/{k}" if is_urdf or not geom.name else geom.name
 
 
 def _take_inertials(spec: Any, is_urdf: bool) -> dict[str, tuple[float, Array]]:

@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 
 from aloft.benchmarks import mutated_robots as module
-from aloft.benchmarks.mutated_robots import KINDS, mutated_robots
+from aloft.benchmarks.mistakes import MJCF, URDF, Change
+from aloft.benchmarks.mistakes_yaml import YAML
+from aloft.benchmarks.mutated_robots import Format, mutated_robots
+from aloft.robots.description import find_robot
 
-URDF = b"""<robot name="x"><link name="base"><inertial><mass value="1"/>
+GOOD = b"""<robot name="x"><link name="base"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
 <visual><geometry><mesh filename="a.stl"/></geometry></visual></link>
 <link name="arm"><inertial><mass value="2"/>
@@ -18,11 +21,18 @@ URDF = b"""<robot name="x"><link name="base"><inertial><mass value="1"/>
 """
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_of_mistake_changes_something_and_repeats(kind: str) -> None:
-    found = [KINDS[kind](random.Random(seed), URDF) for seed in range(5)]
-    assert all(data != URDF for data in found) and any(found)
-    assert found == [KINDS[kind](random.Random(seed), URDF) for seed in range(5)]
+def each_changes_something(mistakes: dict[str, Change], good: bytes) -> None:
+    for kind, mistake in mistakes.items():
+        found = [mistake(random.Random(seed), good) for seed in range(5)]
+        assert all(data != good for data in found) and any(found), kind
+        assert found == [mistake(random.Random(seed), good) for seed in range(5)], kind
+
+
+def test_each_kind_of_mistake_changes_something_and_repeats(tmp_path: Path) -> None:
+    each_changes_something(URDF, GOOD)
+    each_changes_something(MJCF, module._as_mjcf(find_robot("bruce")))
+    (tmp_path / "x.urdf").write_bytes(GOOD)
+    each_changes_something(YAML, module._as_yaml(find_robot("x.urdf", tmp_path)))
 
 
 def test_without_the_package_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -33,7 +43,7 @@ def test_without_the_package_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.long
 def test_what_no_reader_could_accept_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "x.urdf"
-    file.write_bytes(URDF)
+    file.write_bytes(GOOD)
     usual = module._said(file)
     for kind in (
         "the file is cut",
@@ -42,7 +52,16 @@ def test_what_no_reader_could_accept_is_reported(tmp_path: Path) -> None:
         "a negative mass",
     ):
         for seed in range(3):
-            data = KINDS[kind](random.Random(seed), URDF)
+            data = URDF[kind](random.Random(seed), GOOD)
             assert data is not None
             outcome, said = module._outcome(tmp_path / "y.urdf", data, usual)
             assert (outcome, bool(said)) == ("reported", True), (kind, seed, said)
+
+
+def test_the_cases_of_a_format_are_counted_by_kind() -> None:
+    wrong = {"a mass of zero": YAML["a mass of zero"], "nothing": lambda draw, text: text}
+    tried = Format({"bruce.yaml": module._as_yaml(find_robot("bruce"))}, wrong)
+    examples: dict[str, str] = {}
+    found = module._tried("YAML", tried, 4, 7, examples)
+    assert found == {"a mass of zero": {"reported": 2}, "nothing": {"accepted": 2}}
+    assert examples["YAML: a mass of zero: reported"].startswith("seed 7, bruce.yaml: ")

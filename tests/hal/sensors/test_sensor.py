@@ -127,7 +127,7 @@ def test_packets_carry_float32_and_the_twin_reads_them() -> None:
         ),
         (
             {"nose": {}},
-            "sensor foot_imu: nose: is not known; the nearest is noise; imu has kind, link, position, noise",
+            "sensor foot_imu: nose: is not known; the nearest is noise; imu has kind, link, position, orientation, noise",
         ),
     ],
 )
