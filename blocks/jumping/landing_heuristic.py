@@ -407,10 +407,10 @@ def come_early(
     its centre, by what the fall takes some milliseconds for.
     """
     if plan.lift_off_time != memory.lift_off_time:
-        return memory.early
+        return float(memory.early)
     drop = lowest_height(terms.foot_position) - lowest_height(terms.contact_position)
     early = plan.touchdown_time - plan.time - left + drop / scratch.fall_speed
-    return min(max(early, 0.0), MOST_LEAD)
+    return float(min(max(early, 0.0), MOST_LEAD))
 
 
 @kernel

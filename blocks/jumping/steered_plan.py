@@ -442,7 +442,8 @@ def is_at_rest(
     off = scratch.vector
     off[:] = terms.com - scratch.middle_rate + terms.com_velocity / rate
     off[:] = off - (reference.com - scratch.middle)
-    return hypot(off[0], off[1]) <= offset * height
+    distance = float(hypot(off[0], off[1]))
+    return distance <= float(offset * height)
 
 
 @kernel
