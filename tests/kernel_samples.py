@@ -538,6 +538,20 @@ UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
         {"outcome": 0}, STEERED, MOVED,
     ),
 )  # fmt: skip
+STANDING = {"foot_position": NORMAL((2, 3)), "com": np.array([0.1, 0.0, 0.4])}
+UNUSED["aloft.blocks.jumping.steered_plan.has_moved"] = (
+    np.array([0.11, 0.02, 0.0]), 0.3, 0.05, *records({"asked_from": np.zeros(3), "asked_heading": 0.1}),
+)  # fmt: skip
+UNUSED["aloft.blocks.jumping.steered_plan.is_at_rest"] = (
+    *records({**STANDING, "com_velocity": NORMAL(3)}, STANDING), 0.05,
+    *records({"middle": np.zeros(3), "middle_rate": np.zeros(3), "vector": np.zeros(3)}),
+)  # fmt: skip
+UNUSED["aloft.blocks.jumping.landing_heuristic.come_early"] = (
+    *records(
+        {"lift_off_time": 1.0, "touchdown_time": 1.3, "time": 1.27},
+        {"foot_position": NORMAL((2, 3)), "contact_position": NORMAL((4, 3))},
+    ), 0.02, *records({"lift_off_time": 1.0, "early": 0.001}, {"fall_speed": 1.2}),
+)  # fmt: skip
 WIDTH = len(fed_forward(2, 10))
 ROWS_OF_SPEEDS = TableRows(
     np.concatenate([np.linspace(0.0, 3.2, 9), np.linspace(8.0, 11.2, 9)]), NORMAL((18, WIDTH)),
