@@ -405,6 +405,14 @@ class RobotDescription(Part):
     looks: Mapping[str, Appearance] = {}
     """What links are drawn as, by name; others are drawn as their collision shapes."""
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all fields are equal; pydantic compares cached arrays, too."""
+        if not isinstance(other, RobotDescription):
+            return NotImplemented
+        return all(getattr(self, n) == getattr(other, n) for n in type(self).model_fields)
+
+    __hash__ = None  # type: ignore[assignment]
+
     @property
     def dimensions(self) -> Mapping[str, int]:
         """The named dimensions every graph with this robot has."""

@@ -101,6 +101,10 @@ def test_what_is_missing_is_said_with_what_to_write(
     (tmp_path / "leg.yaml").write_text("feet: []\n")
     notes = [n for n in run_here("robot", "show", "leg.xml").stdout.splitlines() if "note:" in n]
     assert notes == [
+        (
+            "note: left out: gains of servos, kp 100, kv 0 (knee) at the joint; gains follow from "
+            "inertia and motor, and joint_pd.flight_stiffness in a graph sets them"
+        ),
         "note: no speed limit of hip, knee: 20 rad/s is assumed",
         (
             "note: there are no feet, so the robot can be simulated but not stand or jump; write them "
