@@ -133,7 +133,7 @@ def test_pruning_keeps_the_tasks_that_are_given(
     left = sorted(path.name.partition("-")[0] for path in (folder / "kept").glob("*.npz"))
     # plans of other robots than the tasks' are nobody's to remove
     assert [name for name in left if not name.startswith(("g1_", "go2_", "solo12_"))] == ["in_situ"]
-    assert len(left) == 6
+    assert len(left) == 7
     assert "--prune goes with" in call("plan", one, "--prune", code=2).stderr
     both = call("plan", one, "--rehearse", "--rehearse-landing", code=2).stderr
     assert "give --rehearse or" in both
