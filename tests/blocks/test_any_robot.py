@@ -70,6 +70,7 @@ def test_held_joints_and_arms_do_not_swing_to_balance():
         bench.set("joints", position=robot.standing_position)
         bench.set("phase", phase=int(Phase.STAND), stance=True)
         bench.set("target", com=terms["com"] + [0.02, 0.02, 0.0], orientation=LEVEL)
+        bench.set("target", joint_position=robot.standing_position)
         bench.step()
         accelerations[with_posture] = np.abs(bench.get("command").acceleration[6:][held]).max()
     assert accelerations[True] < 0.3 * accelerations[False]
@@ -86,12 +87,13 @@ def test_every_joint_has_sensible_gains_and_held_ones_are_held(name):
     assert (damping * 0.0005 < 0.5 * inertia).all(), "a drive of 2 kHz would not be stable"
     bench = BlockBench(JointPD, robot=robot)
     bench.set("phase", phase=int(Phase.STAND), stance=True)
+    bench.set("reference", joint_position=robot.standing_position)
     bench.step(5)
     command = bench.get("command")
     for k, joint in enumerate(robot.joints):
         held = joint.name in robot.held
         assert command.stiffness[k] == (stiffness[k] if held else 0.0)
-        assert command.position[k] == robot.held.get(joint.name, 0.0)
+        assert command.position[k] == (robot.standing_position[k] if held else 0.0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
