@@ -411,8 +411,6 @@ class RobotDescription(Part):
             return NotImplemented
         return all(getattr(self, n) == getattr(other, n) for n in type(self).model_fields)
 
-    __hash__ = None  # type: ignore[assignment]
-
     @property
     def dimensions(self) -> Mapping[str, int]:
         """The named dimensions every graph with this robot has."""
