@@ -96,24 +96,31 @@ def misspelt(draw: random.Random, text: str) -> str:
     return text[:place] + text[place + 1 : place + 2] + text[place : place + 1] + text[place + 2 :]
 
 
-def _misspell_tag(draw: random.Random, root: ET.Element) -> bool:
-    each = draw.choice(
-        [e for path in ("link/*", "joint/*", "link/inertial/*") for e in root.findall(path)]
-    )
-    before = each.tag
-    each.tag = misspelt(draw, each.tag)
-    return each.tag != before
+def misspell_tag(*paths: str) -> Change:
+    """The name of an element is misspelt."""
+
+    def change(draw: random.Random, root: ET.Element) -> bool:
+        each = draw.choice([e for path in paths for e in root.findall(path)])
+        before = each.tag
+        each.tag = misspelt(draw, each.tag)
+        return each.tag != before
+
+    return tree(change)
 
 
-def _misspell_attribute(draw: random.Random, root: ET.Element) -> bool:
-    parts = ("link/inertial/*", "joint/origin", "joint/limit", "joint/axis")
-    each = draw.choice([e for path in parts for e in root.findall(path) if e.attrib])
-    name = draw.choice(sorted(each.attrib))
-    wrong = misspelt(draw, name)
-    if wrong in each.attrib:
-        return False
-    each.attrib[wrong] = each.attrib.pop(name)
-    return True
+def misspell_attribute(*paths: str) -> Change:
+    """The name of an attribute is misspelt."""
+
+    def change(draw: random.Random, root: ET.Element) -> bool:
+        each = draw.choice([e for path in paths for e in root.findall(path) if e.attrib])
+        name = draw.choice(sorted(each.attrib))
+        wrong = misspelt(draw, name)
+        if wrong in each.attrib:
+            return False
+        each.attrib[wrong] = each.attrib.pop(name)
+        return True
+
+    return tree(change)
 
 
 def _swap_limits(draw: random.Random, root: ET.Element) -> bool:
@@ -189,8 +196,10 @@ URDF: dict[str, Change] = {
     "a joint is there twice": double("joint"),
     "a link has another name": set_to("link", "name", lambda _, text: f"{text}_2"),
     "a joint of an unknown type": set_to("joint", "type", misspelt),
-    "an element is misspelt": tree(_misspell_tag),
-    "an attribute is misspelt": tree(_misspell_attribute),
+    "an element is misspelt": misspell_tag("link/*", "joint/*", "link/inertial/*"),
+    "an attribute is misspelt": misspell_attribute(
+        "link/inertial/*", "joint/origin", "joint/limit", "joint/axis"
+    ),
     "a mass that is no number": set_to("link/inertial/mass", "value", no_number),
     "an inertia that is no number": set_to("link/inertial/inertia", "ixx", no_number),
     "a place that is no number": set_to("joint/origin", "xyz", no_number),
@@ -243,34 +252,6 @@ def _double_beside(tag: str) -> Change:
     return tree(change)
 
 
-def _misspell_tag_of_mjcf(draw: random.Random, root: ET.Element) -> bool:
-    each = draw.choice([e for path in (".//body/*", "actuator/*") for e in root.findall(path)])
-    before = each.tag
-    each.tag = misspelt(draw, each.tag)
-    return each.tag != before
-
-
-def _misspell_attribute_of_mjcf(draw: random.Random, root: ET.Element) -> bool:
-    parts = (".//inertial", ".//body/joint", ".//body/geom", "actuator/*")
-    each = draw.choice([e for path in parts for e in root.findall(path) if e.attrib])
-    name = draw.choice(sorted(each.attrib))
-    wrong = misspelt(draw, name)
-    if wrong in each.attrib:
-        return False
-    each.attrib[wrong] = each.attrib.pop(name)
-    return True
-
-
-def _all_lengths(_: random.Random, root: ET.Element) -> bool:
-    for each in root.iter():
-        for name in ("pos", "size"):
-            if name in each.attrib:
-                each.attrib[name] = " ".join(
-                    repr(1e3 * float(word)) for word in each.attrib[name].split()
-                )
-    return True
-
-
 def _close_loop(draw: random.Random, root: ET.Element) -> bool:
     names = [each.attrib["name"] for each in root.findall(BODIES) if "name" in each.attrib]
     if len(names) < 2:
@@ -308,8 +289,10 @@ MJCF: dict[str, Change] = {
     "a joint is there twice": _double_beside("joint"),
     "a joint has another name": set_to(".//body/joint", "name", lambda _, text: f"{text}_2"),
     "a geom of an unknown type": set_to(".//body/geom", "type", misspelt),
-    "an element is misspelt": tree(_misspell_tag_of_mjcf),
-    "an attribute is misspelt": tree(_misspell_attribute_of_mjcf),
+    "an element is misspelt": misspell_tag(".//body/*", "actuator/*"),
+    "an attribute is misspelt": misspell_attribute(
+        ".//inertial", ".//body/joint", ".//body/geom", "actuator/*"
+    ),
     "a mass that is no number": set_to(".//inertial", "mass", no_number),
     "an inertia that is no number": set_to(".//inertial", "diaginertia", no_number),
     "a place that is no number": set_to(BODIES, "pos", no_number),
@@ -327,7 +310,7 @@ MJCF: dict[str, Change] = {
     "all masses in grams": of_all(".//inertial", ("mass",), 1000.0),
     "inertias in kg mm²": of_all(".//inertial", ("diaginertia",), 1e6),
     "places in millimetres": of_all(BODIES, ("pos",), 1000.0),
-    "all lengths in millimetres": tree(_all_lengths),
+    "all lengths in millimetres": of_all(".//*", ("pos", "size"), 1000.0),
     "limits in degrees": of_all(".//body/joint", ("range",), 57.29578),
     "limits of a joint swapped": tree(_swap_range),
     "a negative effort": set_to("actuator/*", "forcerange", lambda _, text: "1 -1"),

@@ -11,6 +11,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.segment_distances import capsule_gaps
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, from_base_outwards
+from ...robots.limb import chain_to
 from .exact_dynamics import run_compiled
 
 Capsule = tuple[Array, Array, float]
@@ -32,15 +33,7 @@ def capsule_ends(robot: RobotDescription, poses: LinkPoses, link: str) -> list[C
 
 def legs(robot: RobotDescription) -> list[list[str]]:
     """The links of every leg, from the base outwards, legs in the order of the feet."""
-    parent = {joint.child: joint.parent for _, joint in from_base_outwards(robot)}
-    found = []
-    for foot in robot.feet:
-        chain, link = [foot.link], foot.link
-        while parent[link] != robot.base:
-            link = parent[link]
-            chain.append(link)
-        found.append(chain[::-1])
-    return found
+    return [[robot.joints[k].child for k in chain_to(robot, foot.link)] for foot in robot.feet]
 
 
 def arms(robot: RobotDescription) -> list[list[str]]:
