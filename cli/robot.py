@@ -152,14 +152,26 @@ def export(
     ] = None,
     urdf: Annotated[bool, typer.Option("--urdf", help="As a URDF, which is the default.")] = True,
 ) -> None:
-    """Write a robot as a URDF: links, joints, capsules, contact points, effort and speed limits."""
+    """Write a robot as a URDF: links, joints, shapes, contact points, effort and speed limits."""
     with _faults_reported(False):
-        from ..robots.urdf_export import urdf_of
+        from ..robots.urdf_export import hull_meshes, urdf_of
 
-        text = urdf_of(_read(name).description)
+        described = _read(name).description
+        hulls = hull_meshes(described)
+        if out is None and hulls:
+            raise AloftError(
+                f"{described.name} has {len(hulls)} convex hulls, which a URDF keeps in mesh files of their own; "
+                "give the file to write, and they are written beside it: --out NAME.urdf"
+            )
+        folder = f"{out.stem}_meshes" if out is not None else ""
+        text = urdf_of(described, folder)
         if out is not None:
             try:
                 out.write_text(text, encoding="utf-8")
+                if hulls:
+                    (out.parent / folder).mkdir(exist_ok=True)
+                for file, content in hulls.items():
+                    (out.parent / folder / file).write_bytes(content)
             except OSError as error:
                 raise AloftError(f"{out} cannot be written: {error.strerror}") from error
     if out is None:

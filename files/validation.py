@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -165,6 +165,9 @@ def _models(types: Iterable[Any]) -> list[Any]:
     """The types with the members of unions in place of the unions."""
     found: list[Any] = []
     for each in types:
+        if get_origin(each) is Annotated:
+            found += _models(get_args(each)[:1])
+            continue
         union = get_origin(each) in (Union, UnionType)
         found += _models(get_args(each)) if union else [each]
     return found

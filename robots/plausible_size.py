@@ -40,7 +40,7 @@ def _extremes(robot: RobotDescription, name: str) -> list[tuple[Array, float]]:
     link = robot.link(name)
     found = [(np.zeros(3), 0.0)]
     for shape in link.shapes:
-        found += [(np.array(shape.start), shape.radius), (np.array(shape.end), shape.radius)]
+        found += [(np.array(corner), shape.radius) for corner in shape.corners]
     if link.mass > 0.0:
         gyration = math.sqrt(max(0.0, 0.5 * sum(link.inertia[:3])) / link.mass)
         found.append((np.array(link.com), gyration))

@@ -145,14 +145,14 @@ VIEWS = (("from the right", 0, 1.0), ("from behind", 1, -1.0))
 """The views: title, the base's axis that is horizontal in the picture, and its sign there."""
 WIDTH, HEIGHT = 9.0, 5.5
 """The picture's size [inch]."""
-ROUND = np.linspace(0.0, np.pi, 13)
-"""The directions of the corners of a capsule's end."""
+AROUND = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
+"""The directions of the points of a shape's outline [rad]."""
 
 
 def draw_robot(robot: RobotDescription, path: Path) -> Path:
     """Draw the robot in its standing pose to a PNG or SVG file, whose folder must exist.
 
-    Capsules are as thick as they are, each limb in a colour of its own; dots are joints, rings the
+    Shapes are as thick as they are, each limb in a colour of its own; dots are joints, rings the
     rubber of contact points, the cross is the centre of mass.
 
     Raises:
@@ -184,8 +184,8 @@ def _draw(axes: Axes, robot: RobotDescription, poses: Poses, axis: int, sign: fl
     for link in robot.links:
         turn, place = poses[link.name]
         for shape in link.shapes:
-            start, end = (seen(place + turn @ np.array(at)) for at in (shape.start, shape.end))
-            outline = _outline(start, end, shape.radius)
+            corners = np.array([seen(place + turn @ np.array(at)) for at in shape.corners])
+            outline = _outline(corners, shape.radius)
             axes.fill(*outline.T, facecolor=colours[link.name], edgecolor="white", alpha=0.55)
     for joint in robot.joints:
         ends = np.array([seen(poses[joint.parent][1]), seen(poses[joint.child][1])])
@@ -195,7 +195,7 @@ def _draw(axes: Axes, robot: RobotDescription, poses: Poses, axis: int, sign: fl
     for contact, centre in zip(robot.contacts, centres, strict=True):
         turn, place = poses[links[contact.foot]]
         middle = seen(place + turn @ centre)
-        axes.fill(*_outline(middle, middle, contact.radius).T, fill=False, edgecolor=INK)
+        axes.fill(*_outline(middle[None], contact.radius).T, fill=False, edgecolor=INK)
     if robot.contacts:
         axes.axhline(float(standing_heights(robot).min()), color=FAINT, linewidth=1.0)
     axes.plot(*seen(standing_com(robot)), marker="x", markersize=8.0, color=INK)
@@ -213,12 +213,7 @@ def _limb_colours(robot: RobotDescription) -> dict[str, str]:
     return colours
 
 
-def _outline(start: Array, end: Array, radius: float) -> Array:
-    """The corners (n, 2) of a capsule's outline from ``start`` to ``end``."""
-    along = end - start
-    angle = np.arctan2(along[1], along[0])
-    far, near = ROUND - 0.5 * np.pi + angle, ROUND + 0.5 * np.pi + angle
-    return np.concatenate([
-        end + radius * np.stack([np.cos(far), np.sin(far)], axis=1),
-        start + radius * np.stack([np.cos(near), np.sin(near)], axis=1),
-    ])  # fmt: skip
+def _outline(corners: Array, radius: float) -> Array:
+    """The outline (n, 2) of a shape with these corners (m, 2) that reaches beyond them by ``radius``."""
+    ahead = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=1)
+    return np.asarray(corners[(corners @ ahead.T).argmax(axis=0)] + radius * ahead)

@@ -7,7 +7,7 @@ to the base's at the zero pose; quantities are in SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    Tag,
     model_serializer,
 )
 
@@ -72,12 +74,49 @@ class Part(BaseModel):
         return data
 
 
-class Shape(Part):
+class Capsule(Part):
     """A collision capsule from ``start`` to ``end`` [m, link frame] of ``radius`` [m]."""
 
     start: Vector3
     end: Vector3
     radius: float
+
+    @property
+    def corners(self) -> tuple[Vector3, ...]:
+        """Both ends: all that is within ``radius`` of the line between them is the capsule's."""
+        return (self.start, self.end)
+
+    def moved(self, place: Callable[[Vector3], Vector3]) -> Capsule:
+        """The capsule in another frame, in which ``place`` gives where a point is."""
+        return Capsule(start=place(self.start), end=place(self.end), radius=self.radius)
+
+
+class Hull(Part):
+    """A convex collision body: the hull of its ``corners`` [m, link frame], four or more that lie in no plane."""
+
+    corners: Annotated[tuple[Vector3, ...], Field(min_length=4)]
+
+    @property
+    def radius(self) -> float:
+        """A hull reaches no farther than its corners [m]."""
+        return 0.0
+
+    def moved(self, place: Callable[[Vector3], Vector3]) -> Hull:
+        """The hull in another frame, in which ``place`` gives where a point is."""
+        return Hull(corners=tuple(place(corner) for corner in self.corners))
+
+
+def _kind_of_shape(shape: Any) -> str:
+    """Which kind of shape data, or a shape, is: the keys of a hull are none of a capsule's."""
+    is_hull = "corners" in shape if isinstance(shape, Mapping) else isinstance(shape, Hull)
+    return "hull" if is_hull else "capsule"
+
+
+SHAPE_KINDS = ("capsule", "hull")
+Shape = Annotated[
+    Annotated[Capsule, Tag("capsule")] | Annotated[Hull, Tag("hull")], Discriminator(_kind_of_shape)
+]
+"""A convex collision shape: all that is within ``radius`` of the hull of its ``corners``."""
 
 
 class Mesh(Part):

@@ -2,7 +2,7 @@
 
 What a URDF cannot hold is left out: reflected rotor inertia, couplings between motors, the torque's
 fall with speed. Its effort and speed limits are what the motors give a joint when nothing else
-moves. Capsules become a cylinder with a ball at each end; contact points and sole centres become
+moves. Capsules become a cylinder with a ball at each end, and hulls meshes in files beside the URDF; contact points and sole centres become
 links without mass, ``<name>`` and ``<foot>_sole``, whose origins they are.
 """
 
@@ -15,19 +15,25 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ..mathematics.arrays import Array
-from .robot_description import Joint, Link, RobotDescription, Shape
+from .hulls import surface
+from .robot_description import Capsule, Hull, Joint, Link, RobotDescription
 
 FREE = 1e3
 """The limits [m] of a slide that has none: a URDF demands some."""
 
 
-def urdf_of(robot: RobotDescription) -> str:
-    """The URDF's text. All numbers are written with every digit they have."""
+def urdf_of(robot: RobotDescription, meshes: str = "meshes") -> str:
+    """The URDF's text. All numbers are written with every digit they have.
+
+    Args:
+        robot: the robot.
+        meshes: the folder, as the URDF names it, of the files of ``hull_meshes``.
+    """
     root = Element("robot", name=robot.name)
     root.append(ElementTree.Comment(f" {robot.text or robot.name}, written by aloft "))
     _add_world(root, robot)
     for link in robot.links:
-        _add_link(root, link)
+        _add_link(root, link, meshes)
     effort = np.abs(robot.joint_to_motor).T @ robot.motors.peak_torque
     speed = _fastest(robot)
     for k, joint in enumerate(robot.joints):
@@ -83,7 +89,26 @@ def _connect(root: Element, name: str, kind: str, parent: str, child: str) -> El
     return joint
 
 
-def _add_link(root: Element, link: Link) -> None:
+def hull_meshes(robot: RobotDescription) -> dict[str, bytes]:
+    """The convex hulls as binary STL, by the name of the file: a URDF has no shape for them."""
+    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+    found = {}
+    for link in robot.links:
+        for k, shape in enumerate(link.shapes):
+            if isinstance(shape, Hull):
+                places, triangles = surface(shape)
+                content = np.zeros(len(triangles), layout)
+                content["corners"] = places[triangles]
+                count = np.array([len(triangles)], "<u4").tobytes()
+                found[_mesh_name(link, k)] = bytes(80) + count + content.tobytes()
+    return found
+
+
+def _mesh_name(link: Link, number: int) -> str:
+    return f"{link.name.replace('/', '_')}_{number}.stl"
+
+
+def _add_link(root: Element, link: Link, meshes: str) -> None:
     element = SubElement(root, "link", name=link.name)
     if link.mass > 0.0:
         inertial = SubElement(element, "inertial")
@@ -93,12 +118,16 @@ def _add_link(root: Element, link: Link) -> None:
         inertia = SubElement(inertial, "inertia")
         for name, value in zip(names, link.inertia, strict=True):
             inertia.set(name, repr(value))
-    for shape in link.shapes:
+    for k, shape in enumerate(link.shapes):
         for kind in ("visual", "collision"):
-            _add_capsule(element, kind, shape)
+            if isinstance(shape, Capsule):
+                _add_capsule(element, kind, shape)
+            else:
+                geometry = SubElement(SubElement(element, kind), "geometry")
+                SubElement(geometry, "mesh", filename=f"{meshes}/{_mesh_name(link, k)}")
 
 
-def _add_capsule(element: Element, kind: str, shape: Shape) -> None:
+def _add_capsule(element: Element, kind: str, shape: Capsule) -> None:
     start, end = np.array(shape.start), np.array(shape.end)
     along, radius = end - start, repr(shape.radius)
     length = float(np.linalg.norm(along))

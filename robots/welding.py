@@ -106,6 +106,10 @@ class _Place:
     def point(self, place: Sequence[float]) -> Array:
         return np.asarray(self.origin + self.rotation @ np.array(place))
 
+    def vector(self, place: Sequence[float]) -> Vector3:
+        """The same as plain numbers."""
+        return _vector(self.point(place))
+
 
 def _weld(robot: RobotDescription) -> WeldedRobot:
     held = [k for k, joint in enumerate(robot.joints) if joint.name in robot.held]
@@ -218,15 +222,7 @@ def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Li
     shapes = list[Shape]()
     for link in parts:
         place = places[link.name]
-        shapes += [
-            shape.model_copy(
-                update={
-                    "start": _vector(place.point(shape.start)),
-                    "end": _vector(place.point(shape.end)),
-                }
-            )
-            for shape in link.shapes
-        ]
+        shapes += [shape.moved(place.vector) for shape in link.shapes]
     changed = {
         "mass": mass, "com": _vector(com), "inertia": _six(inertia), "shapes": tuple(shapes)
     }  # fmt: skip

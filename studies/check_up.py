@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..robots.hulls import corners_of
 from ..robots.plausible_size import wrong_size
 
 if TYPE_CHECKING:
@@ -107,9 +108,8 @@ def _links(robot: RobotDescription) -> Iterator[Remark]:
 
 def _extent(link: Link) -> tuple[float, Array]:
     """How far a link's shapes reach from their middle [m], and that middle (3,)."""
-    ends = np.array([end for shape in link.shapes for end in (shape.start, shape.end)])
-    radii = np.repeat([shape.radius for shape in link.shapes], 2)[:, None]
-    low, high = (ends - radii).min(axis=0), (ends + radii).max(axis=0)
+    corners, radii = corners_of(link)
+    low, high = (corners - radii[:, None]).min(axis=0), (corners + radii[:, None]).max(axis=0)
     return 0.5 * float(np.linalg.norm(high - low)), 0.5 * (low + high)
 
 

@@ -5,7 +5,7 @@ controller's have the same links. Rotor inertia is exact: a rotor that is geared
 that joint's armature, and a rotor that is geared to several is a fixed tendon with armature
 (``add_rotors``).
 
-Contact: spheres at the contact points and capsules for the rest of the robot. The capsules collide
+Contact: spheres at the contact points, and capsules and hulls for the rest of the robot. These shapes collide
 with the ground and with other limbs, but not with their own limb or the base; a limb consists of
 all links that one joint of the base carries. Capsules of two limbs that overlap in the standing
 pose do not collide with each other, as they only approximate the links' shapes. Every contact of a
@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...robots.description import RobotDescription
+from ...robots.description import Hull, RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
 from ...runtime.language.terrain import Ground, HeightField, Terrain
 from ..sensors.sensor import mounted_sensors
@@ -250,10 +250,13 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
             bits["contype"] = 1 << limb[name]
             bits["conaffinity"] |= (1 << limb[name]) - 1
         for k, shape in enumerate(link.shapes):
-            ends = [longer * x for x in (*shape.start, *shape.end)]
-            place: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": ends}
-            if shape.start == shape.end:
-                place = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "pos": ends[:3]}
+            corners = [longer * x for corner in shape.corners for x in corner]
+            place: dict[str, Any] = {"type": mujoco.mjtGeom.mjGEOM_CAPSULE, "fromto": corners}
+            if isinstance(shape, Hull):
+                place = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": f"{name}/{k}"}
+                spec.add_mesh(name=f"{name}/{k}", uservert=corners)
+            elif shape.start == shape.end:
+                place = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "pos": corners[:3]}
             body.add_geom(
                 name=f"{name}/{k}", mass=0.0, size=[shape.radius, 0, 0],
                 **place, **bits, **_surface(variation),

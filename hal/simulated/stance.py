@@ -18,7 +18,7 @@ from ...mathematics.capture_step import support_margin
 from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import acos
 from ...mathematics.linear_algebra import product
-from ...robots.description import RobotDescription
+from ...robots.description import Hull, RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
 from ...runtime.language.errors import BlockError
 from ...runtime.language.terrain import Vector
@@ -243,9 +243,13 @@ def _put_down(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescrip
     lowest = np.inf
     for link in robot.links:
         for k, shape in enumerate(link.shapes):
-            geom = data.geom(f"{link.name}/{k}")
-            half = float(model.geom(f"{link.name}/{k}").size[1])
-            reach = abs(half * geom.xmat.item(8)) + shape.radius
+            geom, form = data.geom(f"{link.name}/{k}"), model.geom(f"{link.name}/{k}")
+            if isinstance(shape, Hull):
+                mesh = model.mesh(int(form.dataid[0]))
+                first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+                reach = -float((model.mesh_vert[first : first + count] @ geom.xmat[6:]).min())
+            else:
+                reach = abs(float(form.size[1]) * geom.xmat.item(8)) + shape.radius
             lowest = min(lowest, geom.xpos.item(2) - reach)
     if lowest == np.inf:
         raise StartError(

@@ -25,7 +25,8 @@ import numpy as np
 
 from ...hal.sensors.sensor import RosMessage
 from ...mathematics.rotations import quaternions_of_matrices
-from ...robots.description import RobotDescription
+from ...robots.description import Hull, RobotDescription
+from ...robots.hulls import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
 from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError
@@ -216,8 +217,11 @@ def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dic
             ]
             entities.append(_entity(link.name, link.name, instant, {"triangles": seen}))
             continue
-        cylinders, spheres = [], []
+        cylinders, spheres, hulls = [], [], []
         for shape in shapes_of(robot, link):
+            if isinstance(shape, Hull):
+                hulls.append(_triangles(*surface(shape), GREY))
+                continue
             start, end = np.array(shape.start), np.array(shape.end)
             length = float(np.linalg.norm(end - start))
             thickness = 2.0 * shape.radius
@@ -229,7 +233,7 @@ def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dic
             for point in (start, end):
                 size = (thickness, thickness, thickness)
                 spheres.append(_solid(point, (0.0, 0.0, 0.0, 1.0), size, GREY))
-        shown = {"cylinders": cylinders, "spheres": spheres}
+        shown = {"cylinders": cylinders, "spheres": spheres, "triangles": hulls}
         entities.append(_entity(link.name, link.name, instant, shown))
     terrain = run.header.terrain
     if terrain is not None and (terrain.blocks or terrain.fields):

@@ -1,4 +1,4 @@
-"""The links of a robot as Rerun draws them: surfaces, solid capsules, or outlines of a second robot."""
+"""The links of a robot as Rerun draws them: surfaces, solid shapes, or outlines of a second robot."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...robots.description import Link, RobotDescription, Shape
+from ...robots.description import Capsule, Hull, Link, RobotDescription, Shape
+from ...robots.hulls import edges, surface
 from ...robots.kinematics import link_poses
-from ...robots.surfaces import RobotSurfaces, joined, normals, quaternion_from_z
+from ...robots.surfaces import RobotSurfaces, Surface, joined, normals, quaternion_from_z
 
 USUAL_REACH = 0.4
 """The reach [m] of the robot that the sizes of marks and lines are given for."""
@@ -26,7 +28,7 @@ def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
     ends = [joint.origin for joint in robot.joints if joint.parent == link.name]
     ends += [contact.position for contact in robot.contacts if contact.foot in feet]
     radius = 0.025 * reach_of(robot)
-    return [Shape(start=(0.0, 0.0, 0.0), end=end, radius=radius) for end in ends]
+    return [Capsule(start=(0.0, 0.0, 0.0), end=end, radius=radius) for end in ends]
 
 
 def reach_of(robot: RobotDescription) -> float:
@@ -66,13 +68,53 @@ def eye_height(robot: RobotDescription) -> float:
     return 0.85 * reach_of(robot)
 
 
-def capsules(
-    shapes: Sequence[Shape], color: int, *, wires: bool = False, line_radius: float = 0.0006
-) -> Any:
-    """Rerun's capsules for ``shapes``, in the link's frame; with ``wires`` only their outlines.
+HULLS = "hulls"
+"""The entity below a link of its convex hulls."""
 
-    A capsule of Rerun's reaches from its origin along +z, so each is turned.
-    """
+
+def drawn_shapes(
+    shapes: Sequence[Shape], color: int, *, wires: bool = False, line_radius: float = 0.0006
+) -> dict[str, Any]:
+    """What Rerun draws for ``shapes``, in the link's frame, by what follows the link's entity; with ``wires`` only their
+    outlines."""
+    drawn = dict[str, Any]()
+    if capsules := [shape for shape in shapes if isinstance(shape, Capsule)]:
+        drawn[""] = _capsules(capsules, color, wires, line_radius)
+    if hulls := [shape for shape in shapes if isinstance(shape, Hull)]:
+        drawn[f"/{HULLS}"] = _hulls(hulls, color, wires, line_radius)
+    return drawn
+
+
+def _hulls(hulls: Sequence[Hull], color: int, wires: bool, line_radius: float) -> Any:
+    import rerun as rr
+
+    if wires:
+        strips = [np.array(edge, np.float32) for hull in hulls for edge in edges(hull)]
+        return rr.LineStrips3D(
+            strips,
+            colors=np.full(len(strips), color, np.uint32),
+            radii=np.full(len(strips), line_radius),
+        )
+    return _mesh(joined([Surface(*surface(hull)) for hull in hulls]), color)
+
+
+def _mesh(
+    whole: Surface, color: int | None, vertex_colors: NDArray[np.uint32] | None = None
+) -> Any:
+    import rerun as rr
+
+    return rr.Mesh3D(
+        vertex_positions=whole.corners.astype(np.float32),
+        # without normals the viewer shows a mesh as if it gave light itself: a mere outline
+        vertex_normals=normals(whole).astype(np.float32),
+        triangle_indices=whole.triangles.astype(np.uint32),
+        vertex_colors=vertex_colors,
+        albedo_factor=color,
+    )
+
+
+def _capsules(shapes: Sequence[Capsule], color: int, wires: bool, line_radius: float) -> Any:
+    """A capsule of Rerun's reaches from its origin along +z, so each is turned."""
     import rerun as rr
 
     starts = np.array([shape.start for shape in shapes]).reshape(-1, 3)
@@ -109,27 +151,14 @@ def drawn_link(
 
     ``color`` (0xRRGGBBAA) is that of all whose colour the description does not say; without ``own_colors`` of all.
     """
-    import rerun as rr
 
     parts = surfaces.links.get(link.name)
     if parts is None:
-        shapes = shapes_of(robot, link)
-        return {"": capsules(shapes, color, line_radius=line_radius)} if shapes else {}
+        return drawn_shapes(shapes_of(robot, link), color, line_radius=line_radius)
     whole = joined(parts)
     painted = own_colors and any(part.color is not None for part in parts)
     each = [color if part.color is None else part.color << 8 | 0xFF for part in parts]
-    drawn: dict[str, Any] = {
-        "": rr.Mesh3D(
-            vertex_positions=whole.corners.astype(np.float32),
-            # without normals the viewer shows a mesh as if it gave light itself: a mere outline
-            vertex_normals=normals(whole).astype(np.float32),
-            triangle_indices=whole.triangles.astype(np.uint32),
-            vertex_colors=np.repeat(
-                np.array(each, np.uint32), [len(part.corners) for part in parts]
-            ) if painted else None,
-            albedo_factor=None if painted else color,
-        )
-    }  # fmt: skip
-    if beside := robot.looks[link.name].shapes:
-        drawn[f"/{BESIDE}"] = capsules(beside, color, line_radius=line_radius)
-    return drawn
+    painting = np.repeat(np.array(each, np.uint32), [len(part.corners) for part in parts])
+    drawn = {"": _mesh(whole, None, painting) if painted else _mesh(whole, color)}
+    beside = drawn_shapes(robot.looks[link.name].shapes, color, line_radius=line_radius)
+    return drawn | {f"/{BESIDE}{below}": each for below, each in beside.items()}

@@ -30,7 +30,7 @@ from .contacts import (
     thruster_forces,
 )
 from .drawing import Colors, Detail, Moments, ScenePart
-from .robot_shapes import capsules, drawn_link, eye_height, shapes_of
+from .robot_shapes import drawn_link, drawn_shapes, eye_height, shapes_of
 from .scene_ports import PoseSource, ScenePorts
 from .scene_sensors import SensorPart
 
@@ -79,11 +79,11 @@ class RobotPart(ScenePart):
                 entity = f"{name}/{link.name}"
                 if name == "estimate":
                     shapes = shapes_of(self.robot, link)
-                    self.log(entity, capsules(shapes, color, wires=True, line_radius=width))
-                    continue
-                parts = drawn_link(
-                    self.robot, link, surfaces, color, width, own_colors=color == Colors.robot
-                )
+                    parts = drawn_shapes(shapes, color, wires=True, line_radius=width)
+                else:
+                    parts = drawn_link(
+                        self.robot, link, surfaces, color, width, own_colors=color == Colors.robot
+                    )
                 for below, drawn in parts.items():
                     self.log(f"{entity}{below}", drawn)
         if problems := surfaces.problems:

@@ -1,6 +1,6 @@
 """The data that the tests of a plan share: the plan, its replay, and distances of bodies from the ground and each other.
 
-Links are the capsules of the robot's description, as in the simulator. The ground is level, or leans
+Links are the collision shapes of the robot's description, as in the simulator. The ground is level, or leans
 as the task says, with a step where the task has one. Everything is vectorised over instants.
 """
 
@@ -23,9 +23,9 @@ from ...robots.kinematics import (
     ball_feet,
 )
 from ...robots.welding import welded
-from ..models.capsules import arms, capsule_ends, gaps_between, lacking, legs
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
+from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.plan import PlannedJump
@@ -35,7 +35,7 @@ from ..task.task import JumpTask
 from .replay import Replay
 
 BALLS = 13
-"""Along a capsule, where the ground has edges."""
+"""Along an edge, where the ground has edges."""
 
 
 def step_edge(task: JumpTask, jump: int = 0) -> float | None:
@@ -72,9 +72,9 @@ def ground_height(
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
-    """By link, except for soles, the lowest height [m] of its capsules above the ground, (n,).
+    """By link, except for soles, the lowest height [m] of its shapes above the ground, (n,).
 
-    Balls along a capsule stand for it, close enough that no edge of a step passes between two. Where
+    Balls along their edges stand for them, close enough that no edge of a step passes between two. Where
     the ground has edges, a ball's height is that of its lower side above the ground right below it. What a foot
     that is a ball covers of its leg does not count.
     """
@@ -89,7 +89,10 @@ def body_heights(
         if (link.name in feet and ball is None) or not link.shapes:
             continue
         heights = []
-        for start, stop, radius in capsule_ends(robot, poses, link.name):
+        shapes = moving_shapes(robot, poses, link.name)
+        for radius, (start, stop) in (
+            (each.shape.radius, edge) for each in shapes for edge in each.edges()
+        ):
             centres = start + shares * (stop - start)
             if ball is not None:
                 position, rotation = poses.of(link.name)
@@ -119,7 +122,7 @@ def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[
             for other in robot.links:
                 if other.name in arm:
                     continue
-                own, others = (capsule_ends(robot, poses, name) for name in (link, other.name))
+                own, others = (moving_shapes(robot, poses, name) for name in (link, other.name))
                 if not (own and others):
                     continue
                 near = gaps_between(own, others)
@@ -142,9 +145,9 @@ def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array 
 
 
 def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
-    """The distances (pairs, n) between all capsules of one leg and all of another."""
+    """The distances (pairs, n) between all shapes of one leg and all of another."""
     chains = [
-        [capsule for link in chain for capsule in capsule_ends(robot, poses, link)]
+        [shape for link in chain for shape in moving_shapes(robot, poses, link)]
         for chain in legs(robot)
     ]
     for number, chain in enumerate(chains):

@@ -16,7 +16,7 @@ from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
-from ..models.capsules import arms
+from ..models.link_shapes import arms
 from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot

@@ -30,7 +30,7 @@ from ...robots.kinematics import link_poses
 from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
-from ..models.capsules import legs
+from ..models.link_shapes import legs
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:

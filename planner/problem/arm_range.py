@@ -14,7 +14,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..models.capsules import arms, capsule_ends, gaps_between, lacking, legs
+from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
 from ..task.scaling import per_robot
 
 POSES = 6000
@@ -89,11 +89,11 @@ def _clear(
     here = int(np.ravel_multi_index(start, grid.shape[:-1]))
     side = float(np.sign(poses.of(arm[0])[0][here, 1]))
     for link in arm:
-        for start_of, end_of, radius in capsule_ends(robot, poses, link) if side else ():
-            inside = np.minimum(side * start_of[:, 1], side * end_of[:, 1]) - radius
+        for each in moving_shapes(robot, poses, link) if side else ():
+            inside = (side * each.corners()[:, :, 1]).min(axis=0) - each.shape.radius
             clear &= lacking(inside[None], 0.5 * gap, here) <= 0.0
         for other in trunk:
-            own, body = (capsule_ends(robot, poses, name) for name in (link, other))
+            own, body = (moving_shapes(robot, poses, name) for name in (link, other))
             if own and body:
                 gaps = gaps_between(own, body)
                 clear &= lacking(gaps, gap, here, carried=other == carrier[link]) <= 0.0

@@ -65,8 +65,7 @@ def body_points(model: SymbolicModel, coordinates: Coordinates
         for index in joints[min(HIP_JOINTS, len(joints) - 2) : -1]:
             link = robot.link(robot.joints[index].child)
             for shape in link.shapes:
-                found += [((link.name, shape.start), shape.radius)]
-                found += [((link.name, shape.end), shape.radius)]
+                found += [((link.name, corner), shape.radius) for corner in shape.corners]
     sides = {limb: float(np.sign(_root(model, limb)[1])) for limb in range(len(model.limbs))}
     return [(point, radius, sides[model.limb_of_link[point[0]]]) for point, radius in found]
 

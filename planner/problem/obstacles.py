@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Indices
-from ...robots.description import RobotDescription
+from ...robots.description import Capsule, RobotDescription, Shape
+from ...robots.hulls import Edge, corners_of, edges
 from ...robots.kinematics import ball_feet
 from ...robots.robot_description import Link
 from ..models.coordinates import Coordinates
@@ -27,15 +28,17 @@ Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
 SHARES = (0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
 """Where the points between a calf's ends and its middle are."""
+LONG = 0.5
+"""Edges of a hull at least as long as that, as a share of its longest one, get points between their ends."""
 ROUNDING = 0.01
 """m; how long before the edge the rounded step has half its height."""
 
 
 def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Point]:
     """Of the base and the computed limbs (kind, (link, place), radius): contact points, of kind
-    ``foot``, then ends and middles of the capsules, of kind ``calf`` for the links that carry a
+    ``foot``, then corners of the shapes, and the middles of capsules, of kind ``calf`` for the links that carry a
     foot and ``body`` for all others. Between those of a calf there are more, of kind ``shin``, or a step's
-    edge could pass between two of them. The feet's own capsules are left to their contact points."""
+    edge could pass between two of them. The feet's own shapes are left to their contact points."""
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     carriers = {joint.parent for joint in robot.joints if joint.child in link_of.values()}
@@ -57,14 +60,14 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
             continue
         kind = "calf" if link.name in carriers else "body"
         for shape in link.shapes:
-            middle = tuple(0.5 * (a + b) for a, b in zip(shape.start, shape.end, strict=True))
-            found += [
-                (kind, (link.name, (place[0], place[1], place[2])), shape.radius)
-                for place in (shape.start, middle, shape.end)
-            ]
+            places = list(shape.corners)
+            if isinstance(shape, Capsule):
+                places.insert(1, _between(shape.start, shape.end, 0.5))
+            found += [(kind, (link.name, place), shape.radius) for place in places]
             if kind == "calf":
                 found += [
-                    ("shin", (link.name, _between(shape.start, shape.end, share)), shape.radius)
+                    ("shin", (link.name, _between(*edge, share)), shape.radius)
+                    for edge in _along(shape)
                     for share in SHARES
                 ]
     return found
@@ -73,13 +76,21 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
 def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
     """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
     is nearer to the ground than the gap that is kept."""
-    ends = [end for shape in link.shapes for end in (shape.start, shape.end)]
-    half = 0.5 * max(math.dist(end, ball) for end in ends) if ends else 0.0
+    corners, _ = corners_of(link)
+    half = 0.5 * max((math.dist(corner, ball) for corner in corners), default=0.0)
     for shape in link.shapes:
-        for share in (0.0, *SHARES[:3], 0.5, *SHARES[3:], 1.0):
-            place = _between(shape.start, shape.end, share)
-            if math.dist(place, ball) > half:
-                yield "shank", (link.name, place), shape.radius
+        for edge in _along(shape):
+            for share in (0.0, *SHARES[:3], 0.5, *SHARES[3:], 1.0):
+                place = _between(*edge, share)
+                if math.dist(place, ball) > half:
+                    yield "shank", (link.name, place), shape.radius
+
+
+def _along(shape: Shape) -> list[Edge]:
+    """The long edges of a hull, and a capsule's axis: what a step's edge could pass between the corners of."""
+    found = edges(shape)
+    longest = max(math.dist(*edge) for edge in found)
+    return [edge for edge in found if math.dist(*edge) > LONG * longest]
 
 
 def _between(start: Vector3, end: Vector3, share: float) -> Vector3:

@@ -16,6 +16,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription, find_robot
+from ...robots.hulls import corners_of
 from ...robots.kinematics import (
     contact_centres,
     link_poses,
@@ -312,11 +313,8 @@ def _low_links(robot: RobotDescription, height: float) -> Iterator[tuple[str, Ar
     ground = float(np.min(standing_heights(robot)))
     for link in robot.links:
         rotation, origin = poses[link.name]
-        ends = np.array([e for shape in link.shapes for e in (shape.start, shape.end)]).reshape(
-            -1, 3
-        )
-        radii = np.repeat([shape.radius for shape in link.shapes], 2)
-        places = origin + product(ends, rotation.T)
+        corners, radii = corners_of(link)
+        places = origin + product(corners, rotation.T)
         low = places[:, 2] - radii - ground < height
         if low.any():
             yield link.name, places[low] - middle, radii[low]

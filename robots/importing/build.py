@@ -20,6 +20,7 @@ from ...files.problems import listing
 from ...mathematics.arrays import Array
 from ..validation import RobotError, RobotFault
 from .capsules import Capsule, coarse
+from .hulls import RawShape
 from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
 
 GROUND = "ground"
@@ -47,7 +48,7 @@ class BuiltLink:
     name: str
     origin: Array
     bodies: list[Inertial] = field(default_factory=list)
-    capsules: list[Capsule] = field(default_factory=list)
+    shapes: list[RawShape] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
         GROUND, "", np.eye(3), np.zeros(3), Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
     )
     turn, place = start.rotation, start.position
-    links = {start.name: BuiltLink(start.name, np.zeros(3), [start.inertial], [*start.capsules])}
+    links = {start.name: BuiltLink(start.name, np.zeros(3), [start.inertial], [*start.shapes])}
     frames = {start.name: BodyFrame(start.name, np.eye(3), np.zeros(3))}
     joints: list[dict[str, Any]] = []
     raw: dict[str, RawJoint] = {}
@@ -122,7 +123,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
         frame = BodyFrame(carrier.name, rotation, position - carrier.origin)
         frames[body.name] = frame
         carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
-        carrier.capsules += [each.moved(frame.rotation, frame.position) for each in body.capsules]
+        carrier.shapes += [each.moved(frame.rotation, frame.position) for each in body.shapes]
     moving_links = {
         n: link for n, link in links.items() if n != start.name or found_joint != "fixed"
     }
@@ -243,8 +244,10 @@ def _link_data(link: BuiltLink) -> dict[str, Any]:
     tensor = whole.inertia
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     shapes = [
-        {"start": coarse(c.start), "end": coarse(c.end), "radius": coarse(np.array([c.radius]))[0]}
-        for c in link.capsules
+        {"start": coarse(s.start), "end": coarse(s.end), "radius": coarse(np.array([s.radius]))[0]}
+        if isinstance(s, Capsule)
+        else {"corners": [coarse(corner) for corner in s.corners]}
+        for s in link.shapes
     ]
     return {
         "name": link.name,

@@ -1,10 +1,9 @@
-"""Approximates collision shapes by capsules, the one kind of shape that a description has.
+"""Approximates simple collision shapes by capsules; ``hulls`` does so for meshes.
 
 A capsule stands for each shape, lying inside it where the shape is round or slender: a sphere is
-a very short capsule, a cylinder loses its edges, a box is filled by up to three capsules side by
-side, as thick as its thinnest side, and a mesh is taken for the box along its principal directions.
-What a capsule leaves out is at most the corners, so a robot touches things slightly later with
-capsules than with its own shapes, never earlier.
+a very short capsule, a cylinder loses its edges, and a box is filled by up to three capsules side by
+side, as thick as its thinnest side. What a capsule leaves out is at most the corners, so a robot touches things slightly
+later with capsules than with its own shapes, never earlier.
 """
 
 from __future__ import annotations
@@ -17,8 +16,6 @@ from ...mathematics.arrays import Array
 
 SHORTEST = 4e-4
 """The least length of a capsule between the centres of its ends [m]: a ball is that long."""
-UNEVEN = 1e-4
-"""How much a mesh's spread is made uneven, as a share, so that round ones have directions too."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +25,11 @@ class Capsule:
     start: Array
     end: Array
     radius: float
+
+    @property
+    def corners(self) -> Array:
+        """Both ends (2, 3) [m]."""
+        return np.array([self.start, self.end])
 
     def moved(self, rotation: Array, position: Array) -> Capsule:
         """The capsule in another frame, in which its own frame has this rotation and position."""
@@ -87,29 +89,3 @@ def of_box(sizes: Array) -> list[Capsule]:
         offset[middle] = place * room
         found.append(capsule.moved(np.eye(3), offset))
     return found
-
-
-def of_points(points: Array) -> list[Capsule]:
-    """The capsules for a mesh with these corners (n, 3): of the box about it that lies along its
-    principal directions."""
-    corners = _once(points)
-    spread = np.cov((corners - corners.mean(axis=0)).T)
-    # Every machine must find the same directions, also where all across a mesh are alike.
-    spread += UNEVEN * np.trace(spread) * np.diag([0.0, 0.5, 1.0])
-    _, directions = np.linalg.eigh(spread)
-    turn = directions * np.sign(directions[np.abs(directions).argmax(axis=0), range(3)])
-    places = corners @ turn
-    low, high = places.min(axis=0), places.max(axis=0)
-    sizes = np.maximum(0.5 * (high - low), 1e-3)
-    return [capsule.moved(turn, turn @ (0.5 * (low + high))) for capsule in of_box(sizes)]
-
-
-def _once(points: Array) -> Array:
-    """The points (n, 3) without those that stand there again, as corners of triangles do.
-
-    They are told apart by a number made of their bits, which is much faster to sort than rows.
-    """
-    bits = np.ascontiguousarray(points + 0.0).view(np.uint64)
-    factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-    _, first = np.unique((bits * factors).sum(axis=1, dtype=np.uint64), return_index=True)
-    return points[first]

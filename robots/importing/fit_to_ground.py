@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ..hulls import THINNEST, edges, spread
 from ..kinematics import (
     LinkPoses,
     contact_centres,
@@ -23,7 +24,7 @@ from ..kinematics import (
     link_poses_in_base,
     standing_heights,
 )
-from ..robot_description import RobotDescription, Shape
+from ..robot_description import Capsule, Hull, RobotDescription, Shape
 from .capsules import coarse
 
 CLEARANCE = 0.002
@@ -80,8 +81,32 @@ def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescr
 
 
 def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
-    """The shape, shortened where its lower end is not above ``room`` [m] when the link is turned
-    so; None where that leaves nothing."""
+    """The shape, cut off where it is not above ``room`` [m] when the link is turned so; None where that leaves nothing."""
+    return (
+        _shortened(shape, rotation, room)
+        if isinstance(shape, Capsule)
+        else _cut(shape, rotation, room)
+    )
+
+
+def _cut(hull: Hull, rotation: Array, room: float) -> Hull | None:
+    """What of the hull is above: its corners there, and where its edges pass through that height."""
+    corners = np.array(hull.corners)
+    heights = corners @ rotation[2] - room
+    if heights.min() > 0.0:
+        return hull
+    found = [*corners[heights > 0.0]]
+    for start, end in np.array(edges(hull)):
+        first, second = rotation[2] @ start - room, rotation[2] @ end - room
+        if first * second < 0.0:
+            found.append(start + first / (first - second) * (end - start))
+    if len(found) < 4 or spread(np.array(found)) < THINNEST:
+        return None
+    return Hull.model_validate({"corners": [coarse(corner) for corner in found]})
+
+
+def _shortened(shape: Capsule, rotation: Array, room: float) -> Capsule | None:
+    """The capsule with its lower end at that height."""
     ends = np.array([shape.start, shape.end])
     heights = ends @ rotation[2] - shape.radius
     low, high = int(np.argmin(heights)), int(np.argmax(heights))
@@ -95,7 +120,7 @@ def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
     start, end = (tuple(coarse(end)) for end in ends)
     if start == end:
         return None
-    return Shape.model_validate({"start": start, "end": end, "radius": shape.radius})
+    return Capsule.model_validate({"start": start, "end": end, "radius": shape.radius})
 
 
 STEPS = 200

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 
-DRAWABLE = (".stl", ".obj", ".dae")
+READABLE = (".stl", ".obj", ".dae")
 FINEST = 5000.0
 """Cells along the longest side of a mesh at first, which joins corners at nearly the same place."""
 COARSER = 1.15
@@ -45,7 +45,7 @@ def mesh_triangles(path: Path) -> Array:
         elif kind == ".dae":
             triangles = collada_triangles(path.read_bytes())
         else:
-            raise ValueError(f"no mesh of the formats {', '.join(DRAWABLE)}")
+            raise ValueError(f"no mesh of the formats {', '.join(READABLE)}")
         if not len(triangles) or not np.isfinite(triangles).all():
             raise ValueError(f"a mesh of {len(triangles)} triangles, or not all are finite")
     except (ValueError, IndexError, KeyError) as error:
@@ -104,27 +104,6 @@ def _distinct(faces: Indices) -> Indices:
     rolled = np.take_along_axis(faces, (turn + np.arange(3)) % 3, axis=1)
     number = (rolled[:, 0] << 42) | (rolled[:, 1] << 21) | rolled[:, 2]
     return rolled[np.unique(number, return_index=True)[1]]
-
-
-READABLE = (".stl", ".obj")
-
-
-def mesh_corners(path: Path) -> Array:
-    """The corners [in the file's unit] of a mesh, (n, 3); none are left out, some stand twice.
-
-    Raises:
-        ValueError: the file is no mesh of a format that is read here.
-    """
-    if path.suffix.lower() == ".obj":
-        rows = [line.split()[1:4] for line in path.read_text().splitlines() if line[:2] == "v "]
-        corners = np.array(rows, dtype=float).reshape(-1, 3)
-    elif path.suffix.lower() == ".stl":
-        corners = stl_corners(path.read_bytes())
-    else:
-        raise ValueError(f"{path}: no mesh of the formats {', '.join(READABLE)}")
-    if len(corners) < 4:
-        raise ValueError(f"{path}: a mesh of {len(corners)} corners")
-    return corners
 
 
 def stl_corners(content: bytes) -> Array:

@@ -23,6 +23,7 @@ from ..robot_description import RobotDescription
 from ..validation import RobotError, find_faults
 from ..validation.faults import number, vector
 from .build import BodyFrame, LinkTree, tidy
+from .capsules import Capsule
 from .description_data import Imported, import_robot
 from .fit_to_ground import fit_to_ground
 from .raw_model import RawModel
@@ -131,7 +132,7 @@ def _lowest(model: RawModel, built: LinkTree, link: str) -> float:
     found = [height]
     for name, frame in _bodies(built, link).items():
         found.append(height + frame.position[2])
-        shapes = model.bodies[name].capsules if name in model.bodies else ()
+        shapes = model.bodies[name].shapes if name in model.bodies else ()
         found += [height + frame.position[2] + shape.lowest(frame.rotation) for shape in shapes]
     return float(min(found))
 
@@ -141,7 +142,9 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
     bottom = _lowest(model, built, link) - _origins(built)[link][2]
     balls = []
     for name, frame in bodies.items():
-        for shape in model.bodies[name].capsules if name in model.bodies else ():
+        for shape in model.bodies[name].shapes if name in model.bodies else ():
+            if not isinstance(shape, Capsule):
+                continue
             is_ball = np.linalg.norm(shape.end - shape.start) < 0.1 * shape.radius
             if is_ball and frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
                 balls.append((name, frame, 0.5 * (shape.start + shape.end), shape.radius))
@@ -174,11 +177,13 @@ def _sole(
         count, above = count + 1, carrier[above]
     found = []
     for name, frame in _bodies(built, link).items():
-        for shape in model.bodies[name].capsules if name in model.bodies else ():
+        for shape in model.bodies[name].shapes if name in model.bodies else ():
             if frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
-                for end in (shape.start, shape.end):
-                    middle = frame.rotation @ end + frame.position
-                    found.append([*(middle[:2] - shape.radius), *(middle[:2] + shape.radius)])
+                radius = shape.radius if isinstance(shape, Capsule) else 0.0
+                for corner in shape.corners:
+                    middle = frame.rotation @ corner + frame.position
+                    if isinstance(shape, Capsule) or middle[2] < bottom + LEVEL:
+                        found.append([*(middle[:2] - radius), *(middle[:2] + radius)])
     if not found or count < JOINTS_WITH_ANKLE:
         return []
     each = np.array(found)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...mathematics.arrays import Array
-from .capsules import Capsule
+from .hulls import RawShape
 from .looks import NOTHING_SEEN, RawLook
 
 
@@ -107,7 +107,7 @@ class RawSensor:
 @dataclass(frozen=True)
 class RawBody:
     """A body of the file: ``rotation`` and ``position`` [m] in the world at the zero of all joints,
-    its own ``inertial``, ``capsules`` and ``look`` in its own frame, and the joints that carry it."""
+    its own ``inertial``, ``shapes`` and ``look`` in its own frame, and the joints that carry it."""
 
     name: str
     parent: str
@@ -115,7 +115,7 @@ class RawBody:
     position: Array
     inertial: Inertial
     joints: tuple[RawJoint, ...] = ()
-    capsules: tuple[Capsule, ...] = ()
+    shapes: tuple[RawShape, ...] = ()
     look: RawLook = NOTHING_SEEN
 
 

@@ -9,7 +9,7 @@ only few formats and needs none here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,9 +19,10 @@ from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
 from .file_sensors import file_sensors, unknown_sensors
+from .hulls import RawShape, of_points
 from .left_out import left_out
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
-from .meshes import READABLE, mesh_corners
+from .meshes import READABLE, mesh_triangles
 from .package_files import find_file
 from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, RawThruster, full_tensor
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
@@ -107,7 +108,7 @@ def read_model(path: Path) -> RawModel:
                 for j in range(model.njnt)
                 if model.jnt_bodyid[j] == k
             ),
-            tuple(_capsules(model, k, meshes, notes)),
+            tuple(_shapes(model, k, meshes, notes)),
             looks.get(names[k], NOTHING_SEEN) if file.is_urdf else _look(model, k, meshes),
         )
     name = spec.modelname or path.stem
@@ -386,10 +387,8 @@ def _thrusters(model: Any, notes: list[str]) -> dict[str, RawThruster]:
     return found
 
 
-def _capsules(
-    model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]
-) -> list[fit.Capsule]:
-    """The capsules of a body, in its own frame; shapes that touch nothing are left out."""
+def _shapes(model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]) -> list[RawShape]:
+    """The shapes of a body, in its own frame; shapes that touch nothing are left out."""
     import mujoco
 
     kinds = mujoco.mjtGeom
@@ -400,13 +399,13 @@ def _capsules(
         int(kinds.mjGEOM_BOX): fit.of_box,
         int(kinds.mjGEOM_ELLIPSOID): fit.of_ellipsoid,
     }
-    found: list[fit.Capsule] = []
+    found: list[RawShape] = []
     for g in range(model.ngeom):
         if model.geom_bodyid[g] != k or not (model.geom_contype[g] or model.geom_conaffinity[g]):
             continue
         name, body = model.geom(g).name, model.body(k).name
         kind, size = int(model.geom_type[g]), np.array(model.geom_size[g])
-        shapes: list[fit.Capsule] = []
+        shapes: Sequence[RawShape] = ()
         if name in meshes:
             written, path, scale, _ = meshes[name]
             if path is None:
@@ -418,13 +417,13 @@ def _capsules(
                 )
             else:
                 try:
-                    shapes = fit.of_points(mesh_corners(path) * scale)
+                    shapes = of_points(mesh_triangles(path).reshape(-1, 3) * scale)
                 except (ValueError, OSError) as error:
                     notes.append(f"link {body}: {_one_line(error)}, so it has no shape")
         elif kind == int(kinds.mjGEOM_MESH):
             mesh = int(model.geom_dataid[g])
             start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-            shapes = fit.of_points(np.array(model.mesh_vert[start : start + count], dtype=float))
+            shapes = of_points(np.array(model.mesh_vert[start : start + count], dtype=float))
         elif kind in of_kind:
             shapes = of_kind[kind](size)
         turn = np.zeros(9)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from ...files.problems import listing
 from ...files.validation import explain, names_at
-from ..robot_description import RobotDescription
+from ..robot_description import SHAPE_KINDS, RobotDescription
 from .actuation import check_actuation, check_thrusters
 from .faults import Draft, Path, RobotFault, nearest
 from .stance import check_feet, check_poses
@@ -50,7 +50,7 @@ def check_types(draft: Draft, kind: type[BaseModel]) -> None:
 
 
 def _report(draft: Draft, kind: type[BaseModel], error: Mapping[str, Any]) -> None:
-    path, code, value = error["loc"], error["type"], error.get("input")
+    path, code, value = _in_data(error["loc"]), error["type"], error.get("input")
     owner, key = where(draft.data, path[:-1]), path[-1]
     if code == "extra_forbidden":
         legal = names_at(kind, path[:-1])
@@ -76,6 +76,15 @@ def _report(draft: Draft, kind: type[BaseModel], error: Mapping[str, Any]) -> No
         draft.add(
             path, f"{owner}: {name} cannot be {shown(value)}", expected or reason, shown(value)
         )
+
+
+def _in_data(location: Path) -> Path:
+    """Where an error stands in the data: pydantic also names the kind of a shape, which is no key."""
+    return tuple(
+        key
+        for depth, key in enumerate(location)
+        if key not in SHAPE_KINDS or location[max(depth - 2, 0)] != "shapes"
+    )
 
 
 def shown(value: Any) -> str:

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...files.problems import listing
-from ..robot_description import Appearance, Box, Joint, Link, Mesh, Vector3
+from ..hulls import THINNEST, is_body
+from ..robot_description import Appearance, Box, Hull, Joint, Link, Mesh, Vector3
 from .faults import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
@@ -235,6 +236,14 @@ def check_bodies(draft: Draft) -> None:
         if not empty:
             _check_inertia(draft, (*path, "inertia"), link)
         for i, shape in enumerate(link.shapes):
+            if isinstance(shape, Hull):
+                if not is_body(shape):
+                    draft.add(
+                        (*path, "shapes", i), f"shape {i + 1} of link {link.name} is no hull",
+                        f"four or more finite corners that are {THINNEST * 1e3:g} mm or more out of one plane",
+                        f"{len(shape.corners)} corners",
+                    )  # fmt: skip
+                continue
             values = (*shape.start, *shape.end, shape.radius)
             if not all(map(math.isfinite, values)) or shape.radius <= 0.0:
                 draft.add(

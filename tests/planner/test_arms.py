@@ -9,13 +9,13 @@ from tests.robots.limbed_robots import CORNERS, HUMANOID, STANDING, TWO, Y, legg
 
 from aloft.planner.checking.evidence import arm_lack
 from aloft.planner.checking.validity import check_plan
-from aloft.planner.models.capsules import arms
+from aloft.planner.models.link_shapes import arms
 from aloft.planner.problem.arm_range import arm_ranges
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import JumpTask, make_task
-from aloft.robots.description import RobotDescription, Shape
+from aloft.robots.description import Capsule, RobotDescription
 from aloft.robots.kinematics import link_poses
 
 LIMITS = [-3.0, 3.0]
@@ -31,8 +31,8 @@ def _armed() -> RobotDescription:
         "armed", HUMANOID, [0.03, 0.0, -0.03], CORNERS, STANDING[1], TWO, shoulders,
         held={"left_arm": 0.0, "right_arm": 0.0},
     )  # fmt: skip
-    arm = Shape(start=(0.0, 0.0, -0.1), end=(0.0, 0.0, -0.4), radius=0.04)
-    bar = Shape(start=(-0.05, -0.2, 0.6), end=(-0.05, 0.2, 0.6), radius=0.05)
+    arm = Capsule(start=(0.0, 0.0, -0.1), end=(0.0, 0.0, -0.4), radius=0.04)
+    bar = Capsule(start=(-0.05, -0.2, 0.6), end=(-0.05, 0.2, 0.6), radius=0.05)
     return robot.changed(
         links=tuple(
             link.model_copy(update={"com": (0.0, 0.0, -0.25), "mass": 1.0, "shapes": (arm,)})

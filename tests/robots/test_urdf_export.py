@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.description import Hull, RobotDescription, find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
-from aloft.robots.urdf_export import urdf_of
+from aloft.robots.urdf_export import hull_meshes, urdf_of
 
 from .example_robots import needs_robots
 from .validation.wrong_robots import hopper
@@ -97,3 +97,23 @@ def test_other_bases_and_joints(base: str, velocities: int) -> None:
     gravity = pin.computeGeneralizedGravity(ours, ours.createData(), q)
     their = pin.computeGeneralizedGravity(theirs, theirs.createData(), full)
     np.testing.assert_allclose(gravity, their, atol=1e-12)
+
+
+def test_hulls_become_meshes_beside_the_file(tmp_path: Path) -> None:
+    wedge = ((-0.1, 0.0), (0.1, 0.0), (0.0, 0.2))
+    corners = tuple((x, y, z) for x, z in wedge for y in (-0.15, 0.15))
+    links = tuple(
+        link.model_copy(update={"shapes": (Hull(corners=corners),)})
+        if link.name == "torso"
+        else link
+        for link in find_robot("bruce").links
+    )
+    robot = find_robot("bruce").changed(links=links)
+    meshes = hull_meshes(robot)
+    assert list(meshes) == ["torso_0.stl"]
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "torso_0.stl").write_bytes(meshes["torso_0.stl"])
+    (tmp_path / "back.urdf").write_text(urdf_of(robot, "parts"))
+    (shape,) = find_robot("back.urdf", tmp_path).link("torso").shapes
+    assert isinstance(shape, Hull)
+    np.testing.assert_allclose(sorted(shape.corners), sorted(corners), atol=1e-4)

@@ -10,7 +10,7 @@ from aloft.hal.simulated import mujoco_model
 from aloft.hal.simulated.mujoco_model import build_world
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.variation import Variation
-from aloft.robots.description import find_robot
+from aloft.robots.description import Hull, find_robot
 
 ROBOT = find_robot("bruce")
 FLAT = SimulatorParameters()
@@ -61,3 +61,25 @@ def test_what_is_in_the_model_makes_another_world(built: list[str]) -> None:
     for k in range(9):
         build_world(FLAT, ROBOT, Variation(friction=0.5 + 0.01 * k))
     assert len(mujoco_model._model_cache) == 4, "older ones are forgotten"
+
+
+def test_a_hull_is_a_mesh_where_its_corners_are() -> None:
+    wedge = ((-0.1, 0.0), (0.1, 0.0), (0.03, 0.2))
+    corners = [(x, y, z) for x, z in wedge for y in (-0.15, 0.1)]
+    torso = ROBOT.link("torso").model_copy(update={"shapes": (Hull(corners=tuple(corners)),)})
+    links = tuple(torso if link.name == "torso" else link for link in ROBOT.links)
+    model = mujoco_model.build_mujoco_model(ROBOT.changed(links=links))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geom = model.geom("torso/0")
+    assert geom.type == mujoco.mjtGeom.mjGEOM_MESH
+    mesh = model.mesh(int(geom.dataid[0]))
+    first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+    vertices = model.mesh_vert[first : first + count]
+    there, body = data.geom("torso/0"), data.body("torso")
+    places = there.xpos + vertices @ there.xmat.reshape(3, 3).T
+    local = (places - body.xpos) @ body.xmat.reshape(3, 3)
+    np.testing.assert_allclose(sorted(local.tolist()), sorted(corners), atol=1e-6)
+    plain = mujoco_model.build_mujoco_model(ROBOT)
+    np.testing.assert_array_equal(model.body_mass, plain.body_mass)
+    np.testing.assert_array_equal(model.body_inertia, plain.body_inertia)

@@ -186,6 +186,18 @@ def test_a_floating_body_without_feet_or_shapes_has_nothing_to_rest_on(arm: Data
         start(arm)
 
 
+def test_a_floating_body_without_feet_rests_on_the_lowest_corner_of_its_hull(arm: Data) -> None:
+    arm["base_joint"] = "floating"
+    for link in arm["links"]:
+        link["shapes"] = []
+    wedge = ((-0.2, 0.0), (0.2, 0.0), (0.05, 0.3))
+    corners = [[x, y, z - 0.13] for x, z in wedge for y in (-0.2, 0.2)]
+    arm["links"][0]["shapes"] = [{"corners": corners}]
+    robot = start(arm)
+    robot.block.emit()
+    assert float(robot.get("truth").base_position[2]) == pytest.approx(0.13, abs=2e-3)
+
+
 def test_a_run_that_cannot_start_says_why_and_fails(quadruped: Data, tmp_path: Path) -> None:
     quadruped["links"][0]["com"] = [0.35, 0.0, 0.0]
     (tmp_path / "quadruped.yaml").write_text(yaml.safe_dump(quadruped))

@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,8 @@ from aloft import load
 from aloft.logs import read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
-from aloft.logs.viewing.robot_shapes import capsules, drawn_link, reach_of, shapes_of
-from aloft.robots.description import Appearance, Mesh, RobotDescription, Shape, find_robot
+from aloft.logs.viewing.robot_shapes import drawn_link, drawn_shapes, reach_of, shapes_of
+from aloft.robots.description import Appearance, Capsule, Hull, Mesh, RobotDescription, find_robot
 from aloft.robots.surfaces import joined, missing_meshes, robot_surfaces
 
 from ...robots.example_robots import needs_robots
@@ -23,12 +24,28 @@ BRUCE = find_robot("bruce")
 @pytest.mark.parametrize("count", [0, 1, 3, 4, 5])
 def test_links_of_any_number_of_shapes_are_drawn_without_a_warning(count: int) -> None:
     shapes = [
-        Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.1 * k, 0.1), radius=0.01) for k in range(count)
+        Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.1 * k, 0.1), radius=0.01) for k in range(count)
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        drawn = capsules(shapes, 0x90A4AEFF)
-    assert drawn.colors is None or len(drawn.colors.as_arrow_array()) == count
+        drawn = drawn_shapes(shapes, 0x90A4AEFF)
+    assert list(drawn) == ([""] if count else [])
+    assert not count or len(drawn[""].colors.as_arrow_array()) == count
+
+
+CUBE = Hull(corners=tuple(product((-0.1, 0.1), repeat=3)))
+
+
+def test_a_hull_is_drawn_as_its_faces_or_its_edges() -> None:
+    import rerun as rr
+
+    ball = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 0.0004), radius=0.05)
+    drawn = drawn_shapes([ball, CUBE, CUBE], 0x90A4AEFF)
+    assert list(drawn) == ["", "/hulls"]
+    assert isinstance(drawn["/hulls"], rr.Mesh3D)
+    assert len(drawn["/hulls"].triangle_indices.as_arrow_array()) == 2 * 12
+    wires = drawn_shapes([CUBE], 0x90A4AEFF, wires=True)["/hulls"]
+    assert len(wires.strips.as_arrow_array()) == 12 + 6  # a line across each face
 
 
 def test_a_link_without_shapes_has_bones_to_its_joints_and_contact_points() -> None:
@@ -58,7 +75,7 @@ def with_look(folder: Path, *files: str) -> RobotDescription:
         Mesh(file=str(folder / name), position=(0.0, 0.0, 0.5), scale=(0.1, 0.1, 0.2))
         for name in files
     )
-    ball = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 0.0004), radius=0.05)
+    ball = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 0.0004), radius=0.05)
     return BRUCE.changed(looks={BRUCE.base: Appearance(meshes=meshes, shapes=(ball,))})
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import nnls
 
+from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.mathematics.segment_distances import segment_gap
 from aloft.planner.checking.evidence import (
     _gaps,
@@ -12,10 +14,10 @@ from aloft.planner.checking.evidence import (
     leg_lack,
     step_edge,
 )
-from aloft.planner.models.capsules import capsule_ends, legs
 from aloft.planner.models.exact_dynamics import dynamics_of
+from aloft.planner.models.link_shapes import FAR, MovingShape, gaps_between, legs, moving_shapes
 from aloft.planner.task.task import make_task
-from aloft.robots.description import find_robot
+from aloft.robots.description import Capsule, Hull, find_robot
 from aloft.robots.kinematics import link_poses
 from aloft.robots.pinocchio_model import build_pinocchio_model
 
@@ -82,8 +84,8 @@ def closest(first: list, second: list, k: int) -> float:  # type: ignore[type-ar
     """The least distance between the capsules of two legs at an instant, by trying many points."""
     share = np.linspace(0.0, 1.0, 60)[:, None]
     found = np.inf
-    for a, b, radius in first:
-        for c, d, other in second:
+    for (a, b), radius in ((each.edges()[0], each.shape.radius) for each in first):
+        for (c, d), other in ((each.edges()[0], each.shape.radius) for each in second):
             p, q = a[k] + share * (b[k] - a[k]), c[k] + share * (d[k] - c[k])
             gap = np.linalg.norm(p[:, None] - q[None], axis=2).min()
             found = min(found, float(gap) - radius - other)
@@ -100,7 +102,7 @@ def test_legs_lack_what_is_wanted_or_what_they_had_at_first(wanted: float) -> No
         roll = next(k for k, name in enumerate(names) if side in name and "roll" in name)
         joints[:, roll] += sign * np.linspace(0.0, 0.25, count)
     poses = link_poses(robot, np.zeros((count, 3)), np.tile([0.0, 0, 0, 1], (count, 1)), joints)
-    left, right = ([c for link in chain for c in capsule_ends(robot, poses, link)]
+    left, right = ([c for link in chain for c in moving_shapes(robot, poses, link)]
                    for chain in legs(robot))  # fmt: skip
     gaps = np.array([closest(left, right, k) for k in range(count)])
     assert np.ptp(gaps) > 0.02, "the legs come closer or go apart"
@@ -112,7 +114,7 @@ def test_legs_lack_what_is_wanted_or_what_they_had_at_first(wanted: float) -> No
     assert lack[0] <= 0.0 + max(0.0, wanted - gaps[0])
 
 
-def test_ends_of_capsules_move_with_their_link() -> None:
+def test_corners_of_shapes_move_with_their_link() -> None:
     robot = find_robot("bruce")
     random = np.random.default_rng(0)
     quaternion = random.normal(size=(3, 4))
@@ -128,15 +130,12 @@ def test_ends_of_capsules_move_with_their_link() -> None:
         for joint in robot.joints:
             place = data.oMi[built.model.getJointId(joint.name)]
             shapes = robot.link(joint.child).shapes
-            for shape, (start, end, radius) in zip(
-                shapes, capsule_ends(robot, poses, joint.child), strict=True
-            ):
-                np.testing.assert_allclose(start[k], place.act(np.array(shape.start)), atol=1e-12)
-                np.testing.assert_allclose(end[k], place.act(np.array(shape.end)), atol=1e-12)
-                assert radius == shape.radius
+            for shape, moving in zip(shapes, moving_shapes(robot, poses, joint.child), strict=True):
+                expected = [place.act(np.array(corner)) for corner in shape.corners]
+                np.testing.assert_allclose(moving.corners()[:, k], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["bruce", "go2"])
+@pytest.mark.parametrize("name", ["bruce", "a1"])
 def test_compiled_distances_of_legs_are_those_of_their_capsules_one_by_one(name: str) -> None:
     robot, random = find_robot(name), np.random.default_rng(4)
     count, joints = 5, len(robot.joints)
@@ -151,15 +150,19 @@ def test_compiled_distances_of_legs_are_those_of_their_capsules_one_by_one(name:
             np.testing.assert_allclose(found, expected, atol=1e-12)
     gaps = list(_gaps(robot, compiled))
     chains = [
-        [c for link in chain for c in capsule_ends(robot, plain, link)] for chain in legs(robot)
+        [c for link in chain for c in moving_shapes(robot, plain, link)] for chain in legs(robot)
     ]
     pairs = [(one, two) for i, one in enumerate(chains) for two in chains[i + 1 :]]
     assert len(gaps) == len(pairs)
     for found, (one, other) in zip(gaps, pairs, strict=True):
         expected = [
-            [segment_gap(a[k], b[k], c[k], d[k]) - (r + s) for k in range(count)]
-            for a, b, r in one
-            for c, d, s in other
+            [
+                segment_gap(*(corners[k] for corners in (*a.corners(), *b.corners())))
+                - (a.shape.radius + b.shape.radius)
+                for k in range(count)
+            ]
+            for a in one
+            for b in other
         ]
         np.testing.assert_allclose(found, expected, atol=1e-12)
 
@@ -176,7 +179,8 @@ def test_bodies_over_a_step_are_as_high_as_their_lowest_point() -> None:
                           robot.standing_position[None])  # fmt: skip
         heights = body_heights(robot, task, pose, np.zeros(1))
         lowest = np.inf
-        for start, end, radius in capsule_ends(robot, pose, "torso"):
+        for moving in moving_shapes(robot, pose, "torso"):
+            (start, end), radius = moving.edges()[0], moving.shape.radius
             centres = start + share * (end - start)
             for aside in np.linspace(-0.999, 0.999, 201):
                 below = centres[:, 2] - radius * np.sqrt(1.0 - aside**2)
@@ -190,3 +194,51 @@ def test_ground_behind_many_flights() -> None:
     x = np.array([0.0, 0.2, 0.0, 0.2, 0.0, 0.2])
     progress = np.array([-1.0, -1.0, 0.5, 0.5, 3.0, 3.0])
     np.testing.assert_array_equal(ground_height(up, x, progress), [0.0, 0.05] * 3)
+
+
+def least_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Between the hulls of corners (n, 3) and (m, 3), as non-negative least squares: shares of the corners that add up to
+    one, with the nearest points."""
+    large = 1e4
+    ones, others = large * np.ones(len(one)), large * np.ones(len(other))
+    zeros, others_zeros = np.zeros(len(one)), np.zeros(len(other))
+    matrix = np.vstack(
+        [
+            np.hstack([one.T, -other.T]),
+            np.hstack([ones, others_zeros]),
+            np.hstack([zeros, others]),
+        ]
+    )
+    shares, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, large, large]))
+    return float(np.linalg.norm(one.T @ shares[: len(one)] - other.T @ shares[len(one) :]))
+
+
+def random_shape(random: np.random.Generator, hull: bool) -> Hull | Capsule:
+    corners = random.uniform(-0.05, 0.05, (8 if hull else 2, 3)).tolist()
+    if hull:
+        return Hull(corners=tuple(tuple(corner) for corner in corners))
+    return Capsule(start=tuple(corners[0]), end=tuple(corners[1]), radius=0.02)
+
+
+@pytest.mark.parametrize(("first", "second"), [(True, True), (True, False), (False, True)])
+def test_hulls_are_as_far_apart_as_their_nearest_points(first: bool, second: bool) -> None:
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        quaternions = random.normal(size=(2, 6, 4))
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+        turn = matrices_of_quaternions(quaternions)
+        place = random.uniform(-0.15, 0.15, (2, 6, 3))
+        one, other = (
+            MovingShape(random_shape(random, hull), place[k], turn[k])
+            for k, hull in enumerate((first, second))
+        )
+        (gaps,) = gaps_between([one], [other])
+        for k, gap in enumerate(gaps):
+            apart = least_distance(one.corners()[:, k], other.corners()[:, k])
+            expected = apart - one.shape.radius - other.shape.radius
+            if gap > FAR:
+                assert gap <= expected + 1e-9  # balls around them are that far apart
+            elif apart > 1e-6:
+                assert gap == pytest.approx(expected, abs=1e-6)
+            else:
+                assert gap < 1e-6, "they overlap"

@@ -42,21 +42,6 @@ def test_a_ball_is_a_very_short_capsule() -> None:
     assert ball.radius == 0.05 and 0.0 < np.linalg.norm(ball.end - ball.start) < 1e-3
 
 
-def test_a_mesh_is_taken_for_the_box_along_it() -> None:
-    corners = np.array(
-        [[x, y, z] for x in (-0.3, 0.3) for y in (-0.05, 0.05) for z in (-0.05, 0.05)]
-    )
-    angle = 0.5
-    turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
-    (capsule,) = capsules.of_points(corners @ turn.T + [1.0, 0.0, 0.0])
-    along = capsule.end - capsule.start
-    assert capsule.radius == pytest.approx(0.05, rel=0.01)
-    assert abs(along @ turn[:, 0]) == pytest.approx(0.5, rel=0.01)
-    assert 0.5 * (capsule.start + capsule.end) == pytest.approx([1.0, 0.0, 0.0], abs=1e-9)
-
-
 def test_moving_and_the_lowest_point() -> None:
     capsule = capsules.along(2, 0.2, 0.1).moved(np.eye(3), np.array([0.0, 0.0, 1.0]))
     assert capsule.lowest(np.eye(3)) == pytest.approx(0.7)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.robots.importing.meshes import mesh_corners
+from aloft.robots.importing.meshes import mesh_triangles
 from aloft.robots.importing.package_files import find_file, package_of
 
 
@@ -47,22 +47,23 @@ def test_binary_stl(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(
         b"solid".ljust(80) + np.uint32(2).tobytes() + triangles.tobytes()
     )
-    assert mesh_corners(tmp_path / "a.stl").tolist() == CORNERS.tolist()
+    assert mesh_triangles(tmp_path / "a.stl").tolist() == CORNERS.reshape(2, 3, 3).tolist()
 
 
 def test_text_stl_and_obj(tmp_path: Path) -> None:
     lines = [f"      vertex {x} {y} {z}" for x, y, z in CORNERS]
     (tmp_path / "a.STL").write_text("solid a\n facet\n" + "\n".join(lines) + "\nendsolid a\n")
-    assert mesh_corners(tmp_path / "a.STL").tolist() == CORNERS.tolist()
+    expected = CORNERS.reshape(2, 3, 3).tolist()
+    assert mesh_triangles(tmp_path / "a.STL").tolist() == expected
     obj = "# an object\n" + "\n".join(f"v {x} {y} {z}" for x, y, z in CORNERS) + "\nvn 0 0 1\n"
-    (tmp_path / "a.obj").write_text(obj)
-    assert mesh_corners(tmp_path / "a.obj").tolist() == CORNERS.tolist()
+    (tmp_path / "a.obj").write_text(f"{obj}f 1 2 3\nf 4// 5// 6//\n")
+    assert mesh_triangles(tmp_path / "a.obj").tolist() == expected
 
 
 def test_what_is_no_mesh(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(b"nothing")
-    with pytest.raises(ValueError, match="a mesh of 0 corners"):
-        mesh_corners(tmp_path / "a.stl")
-    (tmp_path / "a.dae").touch()
-    with pytest.raises(ValueError, match=r"no mesh of the formats \.stl, \.obj"):
-        mesh_corners(tmp_path / "a.dae")
+    with pytest.raises(ValueError, match="a mesh of 0 triangles"):
+        mesh_triangles(tmp_path / "a.stl")
+    (tmp_path / "a.ply").touch()
+    with pytest.raises(ValueError, match=r"no mesh of the formats \.stl, \.obj, \.dae"):
+        mesh_triangles(tmp_path / "a.ply")

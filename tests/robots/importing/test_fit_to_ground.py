@@ -13,7 +13,7 @@ from aloft.robots.importing.fit_to_ground import (
     fit_to_ground,
 )
 from aloft.robots.kinematics import link_poses_in_base, standing_heights
-from aloft.robots.robot_description import Shape
+from aloft.robots.robot_description import Capsule, Hull
 
 from ..example_robots import needs_robots
 from ..limbed_robots import humanoid, quadruped
@@ -79,24 +79,36 @@ def test_a_pose_is_found_only_where_none_is_given() -> None:
 
 def test_shapes_end_above_the_ground_and_what_lies_below_is_gone() -> None:
     upright = np.eye(3)
-    shape = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -1.0), radius=0.1)
+    shape = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -1.0), radius=0.1)
     assert _above(shape, upright, -1.2) is shape
     shortened = _above(shape, upright, -0.6)
-    assert shortened is not None and shortened.start == (0.0, 0.0, 0.0)
+    assert isinstance(shortened, Capsule) and shortened.start == (0.0, 0.0, 0.0)
     # the lower ball now rests at the height: its centre is a radius above it
     assert shortened.end[2] - 0.1 == pytest.approx(-0.6, abs=1e-3) and shortened.radius == 0.1
     assert _above(shape, upright, 0.0) is None and _above(shape, upright, 5.0) is None
     # upside down it is the other end that is cut
     over = np.diag([1.0, -1.0, -1.0])
     turned = _above(shape, over, 0.3)
-    assert turned is not None and turned.end == (0.0, 0.0, -1.0)
+    assert isinstance(turned, Capsule) and turned.end == (0.0, 0.0, -1.0)
     assert -turned.start[2] - 0.1 == pytest.approx(0.3, abs=1e-3)
+
+
+def test_a_hull_is_cut_at_a_height() -> None:
+    corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-1.0, 0.0)]
+    hull, upright = Hull(corners=tuple(corners)), np.eye(3)
+    assert _above(hull, upright, -1.1) is hull
+    cut = _above(hull, upright, -0.4)
+    assert isinstance(cut, Hull)
+    assert {corner[2] for corner in cut.corners} == {-0.4, 0.0}
+    assert np.ptp(cut.corners, axis=0) == pytest.approx([0.2, 0.4, 0.4])
+    assert _above(hull, upright, 0.0) is None
+    assert _above(hull, upright, -0.0005) is None, "what is left is no body"
 
 
 def test_a_low_shape_of_a_robot_is_cut_in_its_standing_pose() -> None:
     robot = find_robot("bruce")
     calf = next(link for link in robot.links if link.name == "left_calf")
-    long = Shape(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -0.6), radius=0.02)
+    long = Capsule(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -0.6), radius=0.02)
     links = tuple(
         link.model_copy(update={"shapes": (*link.shapes, long)}) if link is calf else link
         for link in robot.links

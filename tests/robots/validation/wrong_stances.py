@@ -178,6 +178,34 @@ WRONG_STANCES: list[tuple[list[Change], list[str]]] = [
         ],
     ),
     (
+        [(("links", 0, "shapes"), [{"corners": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]}])],
+        [
+            "hopper.yaml:18:5: shape 1 of link body is no hull",
+            "    expected   four or more finite corners that are 1 mm or more out of one plane",
+            "    found      4 corners",
+        ],
+    ),
+    (
+        [(("links", 0, "shapes"), [{"corners": [[0, 0, 0], [1, 0, 0], [0, 1, 0]]}])],
+        [
+            "hopper.yaml:19:5: link body, shape 1: corners cannot be [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+            "    expected   at least 4 values",
+            "    found      [[0, 0, 0], [1, 0, 0], [0, 1, 0]]",
+        ],
+    ),
+    (
+        [(("links", 0, "shapes"), [{"start": [0, 0, 0], "end": [0, 0, 1], "radios": 0.1}])],
+        [
+            "hopper.yaml:18:5: link body, shape 1 lacks 'radius'",
+            "    expected   a value for 'radius'",
+            "    found      nothing",
+            "hopper.yaml:26:13: link body, shape 1 has no key 'radios'",
+            "    expected   start, end, radius, corners",
+            "    found      'radios'",
+            "    fix        radius: 0.1",
+        ],
+    ),
+    (
         [(("contacts", 0, "position"), [0, NAN, 0])],
         [
             "hopper.yaml:65:3: contact toe is nowhere",

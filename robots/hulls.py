@@ -1,0 +1,78 @@
+"""Convex hulls as collision shapes: whether corners span a body, its edges and triangles, and the corners of all shapes
+of a link.
+
+Faces are found by Coal, and only for what draws a hull, measures from it or looks along its edges.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..mathematics.arrays import Array, Indices
+from .robot_description import Capsule, Hull, Link, Shape, Vector3
+
+THINNEST = 1e-3
+"""m; how far the corners of a hull are spread across their best plane, at least."""
+Edge = tuple[Vector3, Vector3]
+"""Both ends [m]."""
+
+
+def is_body(hull: Hull) -> bool:
+    """Whether the corners are finite and lie in no plane."""
+    corners = np.array(hull.corners)
+    return bool(np.isfinite(corners).all()) and spread(corners) >= THINNEST
+
+
+def spread(corners: Array) -> float:
+    """How far corners (n, 3) reach across the plane that fits them best [m]."""
+    middle = corners - corners.mean(axis=0)
+    _, directions = np.linalg.eigh(middle.T @ middle)
+    return float(np.ptp(middle @ directions[:, 0]))
+
+
+def corners_of(link: Link) -> tuple[Array, Array]:
+    """The corners (n, 3) [m, link frame] of all shapes of a link, and how far these reach beyond each (n,) [m]."""
+    corners = [corner for shape in link.shapes for corner in shape.corners]
+    radii = [shape.radius for shape in link.shapes for _ in shape.corners]
+    return np.array(corners).reshape(-1, 3), np.array(radii)
+
+
+@lru_cache(maxsize=512)
+def convex(corners: tuple[Vector3, ...]) -> Any:
+    """Coal's hull of the corners, from which distances to others follow."""
+    import coal
+
+    points = coal.StdVec_Vec3s()
+    for corner in corners:
+        points.append(np.array(corner))
+    return coal.Convex.convexHull(points, True, "Qt")
+
+
+def surface(hull: Hull) -> tuple[Array, Indices]:
+    """The corners (n, 3) [m, link frame] that the hull has, and the triangles (m, 3) between them, counter-clockwise as
+    seen from outside."""
+    whole = convex(hull.corners)
+    places = np.array(whole.points())
+    found = [whole.polygons(k) for k in range(whole.num_polygons)]
+    triangles = np.array([[each[0], each[1], each[2]] for each in found], np.int64)
+    a, b, c = (places[triangles[:, k]] for k in range(3))
+    outwards = (np.cross(b - a, c - a) * (a - places.mean(axis=0))).sum(axis=1) > 0.0
+    triangles[~outwards] = triangles[~outwards][:, ::-1]
+    return places, triangles
+
+
+def edges(shape: Shape) -> tuple[Edge, ...]:
+    """The edges of a hull, among them those across a face of more than three corners; of a capsule its axis."""
+    return ((shape.start, shape.end),) if isinstance(shape, Capsule) else _edges(shape.corners)
+
+
+@lru_cache(maxsize=512)
+def _edges(corners: tuple[Vector3, ...]) -> tuple[Edge, ...]:
+    places, triangles = surface(Hull(corners=corners))
+    sides = np.concatenate([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    once = np.unique(np.sort(sides, axis=1), axis=0)
+    ends = [tuple(place) for place in places.tolist()]
+    return tuple((ends[i], ends[j]) for i, j in once.tolist())
