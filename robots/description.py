@@ -13,16 +13,15 @@ from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
 from .importing.package_files import SCHEME, find_file, package_of
 from .importing.xacro_text import XACRO
+from .part import Vector3
 from .plausible_size import wrong_size
 from .robot_description import (
     BASE_VELOCITIES,
     ActuatorProfile,
     Appearance,
     Box,
-    Capsule,
     ContactPoint,
     Foot,
-    Hull,
     Joint,
     Link,
     Mesh,
@@ -30,12 +29,11 @@ from .robot_description import (
     Motors,
     RobotDescription,
     Sensors,
-    Shape,
     Thruster,
     Transmission,
     TurnedPart,
-    Vector3,
 )
+from .shapes import Capsule, Hull, Shape
 from .validation import RobotError, RobotFault, find_faults
 
 if TYPE_CHECKING:

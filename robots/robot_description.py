@@ -7,116 +7,24 @@ to the base's at the zero pose; quantities are in SI.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    BaseModel,
     ConfigDict,
-    Discriminator,
     Field,
-    SerializationInfo,
-    SerializerFunctionWrapHandler,
-    Tag,
-    model_serializer,
 )
 
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..mathematics.linear_algebra import inverse, product
-
-Vector3 = tuple[float, float, float]
-Color = Annotated[str, Field(pattern="^#[0-9a-fA-F]{6}$")]
-Length = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-Radius = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-
-
-class Part(BaseModel):
-    """Immutable data that refuses unknown keys."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, ignored_types=(cached_property,), defer_build=True
-    )
-
-    later: ClassVar[tuple[str, ...]] = ()
-    """Fields that came after version 0.1. They are left out where they have their default, so that
-    a description that does not use them keeps its content, and plans made for it their keys."""
-    seen_only: ClassVar[tuple[str, ...]] = ()
-    """Fields that say what the part looks like, on which nothing that is computed depends. They are
-    in a dump only with ``context={"looks": True}``: a robot keeps its content without its meshes."""
-    simulated_only: ClassVar[tuple[str, ...]] = ()
-    """Fields that only effects of a simulated robot need, and no plan and no controller. They are in a dump with
-    ``context={"simulated": True}`` and in one with looks."""
-
-    @model_serializer(mode="wrap")
-    def _without_unused(
-        self, serialize: SerializerFunctionWrapHandler, info: SerializationInfo
-    ) -> dict[str, Any]:
-        data: dict[str, Any] = serialize(self)
-        fields = type(self).model_fields
-        context = info.context or {}
-        looks = bool(context.get("looks"))
-        simulated = looks or bool(context.get("simulated"))
-        for name in self.later:
-            if getattr(self, name) == fields[name].default:
-                data.pop(name, None)
-        for name in self.seen_only:
-            if not looks or getattr(self, name) == fields[name].default:
-                data.pop(name, None)
-        for name in self.simulated_only:
-            if not simulated or getattr(self, name) == fields[name].default:
-                data.pop(name, None)
-        return data
-
-
-class Capsule(Part):
-    """A collision capsule from ``start`` to ``end`` [m, link frame] of ``radius`` [m]."""
-
-    start: Vector3
-    end: Vector3
-    radius: float
-
-    @property
-    def corners(self) -> tuple[Vector3, ...]:
-        """Both ends: all that is within ``radius`` of the line between them is the capsule's."""
-        return (self.start, self.end)
-
-    def moved(self, place: Callable[[Vector3], Vector3]) -> Capsule:
-        """The capsule in another frame, in which ``place`` gives where a point is."""
-        return Capsule(start=place(self.start), end=place(self.end), radius=self.radius)
-
-
-class Hull(Part):
-    """A convex collision body: the hull of its ``corners`` [m, link frame], four or more that lie in no plane."""
-
-    corners: Annotated[tuple[Vector3, ...], Field(min_length=4)]
-
-    @property
-    def radius(self) -> float:
-        """A hull reaches no farther than its corners [m]."""
-        return 0.0
-
-    def moved(self, place: Callable[[Vector3], Vector3]) -> Hull:
-        """The hull in another frame, in which ``place`` gives where a point is."""
-        return Hull(corners=tuple(place(corner) for corner in self.corners))
-
-
-def _kind_of_shape(shape: Any) -> str:
-    """Which kind of shape data, or a shape, is: the keys of a hull are none of a capsule's."""
-    is_hull = "corners" in shape if isinstance(shape, Mapping) else isinstance(shape, Hull)
-    return "hull" if is_hull else "capsule"
-
-
-SHAPE_KINDS = ("capsule", "hull")
-Shape = Annotated[
-    Annotated[Capsule, Tag("capsule")] | Annotated[Hull, Tag("hull")], Discriminator(_kind_of_shape)
-]
-"""A convex collision shape: all that is within ``radius`` of the hull of its ``corners``."""
+from .part import Color, Length, Part, Radius, Vector3
+from .shapes import Shape
 
 
 class Mesh(Part):

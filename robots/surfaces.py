@@ -17,7 +17,8 @@ from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import matrices_of_quaternions
 from .importing.meshes import mesh_triangles, simplified
 from .importing.package_files import find_file
-from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart, Vector3
+from .part import Vector3
+from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart
 
 MOST_TRIANGLES = 24_000
 """Of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""

@@ -15,8 +15,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ..mathematics.arrays import Array
-from .hulls import surface
-from .robot_description import Capsule, Hull, Joint, Link, RobotDescription
+from .robot_description import Joint, Link, RobotDescription
+from .shapes import Capsule, Hull, surface
 
 FREE = 1e3
 """The limits [m] of a slide that has none: a URDF demands some."""

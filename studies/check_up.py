@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..mathematics.arrays import Array
-from ..robots.hulls import corners_of
 from ..robots.plausible_size import wrong_size
+from ..robots.shapes import corners_of
 
 if TYPE_CHECKING:
     from ..robots.description import RobotDescription
@@ -108,7 +108,7 @@ def _links(robot: RobotDescription) -> Iterator[Remark]:
 
 def _extent(link: Link) -> tuple[float, Array]:
     """How far a link's shapes reach from their middle [m], and that middle (3,)."""
-    corners, radii = corners_of(link)
+    corners, radii = corners_of(link.shapes)
     low, high = (corners - radii[:, None]).min(axis=0), (corners + radii[:, None]).max(axis=0)
     return 0.5 * float(np.linalg.norm(high - low)), 0.5 * (low + high)
 

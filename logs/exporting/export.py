@@ -26,7 +26,7 @@ import numpy as np
 from ...hal.sensors.sensor import RosMessage
 from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import Hull, RobotDescription
-from ...robots.hulls import surface
+from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
 from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError

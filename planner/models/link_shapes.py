@@ -15,9 +15,9 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.segment_distances import capsule_gaps
 from ...robots.description import Capsule, Hull, RobotDescription, Shape, Vector3
-from ...robots.hulls import convex, edges
 from ...robots.kinematics import LinkPoses, from_base_outwards
 from ...robots.limb import chain_to
+from ...robots.shapes import convex, edges
 from ...robots.surfaces import quaternion_from_z
 from .exact_dynamics import run_compiled
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from ...mathematics.arrays import Indices
 from ...robots.description import Capsule, RobotDescription, Shape
-from ...robots.hulls import Edge, corners_of, edges
 from ...robots.kinematics import ball_feet
 from ...robots.robot_description import Link
+from ...robots.shapes import Edge, corners_of, edges
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.sequence import Hop, StanceLocation, step_of
@@ -76,7 +76,7 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
 def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
     """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
     is nearer to the ground than the gap that is kept."""
-    corners, _ = corners_of(link)
+    corners, _ = corners_of(link.shapes)
     half = 0.5 * max((math.dist(corner, ball) for corner in corners), default=0.0)
     for shape in link.shapes:
         for edge in _along(shape):

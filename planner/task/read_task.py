@@ -16,7 +16,6 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription, find_robot
-from ...robots.hulls import corners_of
 from ...robots.kinematics import (
     contact_centres,
     link_poses,
@@ -24,6 +23,7 @@ from ...robots.kinematics import (
     standing_contacts,
     standing_heights,
 )
+from ...robots.shapes import corners_of
 from .contact_groups import contact_points, wrong_groups
 from .files import JumpTaskError, read_placed
 from .margins import unknown_joints
@@ -313,7 +313,7 @@ def _low_links(robot: RobotDescription, height: float) -> Iterator[tuple[str, Ar
     ground = float(np.min(standing_heights(robot)))
     for link in robot.links:
         rotation, origin = poses[link.name]
-        corners, radii = corners_of(link)
+        corners, radii = corners_of(link.shapes)
         places = origin + product(corners, rotation.T)
         low = places[:, 2] - radii - ground < height
         if low.any():

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..hulls import THINNEST, edges, spread
 from ..kinematics import (
     LinkPoses,
     contact_centres,
@@ -24,7 +23,8 @@ from ..kinematics import (
     link_poses_in_base,
     standing_heights,
 )
-from ..robot_description import Capsule, Hull, RobotDescription, Shape
+from ..robot_description import RobotDescription
+from ..shapes import THINNEST, Capsule, Hull, Shape, edges, spread
 from .capsules import coarse
 
 CLEARANCE = 0.002

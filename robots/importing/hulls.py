@@ -14,7 +14,7 @@ from itertools import permutations, product
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ..hulls import THINNEST, spread
+from ..shapes import THINNEST, spread
 from .capsules import Capsule, of_box
 
 BEYOND = 0.01

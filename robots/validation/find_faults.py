@@ -9,7 +9,8 @@ from pydantic import BaseModel, ValidationError
 
 from ...files.problems import listing
 from ...files.validation import explain, names_at
-from ..robot_description import SHAPE_KINDS, RobotDescription
+from ..robot_description import RobotDescription
+from ..shapes import SHAPE_KINDS
 from .actuation import check_actuation, check_thrusters
 from .faults import Draft, Path, RobotFault, nearest
 from .stance import check_feet, check_poses

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...files.problems import listing
-from ..hulls import THINNEST, is_body
-from ..robot_description import Appearance, Box, Hull, Joint, Link, Mesh, Vector3
+from ..part import Vector3
+from ..robot_description import Appearance, Box, Joint, Link, Mesh
+from ..shapes import THINNEST, Hull, is_body
 from .faults import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}

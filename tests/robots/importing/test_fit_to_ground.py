@@ -13,7 +13,7 @@ from aloft.robots.importing.fit_to_ground import (
     fit_to_ground,
 )
 from aloft.robots.kinematics import link_poses_in_base, standing_heights
-from aloft.robots.robot_description import Capsule, Hull
+from aloft.robots.shapes import Capsule, Hull
 
 from ..example_robots import needs_robots
 from ..limbed_robots import humanoid, quadruped

@@ -1,18 +1,65 @@
-"""Convex hulls as collision shapes: whether corners span a body, its edges and triangles, and the corners of all shapes
-of a link.
+"""Collision shapes of links: capsules and convex hulls, whether corners span a body, and the edges and triangles of hulls.
 
 Faces are found by Coal, and only for what draws a hull, measures from it or looks along its edges.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Discriminator, Field, Tag
 
 from ..mathematics.arrays import Array, Indices
-from .robot_description import Capsule, Hull, Link, Shape, Vector3
+from .part import Part, Vector3
+
+
+class Capsule(Part):
+    """A collision capsule from ``start`` to ``end`` [m, link frame] of ``radius`` [m]."""
+
+    start: Vector3
+    end: Vector3
+    radius: float
+
+    @property
+    def corners(self) -> tuple[Vector3, ...]:
+        """Both ends: all that is within ``radius`` of the line between them is the capsule's."""
+        return (self.start, self.end)
+
+    def moved(self, place: Callable[[Vector3], Vector3]) -> Capsule:
+        """The capsule in another frame, in which ``place`` gives where a point is."""
+        return Capsule(start=place(self.start), end=place(self.end), radius=self.radius)
+
+
+class Hull(Part):
+    """A convex collision body: the hull of its ``corners`` [m, link frame], four or more that lie in no plane."""
+
+    corners: Annotated[tuple[Vector3, ...], Field(min_length=4)]
+
+    @property
+    def radius(self) -> float:
+        """A hull reaches no farther than its corners [m]."""
+        return 0.0
+
+    def moved(self, place: Callable[[Vector3], Vector3]) -> Hull:
+        """The hull in another frame, in which ``place`` gives where a point is."""
+        return Hull(corners=tuple(place(corner) for corner in self.corners))
+
+
+def _kind_of_shape(shape: Any) -> str:
+    """Which kind of shape data, or a shape, is: the keys of a hull are none of a capsule's."""
+    is_hull = "corners" in shape if isinstance(shape, Mapping) else isinstance(shape, Hull)
+    return "hull" if is_hull else "capsule"
+
+
+SHAPE_KINDS = ("capsule", "hull")
+Shape = Annotated[
+    Annotated[Capsule, Tag("capsule")] | Annotated[Hull, Tag("hull")], Discriminator(_kind_of_shape)
+]
+"""A convex collision shape: all that is within ``radius`` of the hull of its ``corners``."""
+
 
 THINNEST = 1e-3
 """m; how far the corners of a hull are spread across their best plane, at least."""
@@ -33,10 +80,10 @@ def spread(corners: Array) -> float:
     return float(np.ptp(middle @ directions[:, 0]))
 
 
-def corners_of(link: Link) -> tuple[Array, Array]:
+def corners_of(shapes: Sequence[Shape]) -> tuple[Array, Array]:
     """The corners (n, 3) [m, link frame] of all shapes of a link, and how far these reach beyond each (n,) [m]."""
-    corners = [corner for shape in link.shapes for corner in shape.corners]
-    radii = [shape.radius for shape in link.shapes for _ in shape.corners]
+    corners = [corner for shape in shapes for corner in shape.corners]
+    radii = [shape.radius for shape in shapes for _ in shape.corners]
     return np.array(corners).reshape(-1, 3), np.array(radii)
 
 
