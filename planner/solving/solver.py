@@ -18,7 +18,7 @@ VIOLATION = 1e-6
 """What a solution may violate a constraint by, in the constraint's unit."""
 DUAL_TOLERANCE = 1e-4
 """fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
-LIMIT = 100
+LIMIT = 150
 """Iterations; where fatrop finds a motion at all it nearly always does in half as many, and IPOPT
 finds it often where it does not."""
 PATIENCE = 1e-5

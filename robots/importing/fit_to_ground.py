@@ -17,7 +17,9 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..kinematics import (
+    BallFoot,
     LinkPoses,
+    ball_feet,
     contact_centres,
     link_poses,
     link_poses_in_base,
@@ -31,6 +33,9 @@ CLEARANCE = 0.002
 """The least height above the ground of a shape that is no contact point [m]."""
 FOOT_CLEARANCE = 0.01
 """The least height for shapes of a link with a foot, which tilts while the robot moves [m]."""
+ABOUT_BALL, IN_BALL = 2.0, 0.9
+"""Radii of a ball that is a foot: what is nearer to its centre than the first is the foot's own, and hulls end within the
+second, as a fork that holds the ball would touch beside it when the leg leans."""
 
 
 def fit_to_ground(
@@ -62,10 +67,15 @@ def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescr
     ground = float(np.min(standing_heights(robot)))
     links, changed = [], []
     feet = {foot.link for foot in robot.feet}
+    balls = {robot.feet[ball.foot].link: ball for ball in ball_feet(robot)}
     for link in robot.links:
         rotation, position = poses[link.name]
         room = ground + (FOOT_CLEARANCE if link.name in feet else CLEARANCE) - position[2]
-        kept = [_above(shape, rotation, room) for shape in link.shapes]
+        shapes: list[Shape] = [*link.shapes]
+        if link.name in balls:
+            ends = [_without_ball(shape, balls[link.name]) for shape in shapes]
+            shapes = [shape for shape in ends if shape is not None]
+        kept = [_above(shape, rotation, room) for shape in shapes]
         if kept != [*link.shapes]:
             changed.append(link.name)
             shapes = tuple(shape for shape in kept if shape is not None)
@@ -78,6 +88,21 @@ def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescr
         "contact points stand for what touches it"
     )
     return robot.changed(links=tuple(links))
+
+
+def _without_ball(shape: Shape, ball: BallFoot) -> Shape | None:
+    """A shape of a leg's last link without what the ball that it ends in stands for, which touches the ground at whatever
+    angle the leg leans: none if that is all of it, else a hull that ends inside the ball."""
+    away = np.array(shape.corners) - ball.centre
+    far = np.linalg.norm(away, axis=1)
+    if far.max() + shape.radius <= ABOUT_BALL * ball.radius:
+        return None
+    near = far <= ABOUT_BALL * ball.radius
+    if isinstance(shape, Capsule) or not near.any():
+        return shape
+    share = np.where(near, np.minimum(1.0, IN_BALL * ball.radius / np.maximum(far, 1e-9)), 1.0)
+    corners = ball.centre + share[:, None] * away
+    return Hull.model_validate({"corners": [coarse(corner) for corner in corners]})
 
 
 def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:

@@ -1,9 +1,9 @@
 """Approximates meshes: by capsules where these lie nearly inside, else by convex hulls.
 
 A mesh is first taken for the box along its principal directions, and that for capsules. Where they reach beyond the mesh's
-own hull by more than a centimetre, as where a thigh is bent or wider at one end, the hull of some of the mesh's corners
-takes their place. It lies inside the mesh's hull and reaches nearly as far in every direction, so a robot touches things
-slightly later than with its own shapes, never earlier by more than that. Hollows are filled.
+own hull by more than 5 mm, as where a thigh is bent or wider at one end, the hull of some of the mesh's corners takes their
+place. It lies inside the mesh's hull and reaches nearly as far in every direction, so a robot touches things slightly later
+than with its own shapes, never earlier by more than that. Hollows are filled.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from ...mathematics.arrays import Array
 from ..shapes import THINNEST, spread
 from .capsules import Capsule, of_box
 
-BEYOND = 0.01
+BEYOND = 0.005
 """m; how far capsules may reach beyond the hull of the mesh that they stand for."""
 INSIDE = 0.01
-"""m; how far a hull may stay inside the mesh's own one."""
+"""m; how far a hull of some of its corners may stay inside the mesh's own one."""
 TIED = 1e-6
 """m; how nearly alike two directions lack reach, to be served together, so that mirrored meshes have mirrored hulls."""
 UNEVEN = 1e-4

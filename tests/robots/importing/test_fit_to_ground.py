@@ -9,10 +9,11 @@ from aloft.robots.description import RobotDescription, find_robot
 from aloft.robots.importing.fit_to_ground import (
     CLEARANCE,
     _above,
+    _without_ball,
     find_standing_pose,
     fit_to_ground,
 )
-from aloft.robots.kinematics import link_poses_in_base, standing_heights
+from aloft.robots.kinematics import BallFoot, link_poses_in_base, standing_heights
 from aloft.robots.shapes import Capsule, Hull
 
 from ..example_robots import needs_robots
@@ -103,6 +104,21 @@ def test_a_hull_is_cut_at_a_height() -> None:
     assert np.ptp(cut.corners, axis=0) == pytest.approx([0.2, 0.4, 0.4])
     assert _above(hull, upright, 0.0) is None
     assert _above(hull, upright, -0.0005) is None, "what is left is no body"
+
+
+def test_what_a_ball_stands_for_is_no_shape_of_its_leg() -> None:
+    ball = BallFoot(foot=0, point=0, radius=0.02, centre=np.array([0.0, 0.0, -0.3]))
+    rubber = Capsule(start=(0.0, -0.01, -0.3), end=(0.0, 0.01, -0.3), radius=0.02)
+    assert _without_ball(rubber, ball) is None
+    fork = [(x, y, z) for x in (-0.01, 0.01) for y in (-0.02, 0.02) for z in (-0.31, 0.0)]
+    leg = _without_ball(Hull(corners=tuple(fork)), ball)
+    assert isinstance(leg, Hull)
+    far = np.linalg.norm(np.array(leg.corners) - ball.centre, axis=1)
+    # the fork's four corners are inside the ball, and the knee's are where they were
+    assert sorted(np.round(far, 3))[:4] == pytest.approx([0.9 * ball.radius] * 4, abs=2e-4)
+    assert set(leg.corners) & set(fork) == {corner for corner in fork if corner[2] == 0.0}
+    knee = Hull(corners=tuple((x, y, z + 0.1) for x, y, z in fork))
+    assert _without_ball(knee, ball) is knee
 
 
 def test_a_low_shape_of_a_robot_is_cut_in_its_standing_pose() -> None:
