@@ -20,7 +20,7 @@ PLACE = 2e-3
 """m; a body within this of another one's mirrored place is its mirror image."""
 MASS = 1.1
 """The ratio from which the masses of mirror images differ."""
-SHARE = 0.01
+SHARE = 0.02
 """A body without a joint that has a larger share of the robot's mass is named."""
 NONE = 1e-3
 """kg; lighter bodies are frames."""
