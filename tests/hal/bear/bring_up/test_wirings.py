@@ -188,7 +188,7 @@ def and_long(names: Iterable[str]) -> Iterator[Any]:
         steps.add(step)
 
 
-@pytest.mark.parametrize("name", and_long(WIRINGS))
+@pytest.mark.parametrize("name", [*and_long(WIRINGS)])
 def test_it_is_found_by_its_step(name: str, tmp_path: Path) -> None:
     change, step, text = WIRINGS[name]
     wiring = Wiring.of(ROBOT)
