@@ -70,6 +70,7 @@ def test_a_strong_push_aside_is_landed_as_feet_seek_the_ground_softly(tmp_path: 
     assert landed[20.0] >= 3 > landed[60.0]
 
 
+@pytest.mark.long
 def test_the_parametric_jump_goes_higher():
     """As the block's defaults touch down; for a push it lands leaning back, with straighter legs."""
     settings = {"robot.seed": 5, "push.force": 0.0, "plan.rise": 0.1, "score.peak_tilt": 0.26}

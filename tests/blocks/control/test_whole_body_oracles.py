@@ -194,6 +194,7 @@ def check(monkeypatch, jumps, *, duration, every):
     return total
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:Converted matrix")
 def test_the_solvers_agree_on_states_of_a_jump(monkeypatch):
     assert check(monkeypatch, [JUMPS["torque-limited"]], duration=0.9, every=5) > 50
@@ -202,4 +203,4 @@ def test_the_solvers_agree_on_states_of_a_jump(monkeypatch):
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore:Converted matrix")
 def test_the_solvers_agree_on_the_states_of_four_jumps(monkeypatch):
-    assert check(monkeypatch, JUMPS.values(), duration=None, every=1) > 4_500
+    assert check(monkeypatch, JUMPS.values(), duration=None, every=8) > 550

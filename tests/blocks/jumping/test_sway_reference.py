@@ -11,6 +11,7 @@ from aloft.robots.description import find_robot
 ROBOT = find_robot("bruce")
 
 
+@pytest.mark.long
 def test_all_directions_sway_over_standing_feet() -> None:
     chosen = Sway((0.004, 0.01, 0.015), (0.1, 0.1, 0.1), 0.03, 1.0)
     table = _plan(ROBOT.model_dump_json(), chosen, 0.5, 4.0)
@@ -32,7 +33,7 @@ def test_robots_sway_as_far_as_their_size_allows() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["go2", "g1", "solo12", "a1", "anymal_c", "hyq", "talos"])
+@pytest.mark.parametrize("name", ["go2", "g1", "talos"])
 def test_no_robot_passes_its_limits(name: str) -> None:
     robot = find_robot(name)
     _plan(robot.model_dump_json(), usual_sway(robot), 0.1, 3.0)
