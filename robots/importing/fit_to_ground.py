@@ -71,15 +71,15 @@ def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescr
     for link in robot.links:
         rotation, position = poses[link.name]
         room = ground + (FOOT_CLEARANCE if link.name in feet else CLEARANCE) - position[2]
-        shapes: list[Shape] = [*link.shapes]
-        if link.name in balls:
-            ends = [_without_ball(shape, balls[link.name]) for shape in shapes]
-            shapes = [shape for shape in ends if shape is not None]
-        kept = [_above(shape, rotation, room) for shape in shapes]
+        kept = list[Shape]()
+        for shape in link.shapes:
+            rest = _without_ball(shape, balls[link.name]) if link.name in balls else shape
+            rest = None if rest is None else _above(rest, rotation, room)
+            if rest is not None:
+                kept.append(rest)
         if kept != [*link.shapes]:
             changed.append(link.name)
-            shapes = tuple(shape for shape in kept if shape is not None)
-            link = link.model_copy(update={"shapes": shapes})
+            link = link.model_copy(update={"shapes": tuple(kept)})
         links.append(link)
     if not changed:
         return robot
