@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .battery import Battery, spread_voltage
+from .contact_bias import ContactBias
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
 from .effects import SwitchEffects
@@ -166,9 +167,13 @@ class ExternalForces:
             )
 
 
-def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
+def step_calls(
+    model: MjModel, data: MjData, contact_bias: bool = False
+) -> tuple[LibraryCall, LibraryCall]:
     """The two parts of a physics step: what follows from the state, and the step with the present
     controls. Keep ``model`` and ``data`` alive.
+
+    With ``contact_bias`` Python calls the first part, and then corrects the contacts, see ``ContactBias``.
 
     Machine code and Python call the same two functions, so the bytes are the same. An error that is
     fatal to the simulator, such as no memory left for contacts, ends the process in machine code, and
@@ -178,10 +183,19 @@ def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
 
     first, second = _addresses()
     memory = model._address, data._address
+    begin = partial(mujoco.mj_step1, model, data)
+    if contact_bias:
+        begin, first = partial(begin_with_bias, begin, ContactBias(model, data)), 0
     return (
-        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
+        LibraryCall(begin, first, *memory),
         LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
     )
+
+
+def begin_with_bias(begin: Callable[[], Any], contacts: ContactBias) -> None:
+    """The first part of a physics step, with contacts that count their bias acceleration."""
+    begin()
+    contacts.correct()
 
 
 @cache
@@ -357,7 +371,7 @@ class Plant:
         self._encoding = KernelCall(
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
-        self.step1, self.step2 = step_calls(model, data)
+        self.step1, self.step2 = step_calls(model, data, self._params.contact_bias)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(
