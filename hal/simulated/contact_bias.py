@@ -14,6 +14,7 @@ It is a call of Python in every physics step.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,13 +33,13 @@ TURNING, MOVING = slice(0, 3), slice(3, 6)
 class ContactBias:
     """Takes the bias acceleration from the references of the ground's contacts with spheres.
 
-    Call it after what ``mj_step1`` computes and before ``mj_step2``. It has no state.
+    ``begin_step`` takes the place of ``mj_step1``. It has no state.
     """
 
     def __init__(self, model: MjModel, data: MjData) -> None:
         import mujoco
 
-        self._data = data
+        self._data, self._begin = data, partial(mujoco.mj_step1, model, data)
         self._body = model.geom_bodyid
         self._root = model.body_rootid[self._body]
         self._ground = self._body == 0
@@ -50,6 +51,11 @@ class ContactBias:
                 first, count = model.body_dofadr[body], model.body_dofnum[body]
                 self._moved_by[geom, first : first + count] = 1.0
                 body = int(model.body_parentid[body])
+
+    def begin_step(self) -> None:
+        """The first part of a physics step."""
+        self._begin()
+        self.correct()
 
     def correct(self) -> None:
         """Correct the references of the present contacts."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -167,41 +167,27 @@ class ExternalForces:
             )
 
 
-def step_calls(
-    model: MjModel, data: MjData, contact_bias: bool = False
-) -> tuple[LibraryCall, LibraryCall]:
-    """The two parts of a physics step: what follows from the state, and the step with the present
-    controls. Keep ``model`` and ``data`` alive.
+def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
+    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
+    and ``data`` must stay alive.
 
-    With ``contact_bias`` Python calls the first part, and then corrects the contacts, see ``ContactBias``.
-
-    Machine code and Python call the same two functions, so the bytes are the same. An error that is
-    fatal to the simulator, such as no memory left for contacts, ends the process in machine code, and
-    is an exception in Python. Of the simulator's memory a jump uses less than a hundredth.
+    Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the
+    simulator, such as no memory left for contacts, ends the process in machine code, and is an exception in Python.
+    Of the simulator's memory a jump uses less than a hundredth.
     """
     import mujoco
 
     first, second = _addresses()
     memory = model._address, data._address
-    begin = partial(mujoco.mj_step1, model, data)
-    if contact_bias:
-        begin, first = partial(begin_with_bias, begin, ContactBias(model, data)), 0
     return (
-        LibraryCall(begin, first, *memory),
+        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
         LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
     )
 
 
-def begin_with_bias(begin: Callable[[], Any], contacts: ContactBias) -> None:
-    """The first part of a physics step, with contacts that count their bias acceleration."""
-    begin()
-    contacts.correct()
-
-
 @cache
 def _addresses() -> tuple[int, int]:
-    """The addresses of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros
-    where it is not found, and then Python calls them."""
+    """Of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros where it is not found."""
     import mujoco
 
     folder, version = Path(mujoco.__file__).parent, mujoco.mj_versionString()
@@ -212,10 +198,8 @@ def _addresses() -> tuple[int, int]:
     return 0, 0
 
 
-SETTLING_TIME = 0.3
-"""The time that a robot settles for, before it is checked whether it stands [s]."""
-OBSERVED_TIME = 0.02
-"""The last part of the settling time, in which the load on the feet is averaged [s]."""
+SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
+"""How long a robot settles before it is checked whether it stands, and the last part of it, in which the load is averaged [s]."""
 
 
 class JointTorques(Protocol):
@@ -371,7 +355,9 @@ class Plant:
         self._encoding = KernelCall(
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
-        self.step1, self.step2 = step_calls(model, data, self._params.contact_bias)
+        self.step1, self.step2 = step_calls(model, data)
+        if self._params.contact_bias:
+            self.step1 = LibraryCall(ContactBias(model, data).begin_step, 0)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(
