@@ -230,6 +230,7 @@ def test_optuna_proposes_and_a_lost_part_is_made_again(
     assert result["tuned"]["high"] == said["arms"]["high"]["set"]
 
 
+@pytest.mark.long
 def test_part_of_a_study_and_plots_that_cannot_be_drawn(
     study: Path, folder: Path, call: Call, call_json: CallJson
 ) -> None:

@@ -81,6 +81,7 @@ def test_without_a_compiler_the_plan_is_the_same() -> None:
     assert np.abs(compiled.com - interpreted.com).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_near_plan_saves_iterations() -> None:
     near = make_task({"recipe": "paper", "name": "near", "rise": 0.15, "distance_x": 0.09})
     cold, warm = (
@@ -288,6 +289,7 @@ def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: PlannedJum
     assert not asks_for_finer(HIGH, None)
 
 
+@pytest.mark.long
 def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     coarse = checked(solve_jump(HIGH, ROBOT), ROBOT)
     assert not coarse.valid
