@@ -238,6 +238,7 @@ def test_a_replay_repeats_the_run_from_any_keyframe() -> None:
     assert replayed.identical and replayed.ran == ("wave", "sum", "motor")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("places", [{"motor": "b"}, {"block": "b", "sum": "c"}])
 def test_machines_in_lockstep_give_the_bytes_of_one_process(places: dict[str, str]) -> None:
     background, _ = both("Slow", 6)
