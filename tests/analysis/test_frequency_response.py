@@ -129,20 +129,12 @@ MEASURED = {"inputs": KNEE, "at": 1.5, "seeds": range(1000, 1005), "low": 1.0, "
 
 
 @pytest.mark.long
-def test_the_stance_of_the_jump_answers_as_its_linear_model_says_but_for_friction() -> None:
-    """With the sensors' noise; friction of the joints holds what is small, so no linear model has it."""
-    for friction, size, within in ((0.0, "0.1 N m", True), (1.0, "0.3 N m", False)):
-        changes = {**STANCE, "robot.joint_friction": friction}
-        graph = aloft.load(GRAPHS / "push.yaml", changes)
-        wire = "joint_pd.command.torque[*]"
-        model = linearise(graph, inputs=wire, outputs=wire, opened=True, at=1.5)
-        (found,) = frequency_responses(graph, size=size, **MEASURED)
-        predicted = loop_responses(model, 2.0 * np.pi * found.frequency)[
-            :, model.inputs.index(KNEE)
-        ]
-        share, ratio = found.holds(predicted).mean(), np.abs(found.value / predicted)
-        if within:
-            assert share >= 0.75, share
-            assert 0.85 < np.median(ratio) < 1.15
-        else:
-            assert share <= 0.4 and np.median(ratio) > 1.3, (share, np.median(ratio))
+def test_the_stance_of_the_jump_answers_as_its_linear_model_says() -> None:
+    """With the sensors' noise; without friction of the joints, which no linear model has."""
+    graph = aloft.load(GRAPHS / "push.yaml", {**STANCE, "robot.joint_friction": 0.0})
+    wire = "joint_pd.command.torque[*]"
+    model = linearise(graph, inputs=wire, outputs=wire, opened=True, at=1.5)
+    (found,) = frequency_responses(graph, size="0.1 N m", **MEASURED)
+    predicted = loop_responses(model, 2.0 * np.pi * found.frequency)[:, model.inputs.index(KNEE)]
+    assert found.holds(predicted).mean() >= 0.75
+    assert 0.85 < np.median(np.abs(found.value / predicted)) < 1.15

@@ -21,7 +21,6 @@ def test_a_process_is_timed_as_often_as_asked(tmp_path: Path) -> None:
 def test_a_process_that_fails_is_no_measurement(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="aloft check ended with 2"):
         time_process(["check", "nothing.yaml"], tmp_path, 1, warm=False)
-    assert time_process(["check", "nothing.yaml"], tmp_path, 1, codes=(2,), warm=False).wall > 0.0
 
 
 @pytest.mark.long

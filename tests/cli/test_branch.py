@@ -33,6 +33,7 @@ def recording(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "run.rrd"
 
 
+@pytest.mark.long
 def test_the_same_parameters_and_others(recording: str) -> None:
     same = run_for_json("branch", recording, "--at", "0.5")
     assert same["reason"] == "as recorded, every byte of 150 ticks"

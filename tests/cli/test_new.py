@@ -31,6 +31,7 @@ def passing_tests(folder: Path) -> int:
     return int(done.stdout.split(" passed")[0].split()[-1])
 
 
+@pytest.mark.long
 def test_a_project_with_a_block_and_a_graph_and_a_robot_passes_its_tests(
     here: Path, call: Call
 ) -> None:

@@ -51,7 +51,9 @@ def running(sockets: Path, start: Start) -> Iterator[subprocess.Popen[str]]:
         process.communicate(timeout=240)
 
 
-def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: CallJson) -> None:
+def test_list_get_set_and_what_is_refused(
+    running: subprocess.Popen[str], call: Call, call_json: CallJson
+) -> None:
     listed = call_json("params", "list")
     assert listed["graph"] == "tune"
     assert [entry["path"] for entry in listed["parameters"]] == [
@@ -67,6 +69,7 @@ def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: Cal
     assert first.partition(":")[0] == second.partition(":")[0]
     values = call_json("params", "get", "gain.gain", "wave.frequency")["values"]
     assert values == {"gain.gain": 2.0, "wave.frequency": 0.5}
+    expect_refusals(call, call_json)
     running.send_signal(signal.SIGINT)
     output, _ = running.communicate(timeout=240)
     changes = json.loads(output)["parameter_changes"]
@@ -75,12 +78,13 @@ def test_list_get_set(running: subprocess.Popen[str], call: Call, call_json: Cal
     ]  # fmt: skip
 
 
-def test_what_is_refused(running: subprocess.Popen[str], call: Call, call_json: CallJson) -> None:
+def expect_refusals(call: Call, call_json: CallJson) -> None:
+    """What the run cannot do is said, and changes nothing."""
     errors = call("params", "set", "gain.gain=high", "gain.n=3", "gian.gain=1", code=2).stderr
     assert "gain.gain cannot be high" in errors
     assert "gain.n cannot be changed while the graph runs" in errors
     assert "there is no block 'gian' in the running graph" in errors
-    assert call("params", "get", "gain.gain").stdout == "1.0\n"
+    assert call("params", "get", "gain.gain").stdout == "2.0\n"
     reason = call_json("params", "get", "gain.gian", code=2)["reason"]
     assert reason == "there is no parameter 'gain.gian'; the nearest is gain.gain"
     reason = call_json("params", "list", "--run", "other", code=2)["reason"]
@@ -144,6 +148,7 @@ PAGES = [
 ]
 
 
+@pytest.mark.long
 def test_pages_of_it(running: subprocess.Popen[str], start: Start) -> None:
     pages = [start(*words) for words, _ in PAGES]
     try:

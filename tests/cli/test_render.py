@@ -30,7 +30,7 @@ def pushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def renderer(pushed: Path) -> None:
     robot = read(pushed).header.robot
     assert robot is not None
@@ -45,12 +45,12 @@ def test_a_film_has_a_picture_for_each_step_of_time(
     pushed: Path, renderer: None, tmp_path: Path
 ) -> None:
     film = tmp_path / "film.gif"
-    words = ("--from", "0.1", "--to", "0.4", "--speed", "0.5", "--rate", "10", *SMALL)
+    words = ("--from", "0.1", "--to", "0.2", "--speed", "0.5", "--rate", "10", *SMALL)
     found = run_for_json("render", str(pushed), "-o", str(film), *words)
-    assert found == {"success": True, "file": str(film), "pictures": 7}
+    assert found == {"success": True, "file": str(film), "pictures": 3}
     with Image.open(film) as image:
         assert (image.size, image.info["duration"]) == ((120, 122), 100)
-        assert 1 < image.n_frames <= 7, "equal pictures are one that stays longer"
+        assert 1 < image.n_frames <= 3, "equal pictures are one that stays longer"
     again = tmp_path / "again.gif"
     run_for_json("render", str(pushed), "-o", str(again), *words)
     assert film.read_bytes() == again.read_bytes()
@@ -66,6 +66,7 @@ def test_a_recording_that_is_not_there_is_one_line(words: list[str], tmp_path: P
     assert "there is no" in done.stderr
 
 
+@pytest.mark.long
 def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path: Path) -> None:
     one, two = tmp_path / "one.png", tmp_path / "two.png"
     run_here("render", str(pushed), "-o", str(one), "--at", "0.3", *SMALL, "--caption", "a")
@@ -83,6 +84,7 @@ def test_several_runs_stand_side_by_side(pushed: Path, renderer: None, tmp_path:
     assert red[0] > 2 and red[1] == 0, "the forces on the feet"
 
 
+@pytest.mark.long
 def test_several_runs_in_one_picture(pushed: Path, renderer: None, tmp_path: Path) -> None:
     one, two = tmp_path / "one.png", tmp_path / "two.png"
     words = ("--at", "0.3", *SMALL, "--no-forces", "--caption", "a")
@@ -94,6 +96,7 @@ def test_several_runs_in_one_picture(pushed: Path, renderer: None, tmp_path: Pat
     assert not np.array_equal(both[100:], alone[100:]), "the second caption"
 
 
+@pytest.mark.long
 def test_plots_beside_the_run(pushed: Path, renderer: None, tmp_path: Path) -> None:
     lines = []
     for at in ("0.1", "0.4"):

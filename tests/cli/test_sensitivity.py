@@ -39,6 +39,7 @@ def ranked(folder: Path) -> Path:
     return folder / "study.yaml"
 
 
+@pytest.mark.long
 def test_parameters_are_ranked_and_drawn(
     ranked: Path, call_json: Callable[..., dict[str, Any]]
 ) -> None:

@@ -13,6 +13,7 @@ Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
 
 
+@pytest.mark.long
 def test_bruce_squats_and_is_recorded(folder: Path, call_json: CallJson) -> None:
     found = call_json("stand", "--squat", "5cm", "--seed", "3")
     assert found["success"] is True

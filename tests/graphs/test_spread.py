@@ -1,4 +1,4 @@
-"""Every shipped graph, spread over three machines at random, gives the bytes of one process."""
+"""Every kind of shipped graph, spread over three machines at random, gives the bytes of one process."""
 
 from pathlib import Path
 
@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 
 from aloft.runtime.loading import load
-from aloft.runtime.loading.reading.files import shipped_graphs
 from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 
+from ..shipped import kinds
+
 MACHINES = {name: f"tcp/127.0.0.1:{7450 + k}" for k, name in enumerate("abc")}
 TICKS = 25
+GRAPHS = kinds()
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("address", [a for a in shipped_graphs() if a != "aloft:robots/jump"])
+@pytest.mark.parametrize("address", GRAPHS)
 def test_bytes_do_not_depend_on_the_split(address: str) -> None:
-    graph = load(shipped_graphs()[address])
+    graph = load(GRAPHS[address])
     rng = np.random.default_rng(len(address))
     places = {spec.path: str(rng.choice(list(MACHINES))) for spec in graph.blocks}
     alone = run(graph, TICKS)

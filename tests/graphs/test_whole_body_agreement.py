@@ -94,17 +94,15 @@ def test_it_agrees_while_standing():
 
 
 @pytest.mark.long
-def test_it_agrees_on_thousands_of_states_of_jumps():
+def test_it_agrees_on_hundreds_of_states_of_jumps():
     watches = [
-        compare("jump"),
-        compare("forward_20cm"),
-        compare("up_5cm"),
-        compare("push"),
-        compare("somersault", {"wbc.torque_margin": 0.8}),
+        compare("up_5cm", every=4),
+        compare("push", every=4),
+        compare("somersault", {"wbc.torque_margin": 0.8}, every=4),
     ]
     errors = np.concatenate([watch.errors for watch in watches])
-    assert len(errors) > 5000
+    assert len(errors) > 700
     assert errors.max() < 1e-6
-    assert sum(watch.limited for watch in watches) > 50
+    assert sum(watch.limited for watch in watches) > 10
     stances = {count for watch in watches for count in watch.stances}
     assert {2, 4} <= stances

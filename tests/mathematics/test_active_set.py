@@ -94,8 +94,8 @@ def test_it_agrees_with_quadprog(solver):
 
 
 @pytest.mark.long
-def test_it_agrees_with_quadprog_on_fifty_thousand_programs(solver):
-    assert compare(solver, 1, 50_000) > 5_000
+def test_it_agrees_with_quadprog_on_ten_thousand_programs(solver):
+    assert compare(solver, 1, 10_000) > 1_000
 
 
 def test_the_answer_does_not_depend_on_what_was_solved_before(solver):

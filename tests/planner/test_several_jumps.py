@@ -175,6 +175,7 @@ def test_free_times_out_of_the_plane_are_those_straight_ahead() -> None:
     assert plan.lift_off_time == pytest.approx(straight.lift_off_time, abs=1e-5)
 
 
+@pytest.mark.long
 def test_several_jumps_aside_and_round() -> None:
     task = make_task({"recipe": "paper", "name": "aside", "rise": 0.08, "jumps": [{"distance_y": 0.05}, {"twist": 0.3}],
                       "contact_time": 0.3})  # fmt: skip

@@ -115,10 +115,8 @@ def test_a_graph_that_does_not_repeat_itself_is_found(
     ("drawn", "begins"),
     [
         ({"push.force": "31 N", "push.angle": "200 deg", "push.delay": "0.1 s"}, 500),
-        ({"push.force": "110 N", "push.delay": "0.02 s"}, 500),
         ({"landing.w_k": [0.1, 0.1], "step.margin": "5 mm"}, 0),
         ({"wbc.landing.torso_weight": [3.0, 3.0, 4.0]}, 500),
-        ({"estimator.velocity_gain": 0.3}, 0),
     ],
 )
 def test_jumps_share_all_before_the_push(drawn: Mapping[str, Any], begins: int) -> None:

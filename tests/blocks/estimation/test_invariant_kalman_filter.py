@@ -185,6 +185,7 @@ def test_starts_at_the_truth_and_stays_there():
     assert np.abs(run.to(0.2).error()).max() < 1e-6
 
 
+@pytest.mark.long
 def test_follows_a_squat_without_noise():
     run = Run(SQUAT)
     for end in (0.3, 0.4, 0.5, 0.6, 0.7):

@@ -220,22 +220,22 @@ blocks:
 """
 
 
-@needs_compiler
-@pytest.mark.long
-def test_a_jump_with_its_controller_as_a_library(tmp_path: Path) -> None:
-    """Every byte of what the simulated robot senses and gets is that of the graph in Python."""
-    write_library("aloft:jump.yaml", tmp_path / "jumper")
-    graphs = Path(aloft.__file__).parent / "graphs"
-    text = JUMP.replace("folder: jumper", f"folder: {tmp_path / 'jumper'}")
+@pytest.fixture(scope="module")
+def jumper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, aloft.RunResult]:
+    """The controller of the jump as a library, and the jump of the graph in Python."""
+    library = tmp_path_factory.mktemp("jump") / "jumper"
+    write_library("aloft:jump.yaml", library)
     wanted = aloft.load("aloft:jump.yaml").run()
     wanted.raise_if_failed()
-    ticks = len(wanted.signal("robot.imu.specific_force"))
-    result = aloft.load(text, path=graphs / "sil.yaml").run(ticks / 500)
-    assert ticks > 1000
-    compare_jumps(result, wanted)
+    assert wanted.ticks > 1000
+    return library, wanted
 
 
-def compare_jumps(result: aloft.RunResult, wanted: aloft.RunResult) -> None:
+def compare_jumps(folder: str, wanted: aloft.RunResult) -> None:
+    """Every byte of what the simulated robot senses and gets is that of the graph in Python."""
+    text = JUMP.replace("folder: jumper", f"folder: {folder}")
+    graphs = Path(aloft.__file__).parent / "graphs"
+    result = aloft.load(text, path=graphs / "sil.yaml").run(wanted.ticks / 500)
     fields = ("mode", "torque", "position", "velocity", "stiffness", "damping")
     pairs = {f"controller.safety_command.{f}": f"safety.command.{f}" for f in fields}
     sensed = ("imu.angular_velocity", "imu.specific_force", "joints.position", "contacts.closed")
@@ -243,6 +243,13 @@ def compare_jumps(result: aloft.RunResult, wanted: aloft.RunResult) -> None:
     for own, name in pairs.items():
         assert result.signal(own).tobytes() == wanted.signal(name).tobytes(), name
     assert np.ptp(wanted.signal("safety.command.torque")) > 5.0
+
+
+@needs_compiler
+@pytest.mark.long
+def test_a_jump_with_its_controller_as_a_library(jumper: tuple[Path, aloft.RunResult]) -> None:
+    library, wanted = jumper
+    compare_jumps(str(library), wanted)
 
 
 @contextmanager
@@ -316,13 +323,10 @@ def test_a_process_in_real_time_answers_and_counts_its_deadlines(
 
 @needs_compiler
 @pytest.mark.long
-def test_a_jump_with_its_controller_in_a_process(tmp_path: Path) -> None:
-    write_library("aloft:jump.yaml", tmp_path / "jumper")
-    graphs = Path(aloft.__file__).parent / "graphs"
+def test_a_jump_with_its_controller_in_a_process(
+    jumper: tuple[Path, aloft.RunResult], tmp_path: Path
+) -> None:
+    library, wanted = jumper
     memory = tmp_path / "memory"
-    text = JUMP.replace("folder: jumper", f"folder: {tmp_path / 'jumper'}, memory: {memory}")
-    wanted = aloft.load("aloft:jump.yaml").run()
-    ticks = len(wanted.signal("robot.imu.specific_force"))
-    with process(tmp_path / "jumper", memory, "--lockstep"):
-        result = aloft.load(text, path=graphs / "sil.yaml").run(ticks / 500)
-    compare_jumps(result, wanted)
+    with process(library, memory, "--lockstep"):
+        compare_jumps(f"{library}, memory: {memory}", wanted)

@@ -63,6 +63,7 @@ def test_the_end_is_slow_and_a_jump_follows_another_until_then() -> None:
     assert len(lift_offs) == 6
 
 
+@pytest.mark.long
 def test_rows_that_nothing_can_jump_are_refused() -> None:
     with pytest.raises(BlockError, match="no row of jumps of"):
         BlockBench(SpeedPlan, {"flight_time": 2.9, "contact_time": 0.25}, robot="bruce")

@@ -147,6 +147,7 @@ def test_what_the_robot_cannot_do_is_refused(changes, part):
     assert part in str(error.value)
 
 
+@pytest.mark.long
 def test_a_quadruped_with_ball_feet_jumps_too():
     robot = quadruped()
     task = {

@@ -32,7 +32,7 @@ def test_robots_sway_as_far_as_their_size_allows() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["go2", "g1", "solo12", "a1", "anymal_c", "hyq", "talos"])
+@pytest.mark.parametrize("name", ["go2", "g1", "talos"])
 def test_no_robot_passes_its_limits(name: str) -> None:
     robot = find_robot(name)
     _plan(robot.model_dump_json(), usual_sway(robot), 0.1, 3.0)

@@ -19,6 +19,8 @@ from aloft.mathematics.rotations import matrices_of_quaternions, quaternions_of_
 from aloft.robots.kinematics import link_poses
 from aloft.robots.robot_description import RobotDescription
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[3]
 
 
@@ -222,7 +224,6 @@ def test_a_bag_is_one_that_ros2s_readers_take(
     assert [each.name for each in tmp_path.iterdir()] == ["a_bag"]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("kind", ["csv", "parquet", "mcap"])
 def test_an_export_never_has_all_rows_in_memory(
     runs: list[RecordedRun], kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -98,21 +98,11 @@ def test_no_message_is_taken_for_intact_with_any_of_its_bytes_changed(whole: Pat
         assert again == message
 
 
-STRIDE = 61
-"""Of so many bytes one is changed: all would take a quarter of an hour. Every message is tried above."""
-
-
 def test_a_changed_head_of_the_last_message_is_found(whole: Path, tmp_path: Path) -> None:
     """With a greater length it looks like a message that was cut short."""
     last = read(whole).scan.messages[-1]
     places = np.arange(last.place, last.place + HEAD.size)
     expect_found(whole, tmp_path, np.repeat(places, 8), np.tile(np.arange(8), HEAD.size))
-
-
-@pytest.mark.long
-def test_changed_bytes_all_over_the_file_are_found(whole: Path, tmp_path: Path) -> None:
-    places = np.arange(0, whole.stat().st_size, STRIDE)
-    expect_found(whole, tmp_path, places, places % 8)
 
 
 def test_a_lost_batch_is_named_and_the_rest_is_kept(whole: Path, tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ class KillLater:
         """Nothing."""
 
 
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(4))
 def test_the_recorder_is_killed(number: int, tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     recorder = Recorder(path, flush_period=0.02, keyframe_period=0.5)
@@ -78,7 +78,7 @@ def test_the_recorder_is_killed(number: int, tmp_path: Path) -> None:
         assert read(part).ticks.tolist() == before
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(3))
 def test_the_run_is_killed(number: int, tmp_path: Path) -> None:
     graph(tmp_path, seconds=600.0)
     path, moment = tmp_path / "run.rrd", random.Random(100 + number)

@@ -26,6 +26,8 @@ from aloft.runtime.transports.hub import Hub
 
 from ...runtime.links.example_graphs import ring
 
+pytestmark = pytest.mark.long
+
 Made = tuple[PlacedGraph, dict[str, Path], Path]
 
 
@@ -51,7 +53,6 @@ def same(one: RecordedRun, other: RecordedRun) -> None:
         assert one.snapshot(tick) == other.snapshot(tick)
 
 
-@pytest.mark.long
 def test_the_merged_recording_is_that_of_one_process(made: Made, tmp_path: Path) -> None:
     placed, paths, alone = made
     parts = read_parts(placed, paths)

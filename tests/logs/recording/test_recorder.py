@@ -161,6 +161,7 @@ def test_what_finds_no_room_is_counted_and_noted(tmp_path: Path) -> None:
     assert recorded.rows.tobytes() == result.log.rows()[recorded.ticks].tobytes()
 
 
+@pytest.mark.long
 def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "a.rrd", flush_period=0.05)
     wait = At(999, lambda: until(lambda: len(ticks_in(tmp_path / "a.part.rrd")) >= 1000))
@@ -182,6 +183,7 @@ def test_the_run_goes_on_when_the_recorder_is_killed(tmp_path: Path) -> None:
     assert recorded.outcome is None
 
 
+@pytest.mark.long
 def test_a_full_disk_is_a_warning(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     told: list[str] = []
     recorder = Recorder(tmp_path / "a.rrd", on_warning=told.append)

@@ -39,7 +39,7 @@ def taken(reader: RingReader, most: int = 1000) -> list[tuple[int, int, bytes]]:
     return found
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(st.one_of(st.integers(0, 500), st.none()), max_size=60))
 def test_what_goes_in_comes_out(steps: list[int | None]) -> None:
     """A number writes so many bytes, nothing reads; never is a record lost, cut or mixed up."""

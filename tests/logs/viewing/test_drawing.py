@@ -21,7 +21,7 @@ def filled(ticks: np.ndarray, written: np.ndarray, values: np.ndarray) -> np.nda
 ODD = np.array([0.0, -0.0, np.nan, -np.nan, 1.0, np.nextafter(1.0, 2.0)])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     batches=st.lists(
         st.lists(st.tuples(st.integers(1, 3), st.integers(0, 5), st.integers(0, 1)), min_size=1),

@@ -183,6 +183,7 @@ def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
             assert links == expected, stretch.phase
 
 
+@pytest.mark.long
 def test_knees_keep_off_the_ground_also_at_the_end() -> None:
     """Where only the base is given: the last knot has no interval, and its joints are free."""
     for robot, watched in ((find_robot("go2"), True), (ROBOT, False)):

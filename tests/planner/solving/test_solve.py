@@ -74,6 +74,7 @@ def test_ipopt_finds_the_same_optimum() -> None:
     assert np.abs(fatrop.com - ipopt.com).max() < 2e-3
 
 
+@pytest.mark.long
 def test_without_a_compiler_the_plan_is_the_same() -> None:
     compiled, interpreted = solve_jump(FORWARD, ROBOT), solve_jump(FORWARD, ROBOT, compiled=False)
     assert not interpreted.statistics["compiled"]
@@ -113,6 +114,7 @@ def test_a_start_from_a_neighbour_takes_fewer_iterations_to_a_plan_as_good(
     assert check_plan(warm, ROBOT).explain() == ""
 
 
+@pytest.mark.long
 def test_a_jump_beyond_the_motors_is_refused_with_a_family() -> None:
     with pytest.raises(PlanError, match="no plan for 'moon'") as caught:
         solve_jump(make_task({"recipe": "paper", "name": "moon", "rise": 0.8}), ROBOT)
@@ -163,6 +165,7 @@ def test_derivatives_are_those_of_the_constraints() -> None:
     assert np.abs(bend - change).max() < 1e-5 * np.abs(bend).max()
 
 
+@pytest.mark.long
 def test_equations_are_independent_at_the_guess() -> None:
     problem = make_problem(FORWARD, ROBOT)
     assert smallest_singular_value(problem, ballistic_guess(problem)) > 1e-7
@@ -190,6 +193,7 @@ def test_only_the_motors_are_made_stronger() -> None:
         assert stronger.row_lower[k] == factor * problem.row_lower[k]
 
 
+@pytest.mark.long
 def test_limits_come_down_to_the_real_ones() -> None:
     problem = make_problem(TASK, ROBOT)
     easy = solve(eased(problem, 1.5), ballistic_guess(problem), solver="fatrop")
@@ -201,6 +205,7 @@ def test_limits_come_down_to_the_real_ones() -> None:
     assert found.cost > easy.cost
 
 
+@pytest.mark.long
 def test_limits_out_of_reach_are_not_reached() -> None:
     high = make_problem(make_task({"recipe": "paper", "name": "high", "rise": 0.45}), ROBOT)
     easy = solve(eased(high, 2.0), ballistic_guess(high), solver="fatrop")
@@ -324,6 +329,7 @@ def test_an_invalid_plan_is_not_refined_without_end(by_hand: PlannedJump) -> Non
     assert len(calls) <= 3
 
 
+@pytest.mark.long
 def test_a_plan_on_another_grid_is_a_start() -> None:
     first = make_task({"recipe": "paper", "name": "low", "rise": 0.14})
     fine = solve_jump(first, ROBOT, knots=finer_knots(solve_jump(first, ROBOT)))

@@ -4,6 +4,7 @@ Files that are whole or not there, and what a killed process leaves behind.
 """
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,7 @@ VALUES = st.recursive(
 )
 TASKS = st.dictionaries(KEYS, VALUES, max_size=6)
 MANY = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
@@ -149,7 +150,7 @@ def test_whatever_text_is_a_task_or_a_clear_error(tmp_path: Path, text: str) -> 
     path = tmp_path / "any.yaml"
     path.write_text(text, encoding="utf-8", errors="replace")
     for read in (read_task, read_grid):
-        with pytest.raises(JumpTaskError):
+        with suppress(JumpTaskError):  # ``rise: 1`` is a task
             read(path)
 
 

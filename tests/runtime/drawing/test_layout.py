@@ -1,10 +1,12 @@
 """Drawings: nothing overlaps, lines have right angles, and every wire arrives at its port."""
 
 import time
+from functools import cache
 from itertools import pairwise
 from random import Random
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
 from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire, diagram
@@ -59,14 +61,18 @@ def drawn(diagram: Diagram) -> Drawing:
     return drawing
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(NAMES, NAMES), min_size=1, max_size=24))
 def test_any_graph_can_be_drawn(edges: list[tuple[str, str]]) -> None:
     drawn(diagram_of(edges))
 
 
+@cache
+def jump() -> Drawing:
+    return drawn(diagram(load("aloft:jump")))
+
+
 def test_the_jump_fits_on_one_screen() -> None:
-    drawing = drawn(diagram(load("aloft:jump")))
+    drawing = jump()
     assert drawing.width < 2500 and drawing.height < 1000  # scaled to 0.8 on a screen of 1920
 
 
@@ -88,7 +94,7 @@ def crossings(drawing: Drawing) -> int:
 
 
 def test_the_jump_is_read_from_the_robot_to_the_safety_monitor_with_few_crossings() -> None:
-    drawing = draw(diagram(load("aloft:jump")))
+    drawing = jump()
     order = sorted(drawing.boxes, key=lambda path: drawing.boxes[path].x)
     assert order[0] == "robot" and order[-1] == "safety"
     assert order.index("estimator") < order.index("dynamics") < order.index("wbc")
@@ -111,6 +117,7 @@ def test_a_thousand_blocks_are_drawn_in_seconds() -> None:
     assert time.process_time() - began < 5.0
 
 
+@pytest.mark.long
 def test_a_graph_of_another_robot_is_drawn() -> None:
     drawn(diagram(load("aloft:robots/go2_jump")))
 

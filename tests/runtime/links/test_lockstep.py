@@ -55,10 +55,9 @@ def test_the_random_graphs_go_forth_and_back_within_a_tick() -> None:
     assert returns >= 5
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_jump_in_a_random_split(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    graph = load(GRAPHS / "jump.yaml", {"robot.seed": 3 + seed})
+def test_a_jump_in_a_random_split() -> None:
+    rng = np.random.default_rng(0)
+    graph = load(GRAPHS / "jump.yaml", {"robot.seed": 3})
     machines = endpoints("a", "b", "c")
     places = {spec.path: str(rng.choice(list(machines))) for spec in graph.blocks}
     alone = run(graph, 60)  # first: compiling kernels takes longer than parts wait for each other

@@ -28,6 +28,8 @@ from aloft.runtime.running.pacing import WallTime
 from aloft.runtime.running.ticker import Ticker
 from aloft.runtime.testing import BlockUse, checked_graph
 
+from ...shipped import kinds
+
 GRAPHS = Path(__file__).parents[3] / "graphs"
 
 
@@ -358,18 +360,14 @@ def test_without_a_clock_for_machine_code_timed_blocks_are_not_fused(
     assert ticker(fuse=False).fuse()
 
 
-SHIPPED = sorted(
-    p.relative_to(GRAPHS).as_posix()
-    for p in (*GRAPHS.glob("*.yaml"), *GRAPHS.glob("robots/*.yaml"))
-    if p != GRAPHS / "robots/jump.yaml"  # the others in its folder include it and name the robot
-)
+SHIPPED = kinds(of_robots=True)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", SHIPPED)
-def test_every_shipped_graph_has_the_same_bytes(name: str) -> None:
+@pytest.mark.parametrize("address", SHIPPED)
+def test_every_kind_of_shipped_graph_has_the_same_bytes(address: str) -> None:
     try:
-        checked = load(GRAPHS / name).checked
+        checked = load(SHIPPED[address]).checked
     except LoadError as error:
         if "pip install example-robot-data" in str(error):
             pytest.skip("example-robot-data is not installed")

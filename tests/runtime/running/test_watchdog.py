@@ -235,19 +235,14 @@ def start(mode: str) -> subprocess.Popen[str]:
 def test_a_signal_stops_cleanly(number: signal.Signals, code: int) -> None:
     process = start("runs")
     process.send_signal(number)
-    output, _ = process.communicate(timeout=240)
+    output, errors = process.communicate(timeout=240)
     name = signal.Signals(number).name
     assert output.splitlines() == [*["stop cycle"] * 5, "close", f"stopped by {name}"]
     assert process.returncode == code
-
-
-def test_the_first_ctrl_c_says_what_happens() -> None:
-    process = start("runs")
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=240)
-    assert errors == (
-        "\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
-    )
+    if number is signal.SIGINT:
+        assert errors == (
+            "\nstopping after this tick, the robot in damping; Ctrl-C again ends a block that hangs\n"
+        )
 
 
 def test_a_second_signal_ends_a_block_that_hangs() -> None:
@@ -280,10 +275,9 @@ def test_stop_cycles_that_hang_can_be_ended_one_by_one() -> None:
     assert process.returncode == 130
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_burst_of_signals_never_keeps_stop_cycles_from_going_out(seed: int) -> None:
+def test_a_burst_of_signals_never_keeps_stop_cycles_from_going_out() -> None:
     process = start("burst")
-    pauses = random.Random(seed)
+    pauses = random.Random(0)
     for _ in range(40):
         process.send_signal(signal.SIGINT)
         time.sleep(pauses.uniform(0.0, 0.001))

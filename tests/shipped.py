@@ -1,0 +1,39 @@
+"""The shipped graphs that differ in kind."""
+
+from pathlib import Path
+
+import yaml
+
+from aloft.runtime.loading.reading.files import FOLDER, shipped_graphs
+
+
+def kinds(of_robots: bool = False) -> dict[str, Path]:
+    """By address the first of the shipped graphs that have the same kinds of blocks (and, if that is
+    asked for, the same robot): those that another task, another scene or another length makes of it
+    run the same code with other numbers."""
+    found: dict[object, tuple[str, Path]] = {}
+    for address, path in shipped_graphs().items():
+        robot, used = contents(path)
+        if address != "aloft:robots/jump":  # the others in its folder include it and name the robot
+            found.setdefault((used, robot if of_robots else ""), (address, path))
+    return dict(found.values())
+
+
+def contents(path: Path) -> tuple[str, frozenset[str]]:
+    """The robot that a graph names, and the kinds of blocks that it and what it includes have."""
+    tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    robot, used = tree.get("robot", ""), set()
+    for block in tree.get("blocks", {}).values():
+        used.add(str(block.get("use")))
+    for name, value in tree.get("set", {}).items():
+        if name.endswith(".use"):
+            used.add(str(value))
+    for name in tree.get("include", ()):
+        file = (
+            FOLDER / name.removeprefix("aloft:")
+            if name.startswith("aloft:")
+            else path.parent / name
+        )
+        theirs, more = contents(file)
+        robot, used = robot or theirs, used | more
+    return robot, frozenset(used)
