@@ -164,7 +164,7 @@ def side_clearance(
     from the ground, or as the standing robot is. Links of other robots keep ``ROUNDING`` from it."""
     if edge is None or hop.rotation or not ball_feet(robot):
         return 0.0
-    before, behind = edge_room(robot, hop, start, end)
+    before, behind = edge_room(robot, hop, start, end, apart)
     stands = abs(before - edge if step_of(hop, start) > 0.0 else behind - edge)
     return min(apart, max(0.0, stands - 2.0 * ROUNDING))
 

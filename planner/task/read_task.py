@@ -289,13 +289,18 @@ def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
 
 
 def edge_room(
-    robot: RobotDescription, hop: Hop, start: StanceLocation, end: StanceLocation
+    robot: RobotDescription,
+    hop: Hop,
+    start: StanceLocation,
+    end: StanceLocation,
+    above: float = 0.0,
 ) -> tuple[float, float]:
-    """Between which x [m] an edge under a jump is under no foot, and nothing of the standing robot in the step: from the
-    front of the robot where it begins to its back where it lands, the former first. A robot that lands near
-    where it stood has no such room: the former is then beyond the latter."""
+    """Between which x [m] an edge under a jump is under no foot, and nothing of the standing robot in the step, or less
+    than ``above`` [m] over it: from the front of the robot where it begins to its back where it lands, the former first.
+    A robot that lands near where it stood has no such room: the former is then beyond the latter."""
     before, behind = (
-        list(_reaches(robot, place, higher)) for _, place, higher in _stances(hop, start, end)
+        list(_reaches(robot, place, higher + above if higher > 0.0 else higher))
+        for _, place, higher in _stances(hop, start, end)
     )
     if (hop.distance_x or 0.0) >= 0.0:
         return max(front for _, _, front in before), min(back for _, back, _ in behind)

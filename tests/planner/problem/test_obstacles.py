@@ -104,7 +104,10 @@ def test_a_step_counts_from_its_edge_on_and_the_higher_ground_a_little_further(
 
 
 @needs_robots
-@pytest.mark.parametrize(("step", "way"), [(-0.2, 1.0), (-0.2, -1.0), (0.12, 1.0)])
+@pytest.mark.parametrize(
+    ("step", "way"),
+    [(-0.2, 1.0), (-0.2, -1.0), (0.12, 1.0), (-0.12, 1.0)],  # its knees are just above the last
+)
 def test_folding_knees_keep_off_a_step_s_side(step: float, way: float) -> None:
     """As far as from the ground, or as the standing robot is, whose knees would be in the way for ever."""
     robot = find_robot("go2")
@@ -123,7 +126,7 @@ def test_folding_knees_keep_off_a_step_s_side(step: float, way: float) -> None:
     task = make_task(
         {"name": "a", "robot": "go2", "rise": 0.2, "distance_x": 0.9 * way, "landing_height": step}
     )
-    before, behind = edge_room(robot, task.hops()[0], *task.places())
+    before, behind = edge_room(robot, task.hops()[0], *task.places(), 0.03)
     assert (behind - before) * way > 0.1
     tight = before if step > 0.0 else behind
     inwards = math.copysign(1.0, 0.5 * (before + behind) - tight)
