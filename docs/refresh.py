@@ -33,6 +33,7 @@ from result_tables import (
     every_robot_table,
     frontier_table,
     impulse_table,
+    mutated_robots_table,
     quarter_table,
     ratio_table,
     real_table,
@@ -265,8 +266,7 @@ def write_every_robot(file: Path) -> None:
 
 def write_mutated_robots(file: Path) -> None:
     """What becomes of real descriptions with one thing made wrong."""
-    rows = [row for row in read_json(file)["rows"] if row["value"] is not None]
-    text = every_robot_table(rows, "what was made wrong", "cases")
+    text = mutated_robots_table(read_json(file)["rows"])
     refresh(DOCS / "robots_results.md", "mutated robots", text)
 
 

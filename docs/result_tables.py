@@ -284,13 +284,35 @@ def tasks_table(summary: Row) -> str:
     return table(TASKS_HEAD, map(_task, summary["rows"]))
 
 
-def every_robot_table(rows: Sequence[Row], what: str = "file", unit: str = "joints") -> str:
-    """One row a file or kind of mistake: its joints or cases, and what became of it."""
+def every_robot_table(rows: Sequence[Row]) -> str:
+    """One row a file: its joints, and what became of it."""
     return table(
-        (what, unit, "what became of it"),
+        ("file", "joints", "what became of it"),
         (
             (row["name"], "" if row["value"] is None else f"{row['value']:.0f}", row["note"])
             for row in rows
+        ),
+    )
+
+
+def mutated_robots_table(rows: Sequence[Row]) -> str:
+    """One row a kind of mistake, with what became of its cases in each format; none where a format has no such kind.
+
+    The rows are those of ``aloft bench mutated_robots``, called ``FORMAT: KIND``.
+    """
+    found: dict[str, dict[str, str]] = {}
+    formats: dict[str, None] = {}
+    for row in rows:
+        name, colon, kind = row["name"].partition(": ")
+        if colon and row["value"] is not None:
+            found.setdefault(kind, {})[name] = row["note"]
+            formats[name] = None
+    whole = {kind: found.pop(kind) for kind in ("all of them",)}
+    return table(
+        ("what was made wrong", *formats),
+        (
+            (kind, *(notes.get(name, "") for name in formats))
+            for kind, notes in (found | whole).items()
         ),
     )
 

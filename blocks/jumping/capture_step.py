@@ -19,6 +19,7 @@ from ...mathematics.capture_step import (
 from ...mathematics.elementary import exp, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading
+from ...mathematics.stance_feet import has_contact
 from ...robots.kinematics import foot_sides, standing_feet
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, live_parameter
@@ -33,6 +34,9 @@ _NEARER = 0.005
 """A foot is preferred if it comes nearer to its foothold by more than this [m]."""
 _SHORTEST = 0.03
 """The motion of a foot counts on at least this much time [s], which limits its feedback gains."""
+LATE_STIFFNESS, LATE_DAMPING = 3000.0, 110.0
+"""Gains [1/s^2, 1/s] of a foot that the plan lands after others, towards the plan; those of points without load of the
+whole-body controller (``ContactGains``)."""
 
 
 class StepParams(Parameters):
@@ -156,6 +160,8 @@ class CaptureStep(Block):
     stand, goes on down: its points get the acceleration d (-v e_z - p'), with d the ``seek_damping`` and p'
     their velocity. It is a task of the whole-body controller, like a step: driven by its joints alone the
     leg turns the torso by 20 degrees where one foot lands 2 cm higher than the other. It counts as no step.
+    A foot that the plan lands after others follows the plan until then: its velocity, and its height above the
+    lowest point that stands.
 
     The block plans one step at a time, on level ground, and does not return the feet to where they
     stood. A robot with a single foot takes none.
@@ -211,7 +217,7 @@ class CaptureStep(Block):
         lands = before.phase == Phase.LANDING or before.phase == Phase.RECOVER
         goes_on = reference.lift_off_time > reference.time
         if params.seek_speed > 0.0 and before.phase == Phase.LANDING:
-            seek_ground(before, terms, params, constants, phase)
+            seek_ground(before, reference, terms, params, constants, phase)
         if not lands or goes_on or constants.side.shape[0] < 2:
             memory.foot = 0
             memory.taken = 0
@@ -228,26 +234,37 @@ class CaptureStep(Block):
 @kernel
 def seek_ground(
     before: PhaseState,
+    reference: JumpReference,
     terms: DynamicsTerms,
     params: StepParams,
     constants: StepConstants,
     out: PhaseState,
 ) -> None:
-    """Move the feet down that have not touched yet, while another one stands.
+    """Move the feet down that have not touched yet, while another one stands; as in the plan while that lands them later.
 
     As tasks of the whole-body controller, so that it knows how the moving leg pushes the torso.
     """
-    count, any_stance = constants.foot_of_point.shape[0], False
+    count, any_stance, any_planned = constants.foot_of_point.shape[0], False, False
+    ground, planned_ground = math.inf, math.inf
     for i in range(count):
-        any_stance = any_stance or before.stance[i]
+        if before.stance[i]:
+            any_stance, ground = True, min(ground, terms.contact_position[i, 2])
+        if reference.contact[i]:
+            place = reference.foot_position[constants.foot_of_point[i], 2]
+            any_planned, planned_ground = True, min(planned_ground, place)
     for i in range(count):
-        stands = not any_stance
-        for j in range(count):
-            if constants.foot_of_point[j] == constants.foot_of_point[i] and before.stance[j]:
-                stands = True
-        if stands:
+        foot = constants.foot_of_point[i]
+        if not any_stance or has_contact(before.stance, constants.foot_of_point, foot):
             continue
         out.stepping[i] = True
+        if any_planned and not has_contact(reference.contact, constants.foot_of_point, foot):
+            for k in range(3):
+                error = reference.foot_velocity[foot, k] - terms.contact_velocity[i, k]
+                out.step_acceleration[i, k] = LATE_DAMPING * error
+            height = reference.foot_position[foot, 2] - planned_ground
+            height -= terms.contact_position[i, 2] - ground
+            out.step_acceleration[i, 2] += LATE_STIFFNESS * height
+            continue
         for k in range(3):
             speed = terms.contact_velocity[i, k]
             if k == 2:

@@ -29,6 +29,7 @@ from ..validation.faults import nearest
 from ..validation.find_faults import shown
 from .build import BodyFrame, LinkTree, build, tidy
 from .looks import link_looks
+from .odd_bodies import odd_bodies
 from .raw_model import RawJoint, RawModel
 from .read_model import read_model
 from .urdf_text import XmlFile
@@ -397,7 +398,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     model = read_model(path)
     overlay = Overlay(added)
     overlay.check_keys(list(RobotDescription.model_fields))
-    notes = list(model.notes)
+    notes = [*model.notes, *odd_bodies(model)]
     joints = [joint.name for body in model.bodies.values() for joint in body.joints]
     welded = [*overlay.welded(joints), *model.mimics]
     base_joint = added.get("base_joint", "")

@@ -1,4 +1,5 @@
 """What an MJCF file says and a description has no place for, one sentence each, with where it may be written instead.
+Of URDFs ``left_out_urdf`` tells.
 
 A description holds what a robot is. Friction and softness of contacts belong to the simulated ground, gains to the
 controller, and gravity to the world: what a file says of them is reported and not taken over. What is as MuJoCo
@@ -43,7 +44,7 @@ def _contacts(model: Any) -> Iterator[str]:
 
     def given(values: Any, usual: Iterable[float]) -> str:
         rows = [_numbers(values[g]) for g in touching]
-        return _by_value(rows, bodies, _numbers(tuple(usual)))
+        return by_value(rows, bodies, _numbers(tuple(usual)))
 
     slide = given(model.geom_friction[:, :1], FRICTION[:1])
     if slide:
@@ -75,11 +76,11 @@ def _contacts(model: Any) -> Iterator[str]:
 def _joints(model: Any) -> Iterator[str]:
     """Springs and damping that grows with speed."""
     names = [model.joint(j).name for j in range(model.njnt)]
-    springs = _by_value([f"{value:g}" for value in model.jnt_stiffness], names, "0")
+    springs = by_value([f"{value:g}" for value in model.jnt_stiffness], names, "0")
     if springs:
         yield f"left out: springs of joints, stiffness {springs} N m/rad; joints here have none"
     poly = [_numbers(model.dof_dampingpoly[int(model.jnt_dofadr[j])]) for j in range(model.njnt)]
-    growing = _by_value(poly, names, _numbers(np.zeros(model.dof_dampingpoly.shape[1])))
+    growing = by_value(poly, names, _numbers(np.zeros(model.dof_dampingpoly.shape[1])))
     if growing:
         yield f"left out: damping that grows with speed, coefficients {growing}; that of low speed stays"
     held = [model.body(k).name for k in range(model.nbody) if model.body_gravcomp[k]]
@@ -111,7 +112,7 @@ def _servos(model: Any) -> Iterator[str]:
             curved.append(name)
         if int(model.actuator_dyntype[k]) != int(dyn.mjDYN_NONE):
             slow.append(name)
-    gains = _by_value(rows, joints, "")
+    gains = by_value(rows, joints, "")
     if gains:
         yield (
             f"left out: gains of servos, {gains} at the joint; gains follow from inertia and motor, and "
@@ -148,7 +149,7 @@ def _tied(model: Any, spec: Any) -> Iterator[str]:
         yield f"left out: {model.nflex} deformable bodies"
 
 
-def _by_value(rows: list[str], names: list[str], usual: str) -> str:
+def by_value(rows: list[str], names: list[str], usual: str) -> str:
     """Each value that is not the usual one, with the names that have it; empty where all are usual."""
     found: dict[str, dict[str, None]] = {}
     for row, name in zip(rows, names, strict=True):

@@ -20,6 +20,7 @@ from ...mathematics.arrays import Array
 from . import capsules as fit
 from .file_sensors import file_sensors, unknown_sensors
 from .left_out import left_out
+from .left_out_urdf import left_out_of_urdf
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_corners
 from .package_files import find_file
@@ -86,7 +87,15 @@ def read_model(path: Path) -> RawModel:
             notes.append(
                 f"joint {name} has no lower and upper limit in the URDF and turns freely here"
             )
-    if not file.is_urdf:
+    for name, joint in limits.items():
+        for what, value in (("effort", joint.effort), ("velocity", joint.speed)):
+            if value < 0.0:
+                notes.append(
+                    f"joint {name} has a negative {what} limit in the URDF, {value:g}: it counts as none"
+                )
+    if file.is_urdf:
+        notes += left_out_of_urdf(file)
+    else:
         tied = _tied_joints(spec)
         mimics += tuple(tied)
         for name, leader in tied.items():

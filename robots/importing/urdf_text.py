@@ -16,6 +16,8 @@ from .xacro_text import XACRO, expand_xacro
 
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
+DECLARED = re.compile(r"\s*<\?xml[^>]*?\sencoding\s*=\s*[\"']([^\"']*)[\"']")
+"""The encoding that a file says it is in."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class XmlFile:
             text = expand_xacro(path) if path.suffix == XACRO else path.read_text("utf-8")
             if not text.strip():
                 raise self.error("the file is empty", "a URDF or MJCF file")
+            self._check_encoding(text)
             self.root = ElementTree.fromstring(text)
             self.content = text
             # Comments are blanked: nothing is found in them, and all other positions stay.
@@ -60,6 +63,21 @@ class XmlFile:
                 "the root element <robot> of a URDF or <mujoco> of an MJCF file",
                 f"<{self.root.tag}>",
             )
+
+    def _check_encoding(self, text: str) -> None:
+        """Raise ``RobotError`` where the text, read as UTF-8, is another one in the encoding that it declares."""
+        declared = DECLARED.match(text)
+        if not declared:
+            return
+        try:
+            same = text.encode("utf-8").decode(declared[1]) == text
+        except (LookupError, UnicodeError):
+            same = False
+        if not same:
+            raise self.error(
+                f"the file declares the encoding {declared[1]} and is in UTF-8",
+                'encoding="utf-8"', declared[1],
+            )  # fmt: skip
 
     @property
     def is_urdf(self) -> bool:

@@ -77,7 +77,7 @@ def test_a_push_is_named_and_what_it_did() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("graph", "seed"), [(AHEAD, 32), ("graphs/up_8cm.yaml", 33)])
+@pytest.mark.parametrize(("graph", "seed"), [(JUMP, 31), (AHEAD, 32), ("graphs/up_8cm.yaml", 33)])
 def test_nothing_is_named_where_nothing_is_wrong(graph: str, seed: int) -> None:
     found = explained(graph, {"robot.seed": seed})
     assert found.success

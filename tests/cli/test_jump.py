@@ -177,6 +177,7 @@ def test_wrong_words_leave_with_exit_code_2(folder: Path, call: Call, call_json:
     assert "the nearest is rise" in call_json(*words, code=2)["problems"][0]["message"]
 
 
+@pytest.mark.long
 def test_a_jump_beyond_the_motors_says_so(
     folder: Path, call_json: CallJson, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_a_root_locus_as_json_table_and_picture(loop: str, tmp_path: Path) -> No
     assert "the limit of stability is at -100" in out
 
 
+@pytest.mark.long
 def test_a_response_measured_with_a_chirp_beside_the_model(loop: str, tmp_path: Path) -> None:
     svg = tmp_path / "loop.svg"
     asked = (

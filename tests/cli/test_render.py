@@ -113,6 +113,7 @@ def test_plots_beside_the_run(pushed: Path, renderer: None, tmp_path: Path) -> N
     assert "robot.truth.com" in done.stderr
 
 
+@pytest.mark.long
 def test_mp4(pushed: Path, renderer: None, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     path = tmp_path / "film.mp4"

@@ -32,6 +32,7 @@ def in_this_process(function: Any, jobs: Any, *, workers: int) -> Any:
         yield JobResult(index, *attempt(function, job))
 
 
+@pytest.mark.long
 def test_a_table_a_picture_and_figures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(frontier, "do", stand_in)

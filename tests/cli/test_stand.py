@@ -22,6 +22,7 @@ def test_bruce_squats_and_is_recorded(folder: Path, call_json: CallJson) -> None
     assert (folder / "recordings" / "stand.rrd").stat().st_size > 100_000
 
 
+@pytest.mark.long
 def test_a_push_moves_it(folder: Path, call_json: CallJson) -> None:
     words = ("stand", "--no-record", "--trial", "nominal")
     still, pushed = (call_json(*words, *more) for more in ((), ("--push", "0.1m/s")))

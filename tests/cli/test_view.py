@@ -45,6 +45,7 @@ def test_what_is_shown_can_be_kept(tmp_path: Path) -> None:
     assert recording.read_bytes() == before
 
 
+@pytest.mark.long
 def test_where_the_code_has_gone_there_is_no_diagram(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

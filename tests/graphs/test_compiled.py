@@ -11,8 +11,8 @@ GRAPHS = Path(__file__).parents[2] / "graphs"
 
 def test_bytes_do_not_depend_on_the_compiler():
     graph = aloft.load(GRAPHS / "jump.yaml")
-    compiled = graph.run(0.1, log=False)
-    plain = graph.run(0.1, log=False, plain=True)
+    compiled = graph.run(0.06, log=False)
+    plain = graph.run(0.06, log=False, plain=True)
     assert not compiled.block_warnings and not plain.block_warnings
     assert compiled.run_hash == plain.run_hash
 

@@ -43,8 +43,7 @@ def test_a_robot_that_nobody_puts_down_waits_without_a_fault() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_it_jumps_from_a_gantry_through_the_driver(seed: int) -> None:
+def test_it_jumps_from_a_gantry_through_the_driver() -> None:
     gantry = {"height": 0.06, "speed": 0.1, "lower_after": 1.0}
-    result = run(robot__use="hal.TwinRobot", robot__seed=seed, robot__gantry=gantry)
+    result = run(robot__use="hal.TwinRobot", robot__seed=1, robot__gantry=gantry)
     assert result.success, result.reason

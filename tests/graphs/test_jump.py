@@ -38,9 +38,8 @@ def test_it_jumps_lands_and_recovers(jump):
     assert jump.metrics["qp_failures"] == 0
 
 
-@pytest.mark.parametrize("seed", [1001, 1002])
-def test_other_noise_other_delays(seed):
-    result = aloft.load(JUMP, {"robot.seed": seed}).run(log=False)
+def test_other_noise_other_delays():
+    result = aloft.load(JUMP, {"robot.seed": 1001}).run(log=False)
     assert result.success, result.reason
     assert result.metrics["apex_above_standing_m"] >= 0.11
 
@@ -67,10 +66,11 @@ def test_the_body_follows_its_plan_off_the_ground(jump):
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_does_not(jump):
-    again = aloft.load(JUMP, {"robot.seed": 1000}).run(log=False)
-    other = aloft.load(JUMP, {"robot.seed": 1003}).run(duration=0.1, log=False)
-    assert again.run_hash == jump.run_hash
-    assert other.run_hash != jump.run_hash
+    first, again, other = (
+        aloft.load(JUMP, {"robot.seed": seed}).run(duration=0.1) for seed in (1000, 1000, 1003)
+    )
+    assert first.run_hash == again.run_hash != other.run_hash
+    assert first.log.rows().tobytes() == jump.log.rows()[:50].tobytes()
 
 
 def test_no_controller_reads_the_truth():
@@ -102,6 +102,7 @@ def test_the_robust_trial(tmp_path):
     assert result.success, result.reason
 
 
+@pytest.mark.long
 def test_another_solver_jumps_too():
     result = aloft.load(JUMP, {"wbc.solver": "quadprog"}).run(log=False)
     assert result.success, result.reason

@@ -19,10 +19,18 @@ def test_the_graph_has_no_problems():
     assert check(PUSH.with_name("push_12cm.yaml")).ok
 
 
-@pytest.mark.parametrize("angle", [0.0, pytest.param(np.pi / 2.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "angle",
+    [0.0, *(pytest.param(angle, marks=pytest.mark.long) for angle in (np.pi, np.pi / 2.0))],
+)
 def test_a_push_in_the_air_is_landed(angle):
-    result = aloft.load(PUSH, {"robot.seed": 70, "push.angle": angle}).run(log=False)
-    assert result.success, result.reason
+    """Straight back nine of ten land (studies/tasks.yaml), so one of three may fail."""
+    failures = []
+    for seed in (70, 71, 72):
+        result = aloft.load(PUSH, {"robot.seed": seed, "push.angle": angle}).run(log=False)
+        if not result.success:
+            failures.append(result.reason)
+    assert len(failures) <= (angle == np.pi), failures
 
 
 STRONG = {"robot.seed": 70, "push.force": 100.0}
@@ -38,11 +46,13 @@ def test_without_the_landing_heuristic_the_push_from_behind_ends_in_a_fall():
 
 @pytest.mark.long
 def test_steps_after_touchdown_keep_the_robot_from_that_fall():
-    """Without steps it falls on both of these seeds; on seed 70 it falls with them, too."""
-    for seed in (71, 72):
+    """Without steps it falls on all of these seeds; on seed 70 it falls with them, too."""
+    stays = 0
+    for seed in range(70, 75):
         metrics = aloft.load(PUSH, STRONG | OFF | {"robot.seed": seed}).run(log=False).metrics
         assert metrics["steps"] >= 1
-        assert metrics["peak_tilt_deg"] < 45.0 and metrics["final_tilt_deg"] < 5.0
+        stays += metrics["peak_tilt_deg"] < 45.0 and metrics.get("final_tilt_deg", 90.0) < 5.0
+    assert stays >= 4
 
 
 @pytest.mark.long
@@ -60,6 +70,7 @@ def test_a_strong_push_aside_is_landed_as_feet_seek_the_ground_softly(tmp_path: 
     assert landed[20.0] >= 3 > landed[60.0]
 
 
+@pytest.mark.long
 def test_the_parametric_jump_goes_higher():
     """As the block's defaults touch down; for a push it lands leaning back, with straighter legs."""
     settings = {"robot.seed": 5, "push.force": 0.0, "plan.rise": 0.1, "score.peak_tilt": 0.26}

@@ -16,7 +16,6 @@ from aloft.runtime.loading import check
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 ROBOTS = ("go2", "g1", "solo12", "a1", "anymal_c", "hyq", "talos")
 SQUATS = {"go2": 0.06, "g1": 0.12, "solo12": 0.05}
-PUSHED = ("go2", "g1")
 JUMPS = {
     "go2_jump": (0.10, 0.0),
     "go2_forward": (0.10, 0.20),
@@ -43,7 +42,7 @@ def test_a_jumps_graph_has_no_problems(graph: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("robot", PUSHED)
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_it_takes_a_push(robot: str) -> None:
     graph = GRAPHS / "robots" / f"{robot}_stand.yaml"
     result = aloft.load(graph, {"robot.seed": 32}).run()
@@ -64,7 +63,7 @@ def test_it_squats(robot: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("graph", ["go2_forward", "g1_forward", "solo12_jump"])
+@pytest.mark.parametrize("graph", JUMPS)
 def test_it_jumps(graph: str) -> None:
     apex, ahead = JUMPS[graph]
     result = aloft.load(GRAPHS / "robots" / f"{graph}.yaml", {"robot.seed": 32}).run(log=False)

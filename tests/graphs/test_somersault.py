@@ -39,7 +39,9 @@ def test_go2_turns_over_backwards_with_its_real_motors() -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["somersault", "somersault_forward_35cm"])
+@pytest.mark.parametrize(
+    "name", ["somersault", pytest.param("somersault_forward_35cm", marks=pytest.mark.long)]
+)
 def test_it_turns_once_lands_on_its_feet_and_stands(name: str) -> None:
     run = aloft.load(GRAPHS / f"{name}.yaml", {"robot.seed": 0}).run()
     phases = run.signal("phase.phase.phase")

@@ -65,7 +65,9 @@ def test_the_controllers_own_limits_act_before_the_drivers() -> None:
 
 SWITCHES = [
     ("open_switch", "is stuck: it was open under a foot that stood", 0.3),
-    ("bouncing_switch", "bounces: it opened and closed too often", 0.7),
+    pytest.param(
+        "bouncing_switch", "bounces: it opened and closed too often", 0.7, marks=pytest.mark.long
+    ),
     pytest.param("stuck_switch", "is stuck: it was closed in the air", 2.0, marks=pytest.mark.long),
 ]
 

@@ -119,7 +119,7 @@ def test_the_share_follows_the_gains(factor: float) -> None:
 KNOWN = MotorModel(torque_constant={"*": 0.96, "left_*": 1.05}, saturation=0.12, load_friction=0.05)
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(st.floats(-9.0, 9.0), st.floats(-20.0, 20.0), st.integers(0, 9))
 def test_what_is_asked_of_a_known_motor_gives_the_torque(
     torque: float, speed: float, motor: int

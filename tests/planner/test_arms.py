@@ -66,6 +66,7 @@ def test_arms_reach_what_the_same_legs_cannot() -> None:
     assert check_plan(planned(0.3), ROBOT).figures["rise_m"] == pytest.approx(0.3, abs=2e-3)
 
 
+@pytest.mark.long
 def test_for_the_same_momentum_the_legs_do_less_when_arms_swing() -> None:
     """Twin arms swing alike, up before the feet leave, so that the legs need not be as fast."""
     still, swings = planned(0.1, ()), planned(0.1)

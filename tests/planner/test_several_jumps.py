@@ -83,6 +83,7 @@ def test_a_file_of_several_jumps(tmp_path: Path) -> None:
     assert "2 jumps, rise" in plan_picture(steps(), ROBOT)
 
 
+@pytest.mark.long
 def test_a_near_plan_of_several_jumps_saves_iterations() -> None:
     near = make_task({"recipe": "paper", "name": "near", **STEPS, "rise": 0.118})
     cold, warm = (solve_jump(near, ROBOT, warm_start=start) for start in (None, steps()))
@@ -91,6 +92,7 @@ def test_a_near_plan_of_several_jumps_saves_iterations() -> None:
     assert np.abs(np.array(cold.flights) - warm.flights).max() < 2e-3
 
 
+@pytest.mark.long
 def test_the_table_has_every_jump() -> None:
     plan = steps()
     table = reference_table(plan, ROBOT, 0.3)

@@ -223,6 +223,7 @@ def test_a_foot_that_rocks_spoils_no_fit() -> None:
     np.testing.assert_allclose(found, truth, atol=2e-3)
 
 
+@pytest.mark.long
 def test_ripple_is_found_by_how_often_it_comes_again() -> None:
     """In two of ten motors, below noise of the same size."""
     random, time = np.random.default_rng(3), 0.002 * np.arange(10_000)

@@ -20,7 +20,7 @@ VALUES = st.lists(st.floats(-50.0, 50.0), min_size=10, max_size=10).map(np.array
 
 
 @given(VALUES, VALUES)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_motion_and_torque_come_back_and_power_is_conserved(
     velocity: np.ndarray, torque: np.ndarray
 ) -> None:
@@ -52,7 +52,7 @@ def test_the_transmission_of_bruce_is_the_published_one() -> None:
 
 
 @given(st.lists(st.floats(0.0, 200.0), min_size=10, max_size=10).map(np.array))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_gains_that_motors_can_give_are_found_again(motor: np.ndarray) -> None:
     matrix = ROBOT.joint_to_motor
     joint = (matrix.T * motor) @ matrix

@@ -103,6 +103,7 @@ def test_the_smallest_failure_is_found_and_chance_does_not_find_it(study: Read) 
     assert sum(reached[False]) < sum(reached[True]) - 0.5
 
 
+@pytest.mark.long
 def test_draws_come_in_batches_whatever_makes_them_and_the_same_again(study: Read) -> None:
     found = study(TEXT)
     done, batches = falsified(found)

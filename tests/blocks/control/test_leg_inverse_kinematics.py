@@ -238,6 +238,7 @@ def test_the_plans_joints_are_followed_as_long_as_the_plan_flies():
     assert not np.array_equal(bench.get("target").position, np.linspace(-0.5, 0.5, 10))
 
 
+@pytest.mark.long
 @example(np.array([0.125, 0.5, *[0.125] * 8]))
 @given(arrays(np.float64, 10, elements=st.floats(0.05, 0.95)))
 def test_least_squares_agree_with_the_closed_form(fraction):

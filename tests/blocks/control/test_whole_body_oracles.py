@@ -194,6 +194,7 @@ def check(monkeypatch, jumps, *, duration, every):
     return total
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:Converted matrix")
 def test_the_solvers_agree_on_states_of_a_jump(monkeypatch):
     assert check(monkeypatch, [JUMPS["torque-limited"]], duration=0.9, every=5) > 50

@@ -192,6 +192,7 @@ def test_follows_a_squat_without_noise():
         assert np.abs(run.to(end).error()).max() < 2e-4
 
 
+@pytest.mark.long
 def test_standing_still_finds_the_biases():
     gyro, accelerometer = np.array([0.01, -0.01, 0.005]), np.array([0.1, -0.1, 0.05])
     run = Run(STAND, 1, gyro, accelerometer, noise=(0.02, 0.1)).to(1.0)

@@ -282,3 +282,19 @@ def test_no_foot_seeks_the_ground_while_none_stands_nor_after_the_landing():
     bench = make(steps=0, seek_speed=0.8)
     assert not np.any(run(bench, 0.3, stance=(False,) * 4))
     assert not np.any(run(bench, 0.6, stance=(True, True, False, False), landing_time=0.0))
+
+
+def test_a_foot_that_the_plan_lands_later_follows_the_plan_until_then():
+    bench = make(steps=0)
+    bench.set("terms", contact_velocity=[[0, 0, 0], [0, 0, 0], [0.1, 0, -0.5], [0.1, 0, -0.5]])
+    planned = {"foot_position": [[0, -0.1, 0.01], [0, 0.1, 0.03]], "foot_velocity": [[0, 0, 0], [0.1, 0, -0.4]]}  # fmt: skip
+    bench.set("reference", contact=[True, True, False, False], **planned)
+    run(bench, PERIOD, stance=(True, True, False, False))
+    out = bench.get("phase")
+    assert out.stepping.tolist() == [False, False, True, True]
+    for point in (2, 3):  # 2 cm of height and 0.1 m/s are missing
+        wanted = [0.0, 0.0, 3000.0 * 0.02 + 110.0 * 0.1]
+        assert out.step_acceleration[point] == pytest.approx(np.array(wanted))
+    bench.set("reference", contact=[True, True, True, True], **planned)
+    run(bench, 2 * PERIOD, stance=(True, True, False, False))
+    assert bench.get("phase").step_acceleration[2] == pytest.approx(np.array([-2.0, 0.0, -10.0]))

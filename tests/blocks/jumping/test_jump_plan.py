@@ -84,6 +84,7 @@ def test_a_kept_plan_that_is_not_valid_never_starts(tmp_path: Path) -> None:
 REDUCED = {"task": {"rise": "6 cm", "impact": True}, "formulation": "srbm", "solve": True}
 
 
+@pytest.mark.long
 def test_it_is_followed_where_that_is_asked_for_and_called_invalid(tmp_path: Path) -> None:
     block = bench(**REDUCED, library=str(tmp_path), check="reported")
     assert block.block.metrics() == {"plan_valid": False, "plan_tests_failed": 9}

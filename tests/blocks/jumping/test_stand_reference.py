@@ -58,6 +58,7 @@ def test_without_a_depth_it_stands_in_its_standing_pose_for_ever():
         assert float(reference.lift_off_time) == NEVER
 
 
+@pytest.mark.long
 def test_the_squat_is_a_phase_and_no_lift_off_is_planned():
     bench = BlockBench(StandReference, {"squat_depth": 0.04}, robot=quadruped(), rate=500.0)
     phases = []

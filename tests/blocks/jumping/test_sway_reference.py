@@ -11,6 +11,7 @@ from aloft.robots.description import find_robot
 ROBOT = find_robot("bruce")
 
 
+@pytest.mark.long
 def test_all_directions_sway_over_standing_feet() -> None:
     chosen = Sway((0.004, 0.01, 0.015), (0.1, 0.1, 0.1), 0.03, 1.0)
     table = _plan(ROBOT.model_dump_json(), chosen, 0.5, 4.0)

@@ -106,6 +106,7 @@ def test_ros2_publishes_it_by_two_wires(tmp_path: Path) -> None:
     assert "publish" in {block.path for block in aloft.load(tmp_path / "graph.yaml").checked.blocks}
 
 
+@pytest.mark.long
 def test_a_sensor_of_a_users_own_module(tmp_path: Path) -> None:
     page = (Path(aloft.__file__).parent / "docs/robots.md").read_text(encoding="utf-8")
     own = page.partition("### A sensor of a new kind")[2].partition("```python\n")[2]

@@ -56,7 +56,7 @@ def test_curve_is_symmetric_monotone_and_brakes_fully(speed: np.ndarray) -> None
     assert (np.diff(upper[order]) <= 1e-12).all()
 
 
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(SPEEDS, TORQUES)
 def test_clipped_torque_is_within_the_motors_limits(speed: np.ndarray, torque: np.ndarray) -> None:
     lower, upper = limits(speed)

@@ -107,6 +107,7 @@ def run(ticks: int = 20, **options: Any) -> tuple[BlockBench[MujocoRobot], list[
     return robot, [*seen, robot.memory.bus.buffer.tobytes(), robot.snapshot().state]
 
 
+@pytest.mark.long
 def test_machine_code_and_python_simulate_the_same_bytes() -> None:
     quick, seen = run()
     slow, expected = run(plain=True)

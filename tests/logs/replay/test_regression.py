@@ -143,6 +143,7 @@ def test_what_cannot_be_made_a_test(recorded: KeptRun) -> None:
     assert difference is not None and difference.tick == 5
 
 
+@pytest.mark.long
 def test_a_block_in_the_background_is_refused() -> None:
     text = GRAPH.replace(
         'use: "adder:Adder", with: {n: 2}',

@@ -31,8 +31,12 @@ JUMPS: dict[str, dict[str, Any]] = {
     "twist": {"rise": 0.15, "twist": math.radians(30.0)},
 }
 COARSE = {"squat": 4, "thrust": 8, "flight": 14, "landing": 7}
-"""The paper's problem takes seconds at the usual number of knots."""
-REDUCED = [(formulation, jump) for formulation in ("paper", "srbm") for jump in JUMPS]
+"""The paper's problem takes seconds also with fewer knots than usual."""
+PAPER = pytest.mark.long
+REDUCED = [
+    *(pytest.param("paper", jump, marks=PAPER) for jump in JUMPS),
+    *(("srbm", jump) for jump in JUMPS),
+]
 
 
 @lru_cache(maxsize=16)
@@ -74,10 +78,10 @@ def test_a_plan_fulfils_its_own_equations_by_pinocchio(formulation: str, jump: s
 @pytest.mark.parametrize(
     ("formulation", "array", "column", "equation"),
     [
-        ("paper", "angular_momentum", 1, "h = A(q) v"),
-        ("paper", "velocity", 7, "h = A(q) v"),
-        ("paper", "com", 0, "r = f_com(q)"),
-        ("paper", "contact_force", 2, "linear momentum rate"),
+        pytest.param("paper", "angular_momentum", 1, "h = A(q) v", marks=PAPER),
+        pytest.param("paper", "velocity", 7, "h = A(q) v", marks=PAPER),
+        pytest.param("paper", "com", 0, "r = f_com(q)", marks=PAPER),
+        pytest.param("paper", "contact_force", 2, "linear momentum rate", marks=PAPER),
         ("srbm", "contact_force", 2, "moment balance"),
         ("srbm", "position", 2, "com"),
     ],
@@ -105,6 +109,7 @@ def test_the_task_is_done_in_the_formulations_own_terms(formulation: str, jump: 
     assert np.abs(plan.velocity[[0, -1]]).max() < 1e-6
 
 
+@pytest.mark.long
 def test_the_formulations_agree_on_the_ballistic_apex() -> None:
     apex = {}
     for formulation in FORMULATIONS:
@@ -115,6 +120,7 @@ def test_the_formulations_agree_on_the_ballistic_apex() -> None:
     assert apex == {name: pytest.approx(0.15, abs=1e-6) for name in FORMULATIONS}
 
 
+@pytest.mark.long
 def test_legs_without_mass_leave_a_momentum_that_turns_the_robot() -> None:
     plan = planned("srbm", "in situ")
     k = knot(plan, plan.lift_off_time)
@@ -132,7 +138,9 @@ def test_legs_without_mass_leave_a_momentum_that_turns_the_robot() -> None:
 @pytest.mark.parametrize(
     ("formulation", "failed"),
     [
-        ("paper", {"motor_torque", "rise", "touchdown_speed", "com_velocity"}),
+        pytest.param(
+            "paper", {"motor_torque", "rise", "touchdown_speed", "com_velocity"}, marks=PAPER
+        ),
         ("srbm", {"angular_momentum", "flight_rotation", "flight_position"}),
     ],
 )

@@ -288,6 +288,7 @@ def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: PlannedJum
     assert not asks_for_finer(HIGH, None)
 
 
+@pytest.mark.long
 def test_a_high_jump_is_valid_on_the_grid_it_needs() -> None:
     coarse = checked(solve_jump(HIGH, ROBOT), ROBOT)
     assert not coarse.valid

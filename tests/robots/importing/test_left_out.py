@@ -9,7 +9,7 @@ import pytest
 
 from aloft.robots.description import ReadRobot, read
 
-from .model_files import ONE_LEG
+from .model_files import INERTIAL, ONE_LEG
 
 DEFAULTS = '<default><default class="foot"><geom friction="0.8 0.02 0.01" condim="6" solref="0.01 1"/></default></default>'
 SAID = (
@@ -26,8 +26,21 @@ SAID = (
 )  # fmt: skip
 
 
-def read_text(folder: Path, text: str) -> ReadRobot:
-    path = folder / "robot.xml"
+TOLD_GAZEBO = f"""<robot name="legs">
+<link name="trunk">{INERTIAL}</link>
+<link name="leg">{INERTIAL}<contact><lateral_friction value="1.5"/><restitution value="0.5"/></contact></link>
+<joint name="hip" type="revolute"><parent link="trunk"/><child link="leg"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="-9" velocity="9"/>
+<safety_controller soft_lower_limit="-0.5" soft_upper_limit="1" k_velocity="20"/></joint>
+<gazebo reference="trunk"><mu1>0.80</mu1><mu2>0.6</mu2><kp value="1000000.0"/><minDepth>0.0</minDepth></gazebo>
+<gazebo reference="leg"><turnGravityOff>true</turnGravityOff><material>Gazebo/Red</material></gazebo>
+<gazebo reference="hip"><springStiffness>7</springStiffness></gazebo>
+<gazebo><plugin filename="x.so"/><joint name="rod"><parent>trunk</parent><child>leg</child></joint></gazebo>
+<transmission name="wrist"><joint name="a"/><joint name="b"/><actuator name="c"/></transmission></robot>"""
+
+
+def read_text(folder: Path, text: str, name: str = "robot.xml") -> ReadRobot:
+    path = folder / name
     path.write_text(text)
     return read(path)
 
@@ -78,3 +91,23 @@ def test_a_joint_that_an_equality_ties_is_fixed(tmp_path: Path) -> None:
     inactive = read_text(tmp_path, text.replace("<joint joint1", '<joint active="false" joint1'))
     assert len(inactive.description.joints) == 2
     assert math.isfinite(found.description.total_mass)
+
+
+@pytest.mark.parametrize("said", [
+    "left out: friction coefficient 1.5 (leg); mu1 0.8, mu2 0.6 (trunk); friction is the ground's, robot.friction",
+    "left out: softness of contacts, kp 1e+06 (trunk); robot.soles",
+    "left out: restitution 0.5 (leg)",
+    "left out: springs of joints, springStiffness 7 (hip)",
+    "left out: soft limits -0.5 to 1 (hip); those of <limit> hold",
+    "left out: leg without weight; gravity",
+    "left out: joints rod, which close loops for Gazebo",
+    "left out: transmissions wrist, which couple joints",
+    "joint hip has a negative effort limit in the URDF, -9: it counts as none",
+])  # fmt: skip
+def test_what_a_urdf_tells_simulators_is_named(said: str, tmp_path: Path) -> None:
+    assert any(said in note for note in read_text(tmp_path, TOLD_GAZEBO, "robot.urdf").notes)
+
+
+def test_what_only_says_how_a_simulator_runs_is_not(tmp_path: Path) -> None:
+    notes = read_text(tmp_path, TOLD_GAZEBO, "robot.urdf").notes
+    assert len([note for note in notes if note.startswith("left out")]) == 8

@@ -62,14 +62,14 @@ def test_a_few_mutated_files(urdf: str, text: str) -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(mutated(ARM, PIECES), mutated(YAML, PIECES))
 def test_mutated_urdf_and_yaml(urdf: str, text: str) -> None:
     survives("arm.yaml", arm_urdf=urdf, arm_yaml=text)
 
 
 @pytest.mark.long
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(mutated(ONE_LEG, PIECES))
 def test_mutated_mjcf(text: str) -> None:
     survives("leg.xml", leg_xml=text)

@@ -45,6 +45,10 @@ MODELS = [
         "    expected   the root element <robot> of a URDF or <mujoco> of an MJCF file",
         "    found      <foo>",
     ]),
+    ("x.xml", '<?xml version="1.0" encoding="utf-16"?>\n<mujoco/>', [
+        "x.xml: the file declares the encoding utf-16 and is in UTF-8", '    expected   encoding="utf-8"',
+        "    found      utf-16",
+    ]),
     ("x.xml", "hello", ["x.xml:1:1: this is no XML: syntax error"]),
     ("x.urdf", '<robot name="x"/>', [
         "x.urdf: the URDF has no links", "    expected   at least one <link>", "    found      none",

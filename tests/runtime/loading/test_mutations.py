@@ -104,16 +104,9 @@ def mutated(draw: st.DrawFn, text: str, pieces: tuple[str, ...] = PIECES) -> str
 
 
 @pytest.mark.long
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
 def test_mutated_files(graph: str, leg: str, more: str) -> None:
-    survives(graph, leg, more, [])
-
-
-@pytest.mark.long
-@settings(max_examples=1000, deadline=None)
-@given(mutated(GRAPH), mutated(without_spare(LEG)), mutated(MORE))
-def test_many_mutated_files(graph: str, leg: str, more: str) -> None:
     survives(graph, leg, more, [])
 
 

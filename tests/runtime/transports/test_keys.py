@@ -131,6 +131,7 @@ def silent(onboard: Onboard, put: Callable[[], object]) -> bool:
     return not onboard.heard
 
 
+@pytest.mark.long
 def test_an_observer_watches_and_never_commands(
     keys: tuple[PlacedGraph, Path], onboard: Onboard, opened: Opened
 ) -> None:

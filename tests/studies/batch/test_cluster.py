@@ -34,6 +34,7 @@ def results(function: object, jobs: object, address: str) -> dict[int, JobResult
     return {result.index: result for result in found}
 
 
+@pytest.mark.long
 def test_every_job_gives_one_result(cluster: str) -> None:
     found = results(math.sqrt, [4.0, -1.0, *[9.0] * 30], cluster)
     assert found[0].value == 2.0
@@ -41,6 +42,7 @@ def test_every_job_gives_one_result(cluster: str) -> None:
     assert [found[k].value for k in range(2, 32)] == [3.0] * 30
 
 
+@pytest.mark.long
 def test_it_is_the_workers_that_work(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("WHO", "the test")
     found = results(os.getenv, ["WHO", "OMP_NUM_THREADS"], cluster)
