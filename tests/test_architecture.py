@@ -211,6 +211,7 @@ def test_every_file_has_a_room() -> None:
     assert not without, "say in ALLOWED what the room may import"
 
 
+@pytest.mark.long
 def test_only_their_verb_imports_the_benchmarks() -> None:
     """They are not in the wheel."""
     importing = [

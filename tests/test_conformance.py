@@ -1,6 +1,5 @@
 """Every block of ours keeps the promises of all blocks, with BRUCE and with a robot of every kind."""
 
-from collections.abc import Iterable
 from itertools import product
 
 import pytest
@@ -10,12 +9,12 @@ from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases, unmet_messages
 
-OTHERS = [
+OTHERS = (
     "go2",  # four legs, with points for feet
-    pytest.param("g1", marks=pytest.mark.long),  # soles and arms
-    pytest.param("bolt", marks=pytest.mark.long),  # two points, on which it cannot stand
-    pytest.param("simple_humanoid", marks=pytest.mark.long),  # motors that are too weak
-]
+    "g1",  # soles and arms
+    "bolt",  # two points, on which it cannot stand
+    "simple_humanoid",  # motors that are too weak
+)
 """One robot of each kind besides BRUCE; tests/robots and graphs/test_robots.py have every one."""
 OF_ROBOTS = [name for name in known_names() if find_block(name).needs]
 """The blocks that behave differently with another robot."""
@@ -39,13 +38,6 @@ ROWS_OF_BRUCE = {
 }
 """What takes others a minute of planning, to find that the example is not for them."""
 
-LATER = {
-    "hal.TwinRobot": [case for case in conformance_cases() if case not in ("bounds", "restored")],
-    "hal.MujocoRobot": ["array allocations"],
-    "blocks.WholeBodyController": ["live parameters"],
-    "blocks.SquatJumpReference": conformance_cases(),
-}
-"""What takes seconds with another robot: `make test` has it with BRUCE, and the long tests with all."""
 PLANS = ("outputs written", "deterministic", "restored", "inputs kept", "life")
 """The checks of ``blocks.OnlinePlanner`` that make several plans, which takes seconds."""
 
@@ -81,6 +73,7 @@ def test_conformance(name: str, case: str) -> None:
     check_block(find_block(name), robot="bruce", cases=[case])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", OTHERS)
 @pytest.mark.parametrize("name", OF_ROBOTS)
 def test_conformance_with_other_robots(name: str, robot: str) -> None:
@@ -94,19 +87,8 @@ def test_conformance_with_other_robots(name: str, robot: str) -> None:
         with pytest.raises(BlockError, match=BEYOND[robot, name]):
             BlockBench(block, block.example_parameters(), robot=robot)
         return
-    now = [case for case in conformance_cases() if case not in LATER.get(name, ())]
-    checked_with(robot, name, now if robot == "go2" else None)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", LATER)
-def test_conformance_with_another_robot_at_length(name: str) -> None:
-    checked_with("go2", name, LATER[name])
-
-
-def checked_with(robot: str, name: str, cases: Iterable[str] | None) -> None:
     try:
-        check_block(find_block(name), robot=robot, cases=cases)
+        check_block(block, robot=robot)
     except BlockError as error:
         if "ask for less" not in str(error):  # the example's jump is beyond this robot's motors
             raise

@@ -45,6 +45,7 @@ def tutorial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [
@@ -73,6 +74,7 @@ def test_the_tutorial_works(tutorial: Path, command: list[str]) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_the_tutorials_study_of_ones_own_robot_is_right(tutorial: Path) -> None:
     source = find_file(
         "package://example-robot-data/robots/go1_description/urdf/go1.urdf", tutorial
@@ -106,6 +108,7 @@ def test_the_whole_graph_in_the_documentation_runs(tmp_path: Path) -> None:
     assert 0.1 < abs(error[-100:]).max() < 1.0
 
 
+@pytest.mark.long
 def test_the_first_study_on_its_page_tells_three_filters_apart(tmp_path: Path) -> None:
     for name, text in FILE.findall((ROOT / "docs" / "studies.md").read_text()):
         (tmp_path / name).write_text(text)

@@ -37,6 +37,7 @@ def test_every_sub_package_is_listed() -> None:
     assert len(LISTED) == len(set(LISTED))
 
 
+@pytest.mark.long
 def test_the_wheel_holds_all_code_and_data(wheel: Path) -> None:
     inside = set(zipfile.ZipFile(wheel).namelist())
     expected = {"aloft/py.typed", "aloft/robots/bruce/bruce.yaml"}

@@ -40,6 +40,7 @@ from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
 from .battery import Battery, spread_voltage
+from .contact_bias import ContactBias
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
 from .effects import SwitchEffects
@@ -167,12 +168,12 @@ class ExternalForces:
 
 
 def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
-    """The two parts of a physics step: what follows from the state, and the step with the present
-    controls. Keep ``model`` and ``data`` alive.
+    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
+    and ``data`` must stay alive.
 
-    Machine code and Python call the same two functions, so the bytes are the same. An error that is
-    fatal to the simulator, such as no memory left for contacts, ends the process in machine code, and
-    is an exception in Python. Of the simulator's memory a jump uses less than a hundredth.
+    Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the
+    simulator, such as no memory left for contacts, ends the process in machine code, and is an exception in Python.
+    Of the simulator's memory a jump uses less than a hundredth.
     """
     import mujoco
 
@@ -186,8 +187,7 @@ def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
 
 @cache
 def _addresses() -> tuple[int, int]:
-    """The addresses of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros
-    where it is not found, and then Python calls them."""
+    """Of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros where it is not found."""
     import mujoco
 
     folder, version = Path(mujoco.__file__).parent, mujoco.mj_versionString()
@@ -198,10 +198,8 @@ def _addresses() -> tuple[int, int]:
     return 0, 0
 
 
-SETTLING_TIME = 0.3
-"""The time that a robot settles for, before it is checked whether it stands [s]."""
-OBSERVED_TIME = 0.02
-"""The last part of the settling time, in which the load on the feet is averaged [s]."""
+SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
+"""How long a robot settles before it is checked whether it stands, and the last part of it, in which the load is averaged [s]."""
 
 
 class JointTorques(Protocol):
@@ -358,6 +356,8 @@ class Plant:
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
+        if self._params.contact_bias:
+            self.step1 = LibraryCall(ContactBias(model, data).begin_step, 0)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(

@@ -93,6 +93,10 @@ class SimulatorParameters(DriveGains):
     contact_stiffness_spread: float = parameter(
         1.0, ge=1.0, le=16.0, text="further factor, log-uniform between its inverse and this"
     )
+    contact_bias: bool = parameter(
+        False,
+        text="whether contacts of spheres with the ground count J' q', which MuJoCo leaves out, so that soles slide on moving legs",
+    )
     mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
     mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
     joint_friction: float = parameter(1.0, ge=0, text="factor on the motors' friction and damping")

@@ -28,7 +28,7 @@ from ..task.task import JumpTask
 from .arm_range import arm_ranges
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
-from .leg_rows import body_points, fore_and_hind
+from .leg_rows import body_points
 from .obstacles import side_clearance, step_parameters
 from .stage_functions import StageFunction, parameter_sizes
 from .structure import Structure
@@ -474,7 +474,7 @@ class ProblemBuilder:
     @cached_property
     def _leg_gaps(self) -> list[float]:
         """The least gaps [m] between fore and hind legs: those of the standing robot where it has less than asked for."""
-        count = len(fore_and_hind(self.model, self.coordinates))
+        count = self.structure.leg_pairs
         if not count:
             return []
         standing = self.coordinates.reduce(self.stances[0].coordinates)

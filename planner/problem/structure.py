@@ -167,7 +167,7 @@ class Structure:
         self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
-        self._leg_gaps = len(fore_and_hind(model, coordinates))
+        self.leg_pairs = len(fore_and_hind(model, coordinates))
         self.given: dict[int, list[tuple[int, float, str]]] = {}
         self._kept: dict[ProblemPhase, NDArray[np.int64]] = {}
         self.knots = self._knots()
@@ -309,7 +309,7 @@ class Structure:
     def _air_rows(self, k: int) -> NDArray[np.int64]:
         """Which rows are needed: how far ahead only where there is an edge."""
         rows = self.pieces["air"].rows
-        points = (rows - self._leg_gaps) // 3
+        points = (rows - self.leg_pairs) // 3
         feet = len(self.coordinates.contacts)
         ahead = np.arange(points, points + feet)
         if self.hops[self.of_knot[k].place].rotation:

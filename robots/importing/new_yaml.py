@@ -216,7 +216,7 @@ def yaml_text(
     lines += [f"# {note}." for note in notes]
     lines += ["", *_feet(feet), "", *_profile(robot, estimated), "", *sensors]
     if feet:
-        lines += ["", *_angles("standing", robot.standing)]
+        lines += ["", *_standing(robot.standing)]
     lines += [
         "",
         "# Joints that stand still at an angle while the robot is at work: arms, a waist.",
@@ -302,9 +302,11 @@ def _sensors(robot: RobotDescription, model: RawModel, built: LinkTree) -> list[
     return lines
 
 
-def _angles(key: str, angles: Mapping[str, float]) -> list[str]:
-    lines = ["# Found: soles on one level, the centre of mass over their middle.", f"{key}:"]
-    return lines + _numbers(angles)
+def _standing(angles: Mapping[str, float]) -> list[str]:
+    if not angles:
+        return ["# NOT FOUND: a pose in which it stands. Write one: standing: {JOINT: ANGLE, ...}"]
+    found = "# Found: soles on one level, the centre of mass over their middle."
+    return [found, "standing:", *_numbers(angles)]
 
 
 def _numbers(angles: Mapping[str, float]) -> list[str]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from difflib import get_close_matches
 from xml.etree import ElementTree
+
+from ...files.problems import nearest
 
 NEAR = 0.8
 """The likeness from which a word is taken for another one, misspelt."""
@@ -68,7 +69,7 @@ def _near(word: str, known: tuple[str, ...]) -> str:
     if word in known:
         return ""
     swapped = [each for each in known if sorted(each) == sorted(word)]
-    return next(iter(swapped or get_close_matches(word, known, 1, NEAR)), "")
+    return next(iter(swapped or nearest(word, known, 1, NEAR)), "")
 
 
 def wrong_inertia(link: ElementTree.Element) -> str:

@@ -39,6 +39,7 @@ def line_of(text: str) -> int:
     return 1 + next(i for i, line in enumerate(lines) if text in line)
 
 
+@pytest.mark.long
 def test_a_loop_in_python(graph: Callable[[bool], str], call_json: Any) -> None:
     result = call_json("run", graph(False), code=3)
     assert result["reason"] == (

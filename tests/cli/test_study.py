@@ -63,6 +63,7 @@ def test_rows_goals_and_table(study: Path, folder: Path, call_json: CallJson) ->
     assert rows[0]["counter.last_count"] == 1051.0 and len(rows[0]["run_hash"]) == 32
 
 
+@pytest.mark.long
 def test_arms_are_compared_over_equal_seeds(study: Path, call: Call, call_json: CallJson) -> None:
     result = call_json("study", "grid.yaml", "--workers", "1", "--detect", "10%")
     success, count = (each for each in result["comparisons"] if "double" not in each["metric"])
@@ -230,6 +231,7 @@ def test_optuna_proposes_and_a_lost_part_is_made_again(
     assert result["tuned"]["high"] == said["arms"]["high"]["set"]
 
 
+@pytest.mark.long
 def test_part_of_a_study_and_plots_that_cannot_be_drawn(
     study: Path, folder: Path, call: Call, call_json: CallJson
 ) -> None:

@@ -30,6 +30,7 @@ def test_options_that_mean_nothing(tmp_path: Path) -> None:
     assert code == 2 and "add --save FILE.rrd" in text
 
 
+@pytest.mark.long
 def test_what_is_shown_can_be_kept(tmp_path: Path) -> None:
     recording, kept = tmp_path / "count.rrd", tmp_path / "kept.rrd"
     graph = str(ROOT / "tests/cli/count.yaml")

@@ -36,6 +36,7 @@ def test_the_plan_begins_when_all_switches_have_been_loaded() -> None:
     assert not np.any(closed[:250]) and np.mean(closed[stands - 100 : stands]) > 0.95
 
 
+@pytest.mark.long
 def test_a_robot_that_nobody_puts_down_waits_without_a_fault() -> None:
     result = run(robot__gantry={"height": 0.04, "lower_after": None})
     assert not result.success and result.reason == "the plan has not begun"

@@ -93,6 +93,7 @@ blocks:
 """
 
 
+@pytest.mark.long
 def test_a_users_task_with_an_input_of_its_own_lies_beside_the_graph(tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     robot = find_robot("go2")

@@ -109,6 +109,7 @@ def test_a_robot_that_does_not_stand_is_damped_at_once(change: Any) -> None:
     assert len(heights) == STOP_CYCLES
 
 
+@pytest.mark.long
 def test_a_fault_on_the_way_ends_in_damping() -> None:
     fault = {"kind": "dead", "start": 0.3, "target": "left_knee_motor"}
     bench, heights = standing(TwinRobot, faults=[fault])

@@ -43,6 +43,7 @@ def planned(robot_name: str) -> PlannedJump:
     return solve_jump(make_task({**asked, **more}), robot, compiled=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", [QUADRUPED, BIPED], ids=["quadruped", "biped"])
 def test_a_jump_ahead(robot: RobotDescription) -> None:
     """Forces and motion are exact dynamics', and the task is done; the coarse grid alone may cost

@@ -105,6 +105,7 @@ def test_the_table_has_every_jump() -> None:
     assert table.columns["com_acceleration"][pushing, 2].mean() > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "task",
     [

@@ -126,6 +126,7 @@ def test_every_stance_obeys_the_dynamics_the_cones_and_the_limits(dynamics, stan
         assert np.abs(motor).max() <= 0.5 * 10.5 + 1e-6
 
 
+@pytest.mark.long
 @given(st.integers(0, 10_000), st.sampled_from(SUBSETS), st.sampled_from(list(Phase)[:6]))
 @settings(max_examples=40, deadline=None)
 def test_two_solvers_find_the_same_optimum(dynamics, seed, stance, phase):

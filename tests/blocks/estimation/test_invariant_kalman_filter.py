@@ -153,6 +153,7 @@ class Disturbed:
         self.disturb(self.points)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("level_ground", [True, False])
 def test_machine_code_estimates_the_same_bytes(level_ground):
     """Through touchdowns, lift-offs and saturated samples."""

@@ -97,6 +97,7 @@ def test_units_are_checked_and_the_plant_breaks_the_loop(folder: Path) -> None:
         )
 
 
+@pytest.mark.long
 @needs_compiler
 def test_a_snapshot_and_a_replay_have_the_library(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder / "controller", tmp_path / "controller")

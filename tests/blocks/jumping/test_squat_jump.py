@@ -134,6 +134,7 @@ def test_left_and_right_mirror(in_place):
     assert joints[:, 5:] == pytest.approx(joints[:, :5] * mirror, abs=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "part"),
     [

@@ -74,6 +74,7 @@ def test_the_load_of_a_kept_plan_is_read_without_the_plan() -> None:
     assert library.load_of(task.model_copy(update={"rise": 0.0123})) is None
 
 
+@pytest.mark.long
 def test_a_twin_is_armed_by_what_its_plan_heats() -> None:
     """Of 71 deg C a jump of 12 cm leaves room, which a flat 5 K would not."""
     graph = aloft.load(

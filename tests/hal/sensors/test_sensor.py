@@ -62,6 +62,7 @@ def test_declared_errors_and_the_factor_on_them() -> None:
     assert not ideal.block.plant.sensors.mounted[0].bias("specific_force").any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", [MujocoRobot, TwinRobot])
 def test_machine_code_and_snapshots_give_the_same_bytes(kind: type[Any]) -> None:
     gains = (300.0, 1.5) if kind is MujocoRobot else (3.5, 0.1)

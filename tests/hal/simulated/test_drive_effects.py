@@ -159,6 +159,7 @@ def test_cogging_pulls_at_rest_and_without_current() -> None:
     assert len(set(phases.tolist())) > 1, "each motor has a phase of its own"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effects", "message"),
     [

@@ -31,6 +31,7 @@ def test_standing_sensors_have_the_stated_noise_and_bias() -> None:
     assert abs(np.mean(white[1:] * white[:-1])) < 4 * 0.02**2 / np.sqrt(1000)
 
 
+@pytest.mark.long
 def test_biases_of_many_seeds_fill_their_range() -> None:
     offsets = []
     for seed in range(30):

@@ -44,6 +44,8 @@ STOPS: list[tuple[dict[str, Any], int, str]] = [
     ({"kind": "saturated_gyro"}, 100, "the gyroscope has been at its range of 35 rad/s"),
 ]  # fmt: skip
 """The fault, the exchanges within which the driver must notice it, and what it says."""
+FAST = ("dead", "hot", "pulled_cable", "frozen_imu")
+"""The kinds that `make test` has: each takes a second."""
 
 
 def bench(*faults: dict[str, Any], **params: Any) -> BlockBench[TwinRobot]:
@@ -67,7 +69,14 @@ def exchanges_to_damping(robot: BlockBench[TwinRobot], most: int) -> int:
     return twin.exchanges - twin.zero - round(START / 0.001)
 
 
-@pytest.mark.parametrize(("fault", "cycles", "text"), STOPS, ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize(
+    ("fault", "cycles", "text"),
+    [
+        pytest.param(*stop, marks=() if stop[0]["kind"] in FAST else pytest.mark.long)
+        for stop in STOPS
+    ],
+    ids=lambda value: str(value)[:40],
+)
 def test_it_ends_in_damping_in_time(fault: dict[str, Any], cycles: int, text: str) -> None:
     robot = bench(fault)
     passed = exchanges_to_damping(robot, cycles)

@@ -50,6 +50,7 @@ def test_it_stands_by_itself_when_it_is_commanded_to() -> None:
     assert not health.age.any() and health.imu_age == 0.0
 
 
+@pytest.mark.long
 def test_the_measured_torque_is_what_the_motors_give() -> None:
     robot = bench()
     hold(robot)
@@ -119,6 +120,7 @@ def write_hardware(folder: Path, board: dict[str, Any] | None = None, **motor: A
     return "bench.yaml"
 
 
+@pytest.mark.long
 def test_addresses_directions_and_offsets_do_not_show(tmp_path: Path) -> None:
     plain, turned = bench(), bench(tmp_path, hardware=write_hardware(tmp_path, sign=-1, offset=0.5))
     for robot in (plain, turned):
@@ -132,6 +134,7 @@ def test_addresses_directions_and_offsets_do_not_show(tmp_path: Path) -> None:
         np.testing.assert_allclose(first, second, atol=2e-2)
 
 
+@pytest.mark.long
 def test_a_turned_imu_inverted_switches_and_other_motors_do_not_show(tmp_path: Path) -> None:
     board = {"imu_rotation": [0.3, -1.2, 0.7], "normally_closed": ["left_toe"]}
     file = write_hardware(tmp_path, board, torque_constant=0.5)

@@ -234,6 +234,7 @@ def test_a_process_ends_with_one_that_died_before_it_had_a_task() -> None:
     assert done.stderr == b""
 
 
+@pytest.mark.long
 def test_the_process_imports_no_pandas_and_arrow_does_without() -> None:
     code = (
         "import sys\n"

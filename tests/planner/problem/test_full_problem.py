@@ -75,6 +75,7 @@ def momenta(plan: PlannedJump) -> tuple[float, float]:
     return float(sizes[lift_off]), float(sizes[touchdown])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("where", ["lift_off", "touchdown"])
 def test_angular_momentum_can_be_bounded(where: str) -> None:
     free = solve_jump(

@@ -81,6 +81,7 @@ def test_without_a_compiler_the_plan_is_the_same() -> None:
     assert np.abs(compiled.com - interpreted.com).max() < 1e-6
 
 
+@pytest.mark.long
 def test_a_near_plan_saves_iterations() -> None:
     near = make_task({"recipe": "paper", "name": "near", "rise": 0.15, "distance_x": 0.09})
     cold, warm = (

@@ -86,6 +86,7 @@ def test_a_plan_keeps_them() -> None:
     assert share.min() >= 0.2 - 1e-4
 
 
+@pytest.mark.long
 def test_a_plan_hits_the_ground_no_faster_than_it_may() -> None:
     jump = {
         "recipe": "paper", "name": "a", "rise": 0.09, "impact": True, "weights": {"impulse": 1e-6}

@@ -12,7 +12,10 @@ import yaml
 
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.robots.description import RobotDescription, find_robot, read
+from aloft.robots.importing.new_yaml import new_yaml
+from aloft.robots.importing.package_files import find_file
 
+from ..example_robots import PACKAGE, needs_robots
 from .model_files import ARM, CART_POLE, DRONE, INERTIAL, ONE_LEG, PLANAR, SPHERICAL_HIP
 
 
@@ -247,3 +250,13 @@ def test_the_yaml_adds_to_the_thrusters_of_the_file(tmp_path: Path) -> None:
         -0.2,
         0.0,
     )
+
+
+@needs_robots
+def test_a_robot_that_stands_in_no_pose_found_is_written_and_read(tmp_path: Path) -> None:
+    arm = find_file(PACKAGE + "borinot_description/urdf/borinot_flying_arm_2.urdf", Path())
+    assert arm is not None
+    target = tmp_path / "arm.yaml"
+    target.write_text(new_yaml(arm, target)[0])
+    assert "# NOT FOUND: a pose in which it stands." in target.read_text()
+    assert len(read(target).description.feet) == 1

@@ -110,6 +110,7 @@ def test_live_parameters_hold_from_the_runs_that_are_sampled_then(use: str, name
     )
 
 
+@pytest.mark.long
 def test_parameters_that_the_block_refuses_leave_the_old_ones() -> None:
     background, _ = both("Slow", 6)
     result = run(background, sinks=[ChangeAt(gain=(17, 7.0))])
@@ -138,6 +139,7 @@ def test_what_is_under_way_is_computed_again(use: str, at: int) -> None:
             assert rest() == first
 
 
+@pytest.mark.long
 def test_another_run_goes_on_from_a_snapshot() -> None:
     background, _ = both("Follower", 6)
     with SteppedRun(background) as stepped:
@@ -236,6 +238,7 @@ def test_a_replay_repeats_the_run_from_any_keyframe() -> None:
     assert replayed.identical and replayed.ran == ("wave", "sum", "motor")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("places", [{"motor": "b"}, {"block": "b", "sum": "c"}])
 def test_machines_in_lockstep_give_the_bytes_of_one_process(places: dict[str, str]) -> None:
     background, _ = both("Slow", 6)

@@ -33,6 +33,7 @@ def graph_file(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.long
 def test_the_pad_is_dragged_and_springs_back(
     server: LiveServer, running: Running, tmp_path: Path
 ) -> None:

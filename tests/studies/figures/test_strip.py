@@ -38,6 +38,7 @@ def test_the_robot_is_where_its_pose_says() -> None:
     assert rows[0] - rows[1] > 10  # higher up is nearer to the picture's first row
 
 
+@pytest.mark.long
 def test_the_robot_is_drawn_on_ground_of_many_pieces() -> None:
     (piece,) = step(0.05, 0.1).blocks
     ground = Terrain(blocks=(piece,) * 400)

@@ -125,6 +125,7 @@ def test_a_robot_s_reach(bruce: RobotDescription, stand_in: StandIn, tmp_path: P
     assert "15 / 20 / 25 cm" in chart and pixels.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_when_the_time_runs_out_the_best_so_far_is_told(
     bruce: RobotDescription, stand_in: StandIn, tmp_path: Path
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -179,7 +179,16 @@ def assert_found(entries: list[dict[str, Any]], step: str, text: str) -> None:
         assert entries[-1] is first
 
 
-@pytest.mark.parametrize("name", WIRINGS)
+def and_long(names: Iterable[str]) -> Iterator[Any]:
+    """All wirings, of which those are long whose step has found another one before."""
+    steps: set[str] = set()
+    for name in names:
+        step = WIRINGS[name][1]
+        yield pytest.param(name, marks=pytest.mark.long) if step in steps else name
+        steps.add(step)
+
+
+@pytest.mark.parametrize("name", [*and_long(WIRINGS)])
 def test_it_is_found_by_its_step(name: str, tmp_path: Path) -> None:
     change, step, text = WIRINGS[name]
     wiring = Wiring.of(ROBOT)
