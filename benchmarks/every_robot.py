@@ -1,14 +1,17 @@
-"""Every URDF of the Python package ``example-robot-data``: is it read, what is guessed, does it stand."""
+"""Every URDF of the Python package ``example-robot-data``: is it read and imported, what is guessed, does it stand."""
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
 
 from ..planner.library.library import shipped_folder
 from ..robots.description import ReadRobot, RobotError, read
+from ..robots.importing.new_yaml import new_yaml
 from ..robots.importing.package_files import find_file
+from ..robots.report import report
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
 from ..studies.check_up import check_up, obstacles_to_jumping
@@ -22,7 +25,8 @@ def every_robot() -> list[Row]:
     """A row for every file: its joints, or none where it is refused, and what became of it.
 
     A robot with feet that floats is put on the ground as a file without a YAML is read, and stands in the
-    robust trial for 3.5 s or until the score has judged it. The time is the processor's for reading the file.
+    robust trial for 3.5 s or until the score has judged it. The time is the processor's for reading the file. The YAML that
+    ``aloft robot import`` would write is read, too; where it is refused the row says why.
     """
     one = find_file(ONE, Path())
     if one is None:
@@ -45,7 +49,21 @@ def _row(path: Path, name: str) -> Row:
     took = time.process_time() - start
     robot = found.description
     said = f"{robot.total_mass:.3g} kg, {len(robot.feet)} feet, read in {took:.1f} s"
-    return Row(name, float(len(robot.joints)), "joints", note=f"{_standing(found)}; {said}")
+    refused = _import(path)
+    more = f"; its imported YAML is refused: {refused}" if refused else ""
+    return Row(name, float(len(robot.joints)), "joints", note=f"{_standing(found)}; {said}{more}")
+
+
+def _import(path: Path) -> str:
+    """What is wrong with the YAML that importing a file writes; empty where it is read and shown."""
+    with tempfile.TemporaryDirectory(prefix="aloft-import-") as folder:
+        target = Path(folder) / "robot.yaml"
+        target.write_text(new_yaml(path, target)[0], encoding="utf-8")
+        try:
+            report(read(target))
+        except RobotError as error:
+            return error.faults[0].message
+    return ""
 
 
 def _standing(found: ReadRobot) -> str:
