@@ -199,22 +199,8 @@ def test_it_is_found_by_its_step(name: str, tmp_path: Path) -> None:
         assert len(entries) == BEFORE_POWER
 
 
-MEASURED = [name for name in UNDER_POWER if "torque constant" in name or "friction" in name]
-"""Those of several motors that one measurement of all motors, which takes half a minute, finds together."""
-
-
 @pytest.mark.long
-def test_what_motors_give_is_measured(tmp_path: Path) -> None:
-    wiring = Wiring.of(ROBOT)
-    for name in MEASURED:
-        UNDER_POWER[name][0](wiring)
-    entries = walked(session_with(wiring, tmp_path, 3, HandErrors()), "motors", "motors")
-    for name in MEASURED:
-        assert_found(entries, *UNDER_POWER[name][1:])
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", [name for name in UNDER_POWER if name not in MEASURED])
+@pytest.mark.parametrize("name", UNDER_POWER)
 def test_it_is_found_under_power(name: str, tmp_path: Path) -> None:
     change, step, text = UNDER_POWER[name]
     wiring = Wiring.of(ROBOT)
