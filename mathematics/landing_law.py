@@ -51,16 +51,18 @@ def landing_place(
     y = nominal[1] + w_l[1] * linear[1] + w_k[1] * angular[0]
     y += side * w_c * abs(linear[1])
     out[0], out[1], out[2] = x, y, nominal[2]
-    keep_within(p_max, centre, out)
+    keep_within(p_max, centre, centre, out)
 
 
 @kernel
-def keep_within(p_max: Vector2, centre: Array1D, place: Array1D) -> None:
-    """Move a ``place`` (3,) that is farther from the ``centre`` than ``p_max`` ahead or aside to
-    that limit."""
+def keep_within(p_max: Vector2, centre: Array1D, planned: Array1D, place: Array1D) -> None:
+    """Move a ``place`` (3,) that is farther from the ``centre`` than ``p_max`` ahead or aside, and than the ``planned``
+    place on the same side, to the farther of these limits: the plan has tried what it asks for."""
     for i in range(2):
         far = p_max[i]
-        distance = place[i] - centre[i]
+        distance, reach = place[i] - centre[i], planned[i] - centre[i]
+        if distance * reach > 0.0:
+            far = max(far, abs(reach))
         if abs(distance) > far:
             place[i] = centre[i] + math.copysign(far, distance)
 

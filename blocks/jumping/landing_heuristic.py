@@ -167,7 +167,8 @@ class LandingHeuristic(Block):
     With ``law: predicted`` the landing place is chosen anew in every tick: all feet are shifted ahead,
     to the left, apart and upwards by what costs least, counting the distance from the capture point,
     the change of the legs' length, and the tilt of the torso at touchdown that the momenta lead to.
-    ``docs/landing.md`` has this law in full. p_max applies as above.
+    ``docs/landing.md`` has this law in full. p_max applies as above, but holds no foot back from its planned place:
+    feet of a quadruped swing farther in a long jump, and the plan knows how far its legs reach.
 
     With ``lead_by: fall`` feet are ahead of their planned way by as much as the soles come down sooner than
     planned: a robot that lifts off too slowly, or whose toes point up, otherwise lands while its feet are still on
@@ -439,7 +440,7 @@ def choose_place(
         place[0] = planned[0] + shift[0]
         place[1] = planned[1] + (shift[1] + side * shift[2])
         place[2] = planned[2] + shift[3]
-        keep_within(params.p_max, scratch.centre[foot], place)
+        keep_within(params.p_max, scratch.centre[foot], planned, place)
         return
     landing_place(
         planned, side, scratch.linear, scratch.angular, params.w_l, params.w_k,

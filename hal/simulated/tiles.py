@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ...robots.description import RobotDescription
-from ...robots.kinematics import standing_contacts
+from ...robots.kinematics import ball_feet, standing_contacts
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, Terrain
 
@@ -119,7 +119,10 @@ class UnevenParameters(TileKind):
         1.5, unit="m", gt=0, le=10.0, text="how far from the start there are tiles on the floor"
     )
     margin: float = parameter(
-        0.01, unit="m", ge=0, text="how far the level tile reaches beyond the contact points"
+        0.01,
+        unit="m",
+        ge=0,
+        text="how far the level tile reaches beyond what touches the ground: contact points, or ball feet",
     )
 
     def cover(self, scene: Terrain, robot: RobotDescription | None, seed: int) -> Terrain:
@@ -151,9 +154,15 @@ class UnevenParameters(TileKind):
         """The rectangle on which the robot stands at the start."""
         if robot is None or not robot.contacts:
             return (-0.2, 0.2), (-0.2, 0.2)
-        x, y = standing_contacts(robot)[:, :2].T
-        m = self.margin
-        return (float(x.min()) - m, float(x.max()) + m), (float(y.min()) - m, float(y.max()) + m)
+        beyond = np.full(len(robot.contacts), self.margin)
+        for ball in ball_feet(robot):
+            # A tile that is higher by `height` would push a ball that stands nearer to it than this.
+            above = max(ball.radius - self.height, 0.0)
+            beyond[ball.point] += math.sqrt(ball.radius**2 - above**2)
+        spans = []
+        for place in standing_contacts(robot)[:, :2].T:
+            spans.append((float((place - beyond).min()), float((place + beyond).max())))
+        return spans[0], spans[1]
 
     def _around(
         self, start: Area, area: Area, top: float, rng: np.random.Generator

@@ -21,6 +21,7 @@ from ...robots.robot_description import Link
 from ...robots.shapes import Edge, corners_of, edges
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
+from ..task.read_task import edge_room
 from ..task.sequence import Hop, StanceLocation, step_of
 from .layout import ProblemPhase
 
@@ -167,14 +168,29 @@ class ObstacleRows:
         return np.concatenate([self._of_kind[kind] for kind in kinds])
 
 
+def side_clearance(
+    robot: RobotDescription, hop: Hop, edge: float | None, start: StanceLocation, end: StanceLocation, apart: float
+) -> float:  # fmt: skip
+    """How far [m] the folding knees of a robot with ball feet keep off a step's side: as far ``apart`` as
+    from the ground, or as the standing robot is. Links of other robots keep ``ROUNDING`` from it."""
+    if edge is None or hop.rotation or not ball_feet(robot):
+        return 0.0
+    before, behind = edge_room(robot, hop, start, end, apart)
+    stands = abs(before - edge if step_of(hop, start) > 0.0 else behind - edge)
+    return min(apart, max(0.0, stands - 2.0 * ROUNDING))
+
+
 def step_parameters(
     hop: Hop, edge: float | None, start: StanceLocation, end: StanceLocation, share: float,
-    leans: bool,
+    leans: bool, beside: float = 0.0,
 ) -> dict[str, Any]:  # fmt: skip
     """The piece's parameters under a jump from ``start`` to ``end``. With no edge the ground changes
-    in the middle of the flight; ``share`` of its time is past. Planes if it ``leans``."""
+    in the middle of the flight; ``share`` of its time is past. Planes if it ``leans``. The higher ground reaches
+    ``beside`` [m] beyond its edge, for what must keep off its side."""
     ground, step = start.z, hop.landing_height or 0.0
     onwards = 1.0 if (hop.distance_x or 0.0) >= 0.0 else -1.0
+    if edge is not None:
+        edge -= math.copysign(beside, step_of(hop, start)) * onwards
     if leans:
         before, after = np.array(start.plane), np.array(end.plane)
         planes = {"ground": before, "step": after - before}

@@ -29,7 +29,7 @@ from .arm_range import arm_ranges
 from .assembly import Assembly, NonlinearProgram
 from .layout import ProblemPhase
 from .leg_rows import body_points
-from .obstacles import step_parameters
+from .obstacles import side_clearance, step_parameters
 from .stage_functions import StageFunction, parameter_sizes
 from .structure import Structure
 
@@ -131,6 +131,7 @@ class ProblemBuilder:
         )
         self.pieces, self.free_base = pieces, coordinates.free_base
         self._nominal: dict[int, Array] = {}
+        self._beside: dict[int, float] = {}
         self._tables: dict[tuple[str, tuple[Rows, ...]], tuple[tuple[str, ...], Array, Array]] = {}
         self._of_motors: dict[float, list[Rows]] = {}
         self._body_points = body_points(model, coordinates)
@@ -166,7 +167,7 @@ class ProblemBuilder:
         other.lower, other.upper = self.lower.copy(), self.upper.copy()
         other.row_lower, other.row_upper = self.row_lower.copy(), self.row_upper.copy()
         other.parameters, other.families = self.parameters.copy(), self.families.copy()
-        other._nominal, other._tables = {}, self._tables.copy()
+        other._nominal, other._beside, other._tables = {}, {}, self._tables.copy()
         other.problem = replace(
             built, task=task, stances=other.stances, lower=other.lower, upper=other.upper,
             row_lower=other.row_lower, row_upper=other.row_upper, parameters=other.parameters,
@@ -405,9 +406,14 @@ class ProblemBuilder:
         stretch, obstacles = self.structure.phase_at(k), self.structure.obstacles
         share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
         end = self.structure.places[min(stretch.place + 1, len(self.hops))]
-        self._set("obstacle", k, **step_parameters(hop, edge, place, end, share, self.leans))
-        floor = self.task.foot_clearance * np.sin(np.pi * share)
         apart = BODY_CLEARANCE if self.margins.step is None else self.margins.step
+        number = min(stretch.place, len(self.hops) - 1)
+        if number not in self._beside:
+            robot = self.exact.robot
+            self._beside[number] = side_clearance(robot, hop, edge, place, end, apart)
+        found = step_parameters(hop, edge, place, end, share, self.leans, self._beside[number])
+        self._set("obstacle", k, **found)
+        floor = self.task.foot_clearance * np.sin(np.pi * share)
         self._rows("obstacle", k, [
             ("ground clearance", obstacles.feet, floor, np.inf),
             ("ground clearance", obstacles.count - obstacles.feet, apart, np.inf),

@@ -273,20 +273,12 @@ def _slopes(task: JumpTask) -> Iterator[Contradiction]:
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
     """A step's edge is under no foot, and nothing of the standing robot is in the step."""
-    feet = standing_contacts(robot) if robot.contacts else np.zeros((0, 3))
     for path, hop, start, end in _jumps(task):
         edge = edge_of(hop, start)
-        if edge is None or not len(feet):
+        if edge is None or not robot.contacts:
             continue
-        step = hop.landing_height or 0.0
-        for where, place, higher in (("start", start, step), ("landing", end, -step)):
-            # Who stands beside higher ground must be away from it with all that is below its height.
-            for name, points, radii in (
-                ("the feet", feet, np.zeros(len(feet))),
-                *_low_links(robot, higher),
-            ):
-                x: Array = place.x + product(points[:, :2], _onward(place.heading))
-                back, front = float(np.min(x - radii)), float(np.max(x + radii))
+        for where, place, higher in _stances(hop, start, end):
+            for name, back, front in _reaches(robot, place, higher):
                 if back < edge < front:
                     yield (
                         f"{path}step_edge",
@@ -295,6 +287,46 @@ def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
                         + "landing, or jump farther",
                     )
                     break
+
+
+def edge_room(
+    robot: RobotDescription,
+    hop: Hop,
+    start: StanceLocation,
+    end: StanceLocation,
+    above: float = 0.0,
+) -> tuple[float, float]:
+    """Between which x [m] an edge under a jump is under no foot, and nothing of the standing robot in the step, or less
+    than ``above`` [m] over it: from the front of the robot where it begins to its back where it lands, the former first.
+    A robot that lands near where it stood has no such room: the former is then beyond the latter."""
+    before, behind = (
+        list(_reaches(robot, place, higher + above if higher > 0.0 else higher))
+        for _, place, higher in _stances(hop, start, end)
+    )
+    if (hop.distance_x or 0.0) >= 0.0:
+        return max(front for _, _, front in before), min(back for _, back, _ in behind)
+    return min(back for _, back, _ in before), max(front for _, _, front in behind)
+
+
+def _stances(
+    hop: Hop, start: StanceLocation, end: StanceLocation
+) -> tuple[tuple[str, StanceLocation, float], ...]:
+    """Where the robot stands before and behind an edge, and how much higher the ground beyond it is [m]."""
+    step = hop.landing_height or 0.0
+    return ("start", start, step), ("landing", end, -step)
+
+
+def _reaches(
+    robot: RobotDescription, place: StanceLocation, higher: float
+) -> Iterator[tuple[str, float, float]]:
+    """From which x to which x [m] the feet of a robot that stands there reach, and what of it is lower than ground
+    beside it that is ``higher`` [m]: it must be away from that with all that is below its height."""
+    feet = standing_contacts(robot)
+    for name, points, radii in (
+        ("the feet", feet, np.zeros(len(feet))), *_low_links(robot, higher)
+    ):  # fmt: skip
+        x: Array = place.x + product(points[:, :2], _onward(place.heading))
+        yield name, float(np.min(x - radii)), float(np.max(x + radii))
 
 
 def _onward(heading: float) -> Array:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.task.read_task import contradictions
+from ...planner.task.read_task import contradictions, edge_room
 from ...planner.task.task import JumpTask, make_task
 from ...robots.robot_description import RobotDescription
 
@@ -95,12 +95,15 @@ class JumpSizes:
         rise: of the jumps that go somewhere.
         onto: how far ahead it jumps onto a step.
         off: and off one.
+        onto_edge, off_edge: how far ahead the step's edge is; without one midway.
     """
 
     scale: float = 1.0
     rise: float = 0.12
     onto: float = 0.20
     off: float = 0.25
+    onto_edge: float | None = None
+    off_edge: float | None = None
 
 
 def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[Direction, ...]:
@@ -108,6 +111,7 @@ def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[
     rise, onto, off = sizes.rise, sizes.onto, sizes.off
     over = 0.5 * rise  # above a step; and so much of the rise is left off one
     down = rise / 1.5
+    edges = [{} if at is None else {"step_edge": at} for at in (sizes.onto_edge, sizes.off_edge)]
 
     def length(name: str, what: str, values: Callable[[float], dict[str, float]],
                step_cm: float, start: int, most: int) -> Direction:  # fmt: skip
@@ -126,9 +130,11 @@ def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[
                   lambda v: {"rise": rise, "twist": v}, math.radians(10.0), 180.0 / math.pi, "deg", 8, 27,
                   robot),
         length("step up", f"the step's height; {_cm(onto)} ahead, rise {_cm(over)} above the step",
-               lambda v: {"rise": over + v, "distance_x": onto, "landing_height": v}, 1.0, 8, 30),
+               lambda v: {"rise": over + v, "distance_x": onto, "landing_height": v, **edges[0]},
+               1.0, 8, 30),
         length("step down", f"the step's height; {_cm(off)} ahead, rise {_cm(down)}",
-               lambda v: {"rise": down, "distance_x": off, "landing_height": -v}, 5.0, 5, 12),
+               lambda v: {"rise": down, "distance_x": off, "landing_height": -v, **edges[1]},
+               5.0, 5, 12),
     )  # fmt: skip
 
 
@@ -162,25 +168,32 @@ def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -
     """The lengths for a robot that can be planned to rise by ``highest`` [m] and no higher.
 
     Jumps rise as far as BRUCE's for their legs, but no further than half of ``highest``. Jumps onto and off a step
-    are so much longer that the robot stands wholly on either side of the edge.
+    are so much longer that the robot stands wholly on either side of the edge. The edge is midway for BRUCE, and for
+    others midway between the front of the robot as it stands before it and its back, often that of its knees, as it
+    stands behind it.
     """
     usual = JumpSizes()
     scale = leg_length(robot) / leg_length(bruce)
     rise = round(min(scale * usual.rise, 0.5 * highest), 2)
     beside = robot.name if robot.name != bruce.name else ""
 
-    def over(length: float, number: int) -> float:
-        """The length, or a greater one [m], with which the direction of that number is consistent where it begins."""
+    def over(length: float, number: int) -> tuple[float, float | None]:
+        """The length, or a greater one [m], with which the direction of that number is consistent where it begins,
+        and the edge."""
         length = _whole_steps(scale * length)
         while length < LONGEST:
-            sizes = JumpSizes(scale, rise, length, length)
-            way = single_directions(sizes, beside)[number]
-            if not contradictions(way.task(way.start), robot):
-                break
+            way = single_directions(JumpSizes(scale, rise, length, length), beside)[number]
+            task = way.task(way.start)
+            if not contradictions(task, robot):
+                if not beside:
+                    break
+                start, end = task.places()
+                return length, round(0.5 * sum(edge_room(robot, task.hops()[0], start, end)), 2)
             length = _whole_steps(length + 0.05)
-        return length
+        return length, None
 
-    return JumpSizes(scale, rise, over(usual.onto, -2), over(usual.off, -1))
+    (onto, onto_edge), (off, off_edge) = over(usual.onto, -2), over(usual.off, -1)
+    return JumpSizes(scale, rise, onto, off, onto_edge, off_edge)
 
 
 def leg_length(robot: RobotDescription) -> float:

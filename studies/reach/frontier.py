@@ -21,7 +21,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -171,29 +171,54 @@ def frontier(
     walks = {d.name: Tries(d) for d in directions}
     searches = {name: explore(tries, effort) for name, tries in walks.items()}
     waiting = {name: next(search) for name, search in searches.items()}
+    jobs = _Jobs()
     with Journal(folder / "runs.jsonl") as journal:
-        while waiting:
-            names, jobs = list[str](), list[PlanJob | RunJob]()
-            for name in list(waiting):
-                while name in waiting:
-                    tries, ask = walks[name], waiting[name]
-                    job = job_for(graph, tries.direction, ask, seeds, folder, journal, keys)
-                    if job is not None:
-                        names.append(name)
-                        jobs.append(job)
-                        break
-                    answer(tries, ask, seeds, journal, keys)
-                    progress(_told(tries, ask))
-                    try:
-                        waiting[name] = next(searches[name])
-                    except StopIteration:
-                        del waiting[name]
-            with closing(job_results(do, jobs, workers=workers)) as results:
-                for result in results:
-                    tries = walks[names[result.index]]
-                    ask = waiting[names[result.index]]
-                    keep(journal, keys, tries.direction, ask, jobs[result.index], result)
+
+        def advance(name: str) -> None:
+            """Go on along a direction, up to the next try that is not kept."""
+            while name in waiting:
+                tries, ask = walks[name], waiting[name]
+                job = job_for(graph, tries.direction, ask, seeds, folder, journal, keys)
+                if job is not None:
+                    jobs.add(name, job)
+                    return
+                answer(tries, ask, seeds, journal, keys)
+                progress(_told(tries, ask))
+                try:
+                    waiting[name] = next(searches[name])
+                except StopIteration:
+                    del waiting[name]
+
+        for name in walks:
+            advance(name)
+        with closing(job_results(do, jobs, workers=workers)) as results:
+            for result in results:
+                name, job = jobs.given[result.index]
+                keep(journal, keys, walks[name].direction, waiting[name], job, result)
+                advance(name)
     return [result_of(tries, len(seeds)) for tries in walks.values()]
+
+
+class _Jobs:
+    """The jobs that can begin, of which there are more each time one is done: no direction waits for another, and
+    the processes, which take seconds to begin, go on to the end."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[str, PlanJob | RunJob]] = []
+        self._begun = 0
+
+    def add(self, name: str, job: PlanJob | RunJob) -> None:
+        """Add a job along the direction of that name."""
+        self.given.append((name, job))
+
+    def __iter__(self) -> Iterator[PlanJob | RunJob]:
+        return self
+
+    def __next__(self) -> PlanJob | RunJob:
+        if self._begun == len(self.given):
+            raise StopIteration  # for now
+        self._begun += 1
+        return self.given[self._begun - 1][1]
 
 
 def _told(tries: Tries, ask: Ask) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,16 +56,17 @@ def reach(
     name = "" if robot.name == bruce.name else robot.name
     legs = leg_length(robot)
 
-    def along(directions: Sequence[Direction]) -> list[dict[str, Any]]:
+    def along(directions: Sequence[Direction], effort: Effort) -> list[dict[str, Any]]:
         return frontier(
             graph, directions, seeds, folder, effort, workers=workers, progress=progress
         )
 
     up = single_directions(JumpSizes(legs / leg_length(bruce)), name)[:1]
-    found = along(up)
-    highest = found[0]["planned"] / up[0].shown
-    if highest:
-        found += along(single_directions(sizes_of(robot, bruce, highest), name)[1:])
+    # What is planned upwards is kept and begins the search along all directions, which share the processors.
+    (first,) = along(up, replace(effort, runs_cpu=0.0, theory_cpu=0.0))
+    highest = first["planned"] / up[0].shown
+    more = single_directions(sizes_of(robot, bruce, highest), name)[1:] if highest else ()
+    found = along((*up, *more), effort)
     for each in found:
         each["in_legs"] = in_legs(each, legs)
     return {

@@ -13,6 +13,7 @@ from aloft.blocks.jumping.landing_heuristic import LandingHeuristic
 from aloft.blocks.signals import Phase
 from aloft.mathematics.landing_law import (
     apply_lead,
+    keep_within,
     landing_place,
     retraction,
     swing,
@@ -129,6 +130,27 @@ def test_limits_are_about_the_stance_of_each_foot_where_asked_for():
     assert far == pytest.approx([0.3, 0.2, 0.0], abs=1e-15)
     beyond = place([0.4, -0.2, 0.0], 1.0, [0.0] * 3, [0.0] * 3, centre=(0.2, 0.15, 0.0))
     assert beyond == pytest.approx([0.35, -0.01, 0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("planned", "place", "kept"),
+    [
+        (0.1, 0.3, 0.15),  # as far as p_max,
+        (0.2, 0.3, 0.2),  # or as the plan where that is farther,
+        (0.2, 0.18, 0.18),
+        (-0.2, 0.3, 0.15),  # on its side only
+        (-0.2, -0.3, -0.2),
+    ],
+)
+def test_limits_hold_no_foot_back_from_its_planned_place(planned, place, kept):
+    found = np.array([1.0 + place, 2.0, 0.0])
+    keep_within(
+        np.array([0.15, 0.16]),
+        np.array([1.0, 2.0, 0.0]),
+        np.array([1.0 + planned, 2.0, 0.0]),
+        found,
+    )
+    assert found == pytest.approx([1.0 + kept, 2.0, 0.0])
 
 
 def test_limits_in_which_a_robot_cannot_stand_are_in_the_load_report():

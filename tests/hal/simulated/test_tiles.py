@@ -14,7 +14,7 @@ from aloft.hal.simulated.scenes import SceneParameters, step
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.tiles import UnevenParameters
 from aloft.robots.description import find_robot
-from aloft.robots.kinematics import standing_contacts
+from aloft.robots.kinematics import ball_feet, standing_contacts
 from aloft.runtime.language.context import Context
 
 BRUCE = find_robot("bruce")
@@ -95,8 +95,15 @@ def test_tiles_stay_within_their_bounds():
 @pytest.mark.parametrize("name", ["bruce", "go2", "solo12"])
 def test_the_robot_stands_on_a_level_tile_at_the_start(name):
     robot = find_robot(name)
-    under = UnevenParameters().cover(scene(), robot, 1)
+    kind = UnevenParameters()
+    under = kind.cover(scene(), robot, 1)
     assert all(under.height(x, y) == 0.0 for x, y, _ in standing_contacts(robot).tolist())
+    for ball in ball_feet(robot):  # no tile beside it is as high as the ball's surface there
+        x, y, _ = standing_contacts(robot)[ball.point].tolist()
+        for way in np.linspace(0.0, 0.999 * ball.radius, 20).tolist():
+            surface = ball.radius - math.sqrt(ball.radius**2 - way**2)
+            around = ((x + way, y), (x - way, y), (x, y + way), (x, y - way))
+            assert max(under.height(*at) for at in around) <= surface
 
 
 def test_the_simulator_tells_scores_how_uneven_its_ground_is():

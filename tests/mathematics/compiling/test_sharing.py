@@ -27,7 +27,7 @@ def jobs():
         (rotations.exponential, (FLOATS,) * 2),
         (rotations.logarithm, (FLOATS,) * 2),
         (linear_algebra.solve_upper, (MATRIX, FLOATS)),
-        (landing_law.keep_within, (FLOATS,) * 3),
+        (landing_law.keep_within, (FLOATS,) * 4),
     )
     return [sharing.CompileJob(f"{k:032d}", *job) for k, job in enumerate(found)]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.robots.example_robots import needs_robots
 
 from aloft.blocks.signals import Phase
 from aloft.planner.library.library import solve_and_check
@@ -15,12 +16,15 @@ from aloft.planner.problem.obstacles import (
     ObstacleRows,
     heights_above_step,
     obstacle_points,
+    side_clearance,
     step_parameters,
 )
 from aloft.planner.solving.solve import make_problem
+from aloft.planner.task.read_task import edge_room
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import fall_height
+from aloft.robots.robot_description import RobotDescription
 
 ROBOT = find_robot("bruce")
 MODEL = SymbolicModel(ROBOT)
@@ -97,6 +101,49 @@ def test_a_step_counts_from_its_edge_on_and_the_higher_ground_a_little_further(
     at_edge = heights(0.2 * way - toe_ahead(), **hop)[toe]
     higher = min(before[toe], after[toe])
     assert at_edge == pytest.approx(higher, abs=0.01 * abs(step))
+
+
+@needs_robots
+@pytest.mark.parametrize(
+    ("step", "way"),
+    [(-0.2, 1.0), (-0.2, -1.0), (0.12, 1.0), (-0.12, 1.0)],  # its knees are just above the last
+)
+def test_folding_knees_keep_off_a_step_s_side(step: float, way: float) -> None:
+    """As far as from the ground, or as the standing robot is, whose knees would be in the way for ever."""
+    robot = find_robot("go2")
+
+    def beside(edge: float, robot: RobotDescription = robot, **more: Any) -> float:
+        said = {
+            "rise": 0.2,
+            "distance_x": 0.9 * way,
+            "landing_height": step,
+            "step_edge": edge,
+            **more,
+        }
+        task = make_task({"name": "jump", "robot": robot.name, **said})
+        return side_clearance(robot, task.hops()[0], edge, *task.places(), 0.03)
+
+    task = make_task(
+        {"name": "a", "robot": "go2", "rise": 0.2, "distance_x": 0.9 * way, "landing_height": step}
+    )
+    before, behind = edge_room(robot, task.hops()[0], *task.places(), 0.03)
+    assert (behind - before) * way > 0.1
+    tight = before if step > 0.0 else behind
+    inwards = math.copysign(1.0, 0.5 * (before + behind) - tight)
+    assert beside(0.5 * (before + behind)) == 0.03
+    assert beside(tight + 0.03 * inwards) == pytest.approx(0.01)
+    assert beside(tight + 0.01 * inwards) == 0.0
+    assert beside(0.5 * (before + behind), rotation="360 deg") == 0.0
+    assert beside(0.45 * way, ROBOT) == 0.0, "legs with ankles"
+
+
+@pytest.mark.parametrize("step", [0.1, -0.1])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_what_is_kept_beside_a_step_is_on_its_lower_side(step: float, way: float) -> None:
+    task = make_task({"name": "a", "rise": 0.2, "distance_x": 0.4 * way, "landing_height": step})
+    hop, places = task.hops()[0], task.places()
+    moved = step_parameters(hop, 0.2 * way, *places, 0.5, False, 0.03)["edge"] - 0.2 * way
+    assert moved == pytest.approx(0.03 * way * (-1.0 if step > 0.0 else 1.0))
 
 
 def test_ground_that_leans_is_a_plane_on_either_side_of_its_edge() -> None:

@@ -56,6 +56,12 @@ def test_other_robots_jump_clear_of_a_step(bruce: RobotDescription, name: str) -
     for way in single_directions(sizes, robot.name):
         require_consistent(way.task(way.start), robot)
         assert way.task(1).robot == name
+    for length, edge in ((sizes.onto, sizes.onto_edge), (sizes.off, sizes.off_edge)):
+        assert edge is not None
+        assert 0.0 < edge < length
+    if name == "go2":  # its knees reach behind its feet
+        assert sizes.off_edge is not None
+        assert sizes.off_edge < 0.4 * sizes.off
 
 
 class StandIn:
