@@ -127,7 +127,7 @@ def test_a_quadruped_stands_wholly_on_either_side_of_an_edge() -> None:
 
     assert "under the feet at the start, which reach from -0.19" in told(distance_x=0.3)[0]
     (knee,) = told(distance_x=0.6)
-    assert "x = 0.3 m is under RL_thigh at the landing, which reach from 0.2" in knee
+    assert "x = 0.3 m is under RL_calf at the landing, which reach from 0.2" in knee
     assert told(distance_x=0.6, landing_height=0.08) == [], "the knees are above that step"
     assert told(distance_x=0.75, step_edge=0.28) == []
 

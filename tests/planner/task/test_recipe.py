@@ -233,7 +233,7 @@ def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:
     assert chosen["bruce"]["margins.touchdown_slide"] == pytest.approx(0.6, rel=0.02)
     assert chosen[balls.name]["margins.touchdown_slide"] == pytest.approx(1.2 * slow, rel=0.02)
     sag = chosen[balls.name]["margins.step"] - chosen["bruce"]["margins.step"]
-    assert sag == pytest.approx(0.04 * size_of(balls).height, abs=1e-3)
+    assert sag == pytest.approx(0.06 * size_of(balls).height, abs=1e-3)
 
 
 def test_a_row_comes_to_balance_between_its_jumps_and_leaves_on_the_toes() -> None:
