@@ -85,15 +85,6 @@ class ContactBias:
         centres = data.geom_xpos[balls]
         arms = centres - data.subtree_com[self._root[balls]]
         turning, spinning = spatial[:, TURNING], velocity[:, TURNING]
-        moving = velocity[:, MOVING] + _cross(spinning, arms)
-        still = _cross(turning, arms + (places - centres))
-        return np.asarray(spatial[:, MOVING] + still + _cross(spinning, moving))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """The cross products of vectors (n, 3)."""
-    result = np.empty_like(a)
-    for k in range(3):
-        ahead, behind = k - 2, k - 1
-        result[:, k] = a[:, ahead] * b[:, behind] - a[:, behind] * b[:, ahead]
-    return result
+        moving = velocity[:, MOVING] + np.cross(spinning, arms)
+        still = np.cross(turning, arms + (places - centres))
+        return np.asarray(spatial[:, MOVING] + still + np.cross(spinning, moving))
