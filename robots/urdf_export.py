@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from ..mathematics.arrays import Array
+from .importing.meshes import STL_TRIANGLE
 from .robot_description import Joint, Link, RobotDescription
 from .shapes import Capsule, Hull, surface
 
@@ -91,13 +92,12 @@ def _connect(root: Element, name: str, kind: str, parent: str, child: str) -> El
 
 def hull_meshes(robot: RobotDescription) -> dict[str, bytes]:
     """The convex hulls as binary STL, by the name of the file: a URDF has no shape for them."""
-    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
     found = {}
     for link in robot.links:
         for k, shape in enumerate(link.shapes):
             if isinstance(shape, Hull):
                 places, triangles = surface(shape)
-                content = np.zeros(len(triangles), layout)
+                content = np.zeros(len(triangles), STL_TRIANGLE)
                 content["corners"] = places[triangles]
                 count = np.array([len(triangles)], "<u4").tobytes()
                 found[_mesh_name(link, k)] = bytes(80) + count + content.tobytes()

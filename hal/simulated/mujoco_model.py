@@ -7,9 +7,9 @@ that joint's armature, and a rotor that is geared to several is a fixed tendon w
 
 Contact: spheres at the contact points, and capsules and hulls for the rest of the robot. These shapes collide
 with the ground and with other limbs, but not with their own limb or the base; a limb consists of
-all links that one joint of the base carries. Capsules of two limbs that overlap in the standing
+all links that one joint of the base carries. Shapes of two limbs that overlap in the standing
 pose do not collide with each other, as they only approximate the links' shapes. Every contact of a
-capsule is a forbidden contact. Friction cones are elliptic.
+shape is a forbidden contact. Friction cones are elliptic.
 
 MuJoCo scales the stiffness of a contact with the mass that it carries: a time constant and a
 damping ratio are given, so robots of any mass sink in by the same fraction of a millimetre.

@@ -107,9 +107,8 @@ def _once(points: Array) -> Array:
     They are told apart by a number made of their bits, which is much faster to sort than rows.
     """
     bits = np.ascontiguousarray(points + 0.0).view(np.uint64)
-    bits ^= bits >> np.uint64(
-        33
-    )  # else two signs that differ would cancel, as in a mesh that is alike on both sides
+    # Else two signs that differ would cancel, as in a mesh that is alike on both sides.
+    bits ^= bits >> np.uint64(33)
     factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
     _, first = np.unique((bits * factors).sum(axis=1, dtype=np.uint64), return_index=True)
     return points[first]

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array, Indices
 
 READABLE = (".stl", ".obj", ".dae")
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+"""A triangle of a binary STL file, behind a header of 80 bytes and the number of triangles in four."""
 FINEST = 5000.0
 """Cells along the longest side of a mesh at first, which joins corners at nearly the same place."""
 COARSER = 1.15
@@ -110,8 +112,7 @@ def stl_corners(content: bytes) -> Array:
     """The corners in binary STL (header, count, 50 bytes a triangle), or in its text form."""
     count = int(np.frombuffer(content[80:84], "<u4")[0]) if len(content) >= 84 else 0
     if len(content) == 84 + 50 * count:
-        layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
-        triangles = np.frombuffer(content, layout, count, 84)
+        triangles = np.frombuffer(content, STL_TRIANGLE, count, 84)
         return np.asarray(triangles["corners"], dtype=float).reshape(-1, 3)
     lines = content.decode("ascii", "replace").splitlines()
     rows = [line.split()[1:4] for line in lines if line.split()[:1] == ["vertex"]]
