@@ -165,7 +165,7 @@ function torso(world) {
 
 window.pushes = []; // for tests: all that were given [N s, world]
 
-let dragged = null, start = null, blow = null, left = 0, shown = new THREE.Vector3(), showing = 0;
+let dragged = null, start = null, plane = null, blow = null, left = 0, shown = new THREE.Vector3(), showing = 0;
 const ray = new THREE.Raycaster();
 
 function under(event) {
@@ -176,13 +176,14 @@ function under(event) {
   return ray;
 }
 
-function onPlane(event) { // through the torso, level
-  const plane = new THREE.Plane(new THREE.Vector3(0, 0, 1), -torso(world).z);
+function onPlane(event) {
   return under(event).ray.intersectPlane(plane, new THREE.Vector3());
 }
 
 canvas.addEventListener("pointerdown", (event) => {
   if (!world || !under(event).intersectObjects(parts.map((part) => part.mesh)).length) return;
+  // level, at the torso's height when the drag begins: the robot moves on under the mouse
+  plane = new THREE.Plane(new THREE.Vector3(0, 0, 1), -torso(world).z);
   start = onPlane(event);
   if (!start) return;
   controls.enabled = false;
