@@ -17,7 +17,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
 from ..models.link_shapes import arms
-from ..task.margins import Margins, joint_bounds
+from ..task.margins import Margins, joint_bounds, plan_limits
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
@@ -254,20 +254,18 @@ def touchdown(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
-    """How fast points hit the ground, downwards and along or across their foot, where bounded."""
-    margins, r, s = e.plan.task.margins, e.replay, e.replay.samples
+    """How fast points hit the ground, downwards and along or across the heading in which their feet
+    shall stand, where bounded. Balls have no heading of their own, and the base may yaw in flight."""
+    margins, s = e.plan.task.margins, e.replay.samples
     if margins is None:
         return
     fast = np.zeros(3)
-    slopes = [place.slope for place in e.plan.task.places()[1:]]
-    for knot, slope in zip(knots, slopes, strict=True):
+    for knot, place in zip(knots, e.plan.task.places()[1:], strict=True):
         speeds = s.point_velocity[np.searchsorted(s.time, e.plan.time[knot] - 1e-9)]
-        for point, foot in enumerate(e.robot.foot_of_contact()):
-            if not e.plan.contact[knot + 1, point]:
-                continue
-            axes = ground_axes(slope, float(r.heading[knot, foot]))
-            along, across, up = speeds[point] @ axes
-            fast = np.maximum(fast, [-up, abs(along), abs(across)])
+        axes = ground_axes(place.slope, place.heading)
+        landing = speeds[np.asarray(e.plan.contact[knot + 1], bool)] @ axes
+        along, across, up = landing.T
+        fast = np.maximum(fast, [(-up).max(), abs(along).max(), abs(across).max()])
     for name, found, most, what in (
         ("touchdown_speed", fast[0], margins.touchdown_speed, "downwards"),
         ("touchdown_slide", fast[1:].max(), margins.touchdown_slide, "along or across the foot"),
@@ -314,7 +312,7 @@ def momentum(e: Evidence) -> Iterator[PlanTestResult]:
 def machine(e: Evidence) -> Iterator[PlanTestResult]:
     """Joints stay within their limits, motors within what they can do at their speed."""
     robot, s = e.robot, e.replay.samples
-    angles, limits = s.position[:, 7:], robot.joint_limits
+    angles, limits = s.position[:, 7:], plan_limits(robot)
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)
     yield PlanTestResult("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",

@@ -15,6 +15,7 @@ from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.planner.checking.evidence import Evidence, body_heights
 from aloft.planner.checking.plan_tests import (
+    _hits,
     _impact,
     _short,
     _standing_knots,
@@ -554,3 +555,22 @@ def test_what_one_interval_may_err_is_as_documented(evidence: Evidence) -> None:
         "velocity_defect": (0.05, "m/s"),
         "angular_velocity_defect": (0.5, "rad/s"),
     }
+
+
+@pytest.mark.parametrize(
+    ("heading", "slide"), [(0.0, 1.1), (0.1, 1.1 * np.cos(0.1) - 0.5 * np.sin(0.1))]
+)
+def test_feet_slide_at_touchdown_in_the_heading_where_they_shall_stand(
+    heading: float, slide: float
+) -> None:
+    """As the planner bounds it: a base that yaws in flight turns no ball, and once made plans fail."""
+    task = SimpleNamespace(
+        margins=Margins(touchdown_speed=0.6, touchdown_slide=1.1),
+        places=lambda: [None, SimpleNamespace(slope=(0.0, 0.0), heading=heading)],
+    )
+    plan = SimpleNamespace(task=task, time=np.array([0.0, 0.1]), contact=np.array([[0, 0], [1, 0]]))
+    velocity = np.array([[[0.5, 1.1, -0.4], [9.0, 9.0, -9.0]]])
+    samples = SimpleNamespace(time=np.array([0.0]), point_velocity=velocity)
+    evidence = SimpleNamespace(plan=plan, replay=SimpleNamespace(samples=samples))
+    fast = {test.name: test.value for test in _hits(evidence, [0])}  # type: ignore[arg-type]
+    assert fast == pytest.approx({"touchdown_speed": 0.4, "touchdown_slide": slide})
