@@ -63,9 +63,7 @@ def courses(seeds: Sequence[int] = SEEDS) -> list[Row]:
 
 def go2_courses(seeds: Sequence[int] = GO2_SEEDS) -> list[Row]:
     """The same of Go2."""
-    return _rows(
-        [run_course(seed, graph="robots/go2_steer.yaml") for seed in seeds], GO2_MISSED_GOAL
-    )
+    return _rows([run_course(seed, graph="robots/steer.yaml") for seed in seeds], GO2_MISSED_GOAL)
 
 
 def _rows(found: Sequence[Mapping[str, Any]], missed_goal: float) -> list[Row]:
