@@ -15,8 +15,8 @@ from ..reading.selection import WHOLE, Selection
 
 _WIDTH = 100
 Item = TypeVar("Item")
-ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
-"""The endings by which the name of a robot is taken for a file, relative to the graph."""
+ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf", ".xacro")
+"""The endings by which the name of a robot is taken for a file, relative to the graph or of a package."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ class FlatGraph:
                 lines.append(f"{entry.key}: {text_of(plain(entry.value))}")
         if self.robot is not None:
             robot = plain(self.robot.value)
-            if isinstance(robot, str) and robot.endswith(ROBOT_FILES):
+            if isinstance(robot, str) and robot.endswith(ROBOT_FILES) and "://" not in robot:
                 robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
             lines.append(f"robot: {text_of(robot)}")
         if self.actuators is not None:
