@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 SHIPPED = Path(__file__).parent
 MODEL_FILES = (".urdf", ".xml", ".mjcf", XACRO)
 YAML_FILES = (".yaml", ".yml")
+ROBOT_FILES = (*YAML_FILES, *MODEL_FILES)
+"""The endings by which the name of a robot is taken for a file."""
 OTHER_FORMATS = {
     ".sdf": "gz sdf has no way back to a URDF: export one from where this file came from",
 }
@@ -124,7 +126,7 @@ def path_of(name: str, folder: Path | None = None) -> Path:
     Raises:
         LookupError: there is none; the message names the robots that there are.
     """
-    if name.endswith((*YAML_FILES, *MODEL_FILES, *OTHER_FORMATS)):
+    if name.endswith((*ROBOT_FILES, *OTHER_FORMATS)):
         found = find_file(name, folder or Path())
         if found is None:
             where = name if name.startswith(SCHEME) else (folder or Path()) / name

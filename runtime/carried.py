@@ -11,8 +11,8 @@ from pathlib import Path
 
 import yaml
 
+from ..robots.description import ROBOT_FILES
 from .language.stages import CheckedGraph
-from .loading.flattening.flat import ROBOT_FILES
 
 _OURS = Path(__file__).parents[1]
 _ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)

@@ -1,10 +1,15 @@
 """The shipped graphs that differ in kind."""
 
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from aloft.runtime.loading.reading.files import FOLDER, shipped_graphs
+
+# Every worker reads all shipped graphs while it collects the tests; PyYAML's own parser takes 5 s for them.
+LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def kinds(of_robots: bool = False) -> dict[str, Path]:
@@ -19,9 +24,10 @@ def kinds(of_robots: bool = False) -> dict[str, Path]:
     return dict(found.values())
 
 
+@cache
 def contents(path: Path) -> tuple[str, frozenset[str]]:
     """The robot that a graph names, and the kinds of blocks that it and what it includes have."""
-    tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    tree = yaml.load(path.read_text(encoding="utf-8"), LOADER)
     robot, used = tree.get("robot", ""), set()
     for block in tree.get("blocks", {}).values():
         used.add(str(block.get("use")))

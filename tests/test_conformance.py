@@ -1,6 +1,6 @@
 """Every block of ours keeps the promises of all blocks, with BRUCE and with a robot of every kind."""
 
-from itertools import product
+from collections.abc import Sequence
 
 import pytest
 
@@ -38,22 +38,34 @@ ROWS_OF_BRUCE = {
 }
 """What takes others a minute of planning, to find that the example is not for them."""
 
-PLANS = ("outputs written", "deterministic", "restored", "inputs kept", "life")
-"""The checks of ``blocks.OnlinePlanner`` that make several plans, which takes seconds."""
+LONG = {
+    "blocks.OnlinePlanner": ("outputs written", "deterministic", "restored", "inputs kept", "life"),
+    "blocks.WholeBodyController": ("live parameters",),
+    "hal.TwinRobot": (
+        "bounds",
+        "machine",
+        "deterministic",
+        "restored",
+        "array allocations",
+        "life",
+    ),
+}
+"""The checks that make several plans, controllers for every parameter or several twins, which takes
+seconds. ``hal.MujocoRobot`` has those of the twin's mechanics among the fast ones."""
 
 
-OF_ALL = [
-    pytest.param(
-        name,
-        case,
-        marks=pytest.mark.long if name == "blocks.OnlinePlanner" and case in PLANS else (),
-    )
-    for name, case in product(known_names(), conformance_cases())
-]
+@pytest.mark.parametrize("name", known_names())
+def test_conformance(name: str) -> None:
+    conforms(name, [case for case in conformance_cases() if case not in LONG.get(name, ())])
 
 
-@pytest.mark.parametrize(("name", "case"), OF_ALL)
-def test_conformance(name: str, case: str) -> None:
+@pytest.mark.long
+@pytest.mark.parametrize("name", LONG)
+def test_conformance_that_takes_seconds(name: str) -> None:
+    conforms(name, LONG[name])
+
+
+def conforms(name: str, cases: Sequence[str]) -> None:
     if name in NOT_FOR_BRUCE:
         assert unmet_messages(find_block(name), robot="bruce")
         pytest.skip(NOT_FOR_BRUCE[name])
@@ -70,7 +82,7 @@ def test_conformance(name: str, case: str) -> None:
         with pytest.raises(AloftError, match="there is no folder controller; write it with aloft"):
             BlockBench(find_block(name), find_block(name).example_parameters(), robot="bruce")
         pytest.skip(NEEDS_LIBRARY[name])
-    check_block(find_block(name), robot="bruce", cases=[case])
+    check_block(find_block(name), robot="bruce", cases=cases)
 
 
 @pytest.mark.long

@@ -86,6 +86,7 @@ def aloft(installed: Path, *arguments: str, code: int = 0) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_a_graph_runs_the_block_of_an_installed_package(installed: Path) -> None:
     result = json.loads(aloft(installed, "run", "graph.yaml", "--no-record", "--json"))
     assert result["success"] is True

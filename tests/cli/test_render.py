@@ -41,6 +41,7 @@ def renderer(pushed: Path) -> None:
         pytest.skip(str(error))
 
 
+@pytest.mark.long
 def test_a_film_has_a_picture_for_each_step_of_time(
     pushed: Path, renderer: None, tmp_path: Path
 ) -> None:

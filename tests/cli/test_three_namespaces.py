@@ -148,7 +148,7 @@ def test_in_lockstep_the_bytes_are_those_of_one_process(network: Network, here: 
 def test_a_pulled_cable_ends_in_damping_and_the_viewer_sees_it(
     network: Network, here: Path
 ) -> None:
-    sets = free(watchdog="1 s")
+    sets = free(watchdog="5 s")
     onboard = network.part("onboard", "--no-record", *sets)
     network.part("ground", "--no-record", *sets)
     seen = wait_until_it_runs(network, sets)

@@ -45,12 +45,7 @@ def test_report(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     report = report_of(name)
     assert not report.ok
     assert text_of(report) == (FOLDER / f"{name}.txt").read_text()
-
-
-@pytest.mark.parametrize("name", GRAPHS)
-def test_every_problem_says_where(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(FOLDER)
-    for problem in report_of(name).problems:
+    for problem in report.problems:
         place = problem.where
         if place.file.startswith("--set "):
             assert str(place) == place.file

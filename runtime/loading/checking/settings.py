@@ -9,10 +9,16 @@ from pathlib import Path
 
 from ....files.nodes import Entry, ScalarNode, kind, plain
 from ....files.problems import Code, Position, Problems, listing, nearest
-from ....robots.description import RobotDescription, RobotError, find_robot, robot_names
+from ....robots.description import (
+    ROBOT_FILES,
+    RobotDescription,
+    RobotError,
+    find_robot,
+    robot_names,
+)
 from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
-from ..flattening.flat import ROBOT_FILES, FlatGraph
+from ..flattening.flat import FlatGraph
 from ..reading.graph_file import ClockKeys, read_section
 from ..reading.written import read_quantity
 

@@ -10,13 +10,13 @@ from typing import Any, Generic, TypeVar
 
 from ....files.nodes import Entry, MapNode, Node, plain, text_of
 from ....files.problems import Position
+from ....robots.description import ROBOT_FILES
+from ....robots.importing.package_files import SCHEME
 from ...language.stages import HasSource
 from ..reading.selection import WHOLE, Selection
 
 _WIDTH = 100
 Item = TypeVar("Item")
-ROBOT_FILES = (".yaml", ".yml", ".urdf", ".xml", ".mjcf", ".xacro")
-"""The endings by which the name of a robot is taken for a file, relative to the graph or of a package."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,8 @@ class FlatGraph:
                 lines.append(f"{entry.key}: {text_of(plain(entry.value))}")
         if self.robot is not None:
             robot = plain(self.robot.value)
-            if isinstance(robot, str) and robot.endswith(ROBOT_FILES) and "://" not in robot:
+            is_file = isinstance(robot, str) and robot.endswith(ROBOT_FILES)
+            if is_file and not robot.startswith(SCHEME):
                 robot = Path(os.path.relpath(self.robot_folder / robot, self.folder)).as_posix()
             lines.append(f"robot: {text_of(robot)}")
         if self.actuators is not None:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -121,12 +122,20 @@ def result(process: subprocess.Popen[str]) -> dict[str, Any]:
     return {**found, "code": process.returncode}
 
 
+def undisturbed(attempt: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The result of a run in which this machine did not stand still, in three attempts.
+
+    When it stands still for a second the drives are damped, and rightly so."""
+    for _ in range(3):
+        found = attempt()
+        if not re.search("no new command|the graph hung", found["reason"]):
+            break
+    return found
+
+
 @pytest.mark.long
 def test_a_run_comes_to_its_end_and_ends_in_damping(bench: Bench) -> None:
-    for _ in range(3):  # a machine that stands still for a second is damped, and rightly so
-        found = result(bench.start(duration="1 s"))
-        if found["success"] or "no new command" not in found["reason"]:
-            break
+    found = undisturbed(lambda: result(bench.start(duration="1 s")))
     assert found["success"], found
     assert bench.states() == {3}
     assert found["metrics"]["drives_at_end"] == "damped"
@@ -143,7 +152,7 @@ def test_unarmed_nothing_is_written_to_the_drives(bench: Bench) -> None:
 
 @pytest.mark.long
 def test_a_block_that_raises(bench: Bench) -> None:
-    found = result(bench.start(fail_at=10))
+    found = undisturbed(lambda: result(bench.start(fail_at=10)))
     assert "as the test wanted" in found["reason"] and found["code"] == 3
     assert bench.states() == {3}
 
@@ -175,47 +184,62 @@ def test_a_graph_that_is_killed_or_stands_still(bench: Bench, how: signal.Signal
 
 @pytest.mark.long
 def test_the_cable_is_pulled(tmp_path: Path) -> None:
-    fault = InjectedFault(kind="pulled_cable", start=0.5)
-    with make_bench(tmp_path, fault) as server:
-        bench = Bench(server, tmp_path)
-        found = result(bench.start())
-        assert "a port failed" in found["reason"], found
-        bench.wait_for(2)  # by the drives' own watchdog: an error, and no torque
+    def pull() -> dict[str, Any]:
+        with make_bench(tmp_path, InjectedFault(kind="pulled_cable", start=0.5)) as server:
+            bench = Bench(server, tmp_path)
+            found = result(bench.start())
+            if "a port failed" in found["reason"]:
+                bench.wait_for(2)  # by the drives' own watchdog: an error, and no torque
+            return found
+
+    assert "a port failed" in (found := undisturbed(pull))["reason"], found
 
 
 @pytest.mark.long
 def test_the_boards_cable_is_pulled_and_the_drives_are_damped_at_once(tmp_path: Path) -> None:
-    fault = InjectedFault(kind="pulled_board", start=0.5)
-    with make_bench(tmp_path, fault) as server:
-        found = result(Bench(server, tmp_path).start())
-        assert "the port of the sensor board failed" in found["reason"], found
-        assert Bench(server, tmp_path).states() == {3}, "not by their own watchdog, after 5 s"
+    def pull() -> dict[str, Any]:
+        with make_bench(tmp_path, InjectedFault(kind="pulled_board", start=0.5)) as server:
+            found = result(Bench(server, tmp_path).start())
+            assert Bench(server, tmp_path).states() == {3}, "not by their own watchdog, after 5 s"
+            return found
+
+    found = undisturbed(pull)
+    assert "the port of the sensor board failed" in found["reason"], found
 
 
 @pytest.mark.long
 def test_a_second_writer_on_the_bus_is_refused(tmp_path: Path) -> None:
-    with make_bench(tmp_path) as server:
-        bench = Bench(server, tmp_path)
-        server.twin.faults = type(server.twin.faults)([InjectedFault(kind="second_writer")], 0)
-        process = bench.start()
-        bench.wait_until_it_drives(process)
-        found = result(process)
-        assert "another program or adapter sends instructions" in found["reason"], found
-        assert bench.states() == {3}
+    def disturb() -> dict[str, Any]:
+        with make_bench(tmp_path) as server:
+            bench = Bench(server, tmp_path)
+            server.twin.faults = type(server.twin.faults)([InjectedFault(kind="second_writer")], 0)
+            process = bench.start()
+            bench.wait_until_it_drives(process)
+            found = result(process)
+            assert bench.states() == {3}
+            return found
+
+    found = undisturbed(disturb)
+    assert "another program or adapter sends instructions" in found["reason"], found
 
 
 @pytest.mark.long
 def test_somebody_calls_the_emergency_stop_while_a_graph_holds_the_port(bench: Bench) -> None:
-    process = bench.start()
-    bench.wait_until_it_drives(process)
-    done = subprocess.run(
-        [sys.executable, "-m", "aloft", "robot", "estop", "bench.yaml", "--json"],
-        cwd=bench.folder, capture_output=True, text=True, check=False, timeout=LONG,
-        env={**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])},
-    )  # fmt: skip
-    assert json.loads(done.stdout)["success"], done.stderr
-    assert result(process)["reason"].endswith("`aloft robot estop` has damped the drives")
-    assert bench.states() == {3}
+    def stop() -> dict[str, Any]:
+        process = bench.start()
+        bench.wait_until_it_drives(process)
+        done = subprocess.run(
+            [sys.executable, "-m", "aloft", "robot", "estop", "bench.yaml", "--json"],
+            cwd=bench.folder, capture_output=True, text=True, check=False, timeout=LONG,
+            env={**os.environ, "PYTHONPATH": str(Path(aloft.__file__).parents[1])},
+        )  # fmt: skip
+        found = result(process)
+        assert bench.states() == {3}
+        return {**found, "estop": json.loads(done.stdout)}
+
+    found = undisturbed(stop)
+    assert found["reason"].endswith("`aloft robot estop` has damped the drives")
+    assert found["estop"]["success"]
 
 
 @pytest.mark.long
@@ -371,8 +395,10 @@ def test_the_time_of_a_twin_is_that_of_its_exchanges() -> None:
     robot = block(_driver=SimpleNamespace(loop=SimpleNamespace(cycles=250)))
     robot.params.time = "virtual"
     assert BearRobot.now(robot) == pytest.approx(0.25)  # type: ignore[arg-type]
-    robot.params.time, robot._opened_at = "real", time.monotonic() - 3.0
-    assert BearRobot.now(robot) == pytest.approx(3.0, abs=1.0)  # type: ignore[arg-type]
+    opened = time.monotonic() - 3.0
+    robot.params.time, robot._opened_at = "real", opened
+    now = BearRobot.now(robot)  # type: ignore[arg-type]
+    assert 3.0 <= now <= time.monotonic() - opened
 
 
 def test_periods_of_the_soft_start_follow_one_another() -> None:

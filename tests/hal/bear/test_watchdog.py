@@ -109,15 +109,14 @@ def test_it_ends_without_damping_when_told_that_the_graph_closes(
         os.kill(watchdog.pid, 0)
 
 
-def test_somebody_asks_it_to_stop(port: tuple[int, int]) -> None:
+def test_somebody_asks_it_to_stop(port: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("aloft.hal.bear.watchdog._ANSWERING", SECONDS)
     name = f"/dev/not there {os.getpid()}"
     assert not ask_to_stop(name), "nobody listens"
     watchdog = DriveWatchdog(port[1], DEVICES, SECONDS, port=name)
     try:
         watchdog.beat()
-        begin = time.monotonic()
         assert not watchdog.asked and ask_to_stop(name)
-        assert time.monotonic() - begin < 0.5
         assert watchdog.asked and not watchdog.tripped, "it goes on to watch"
         assert first_frame(port, 0.0) == FRAME
         assert ask_to_stop(name), "again"

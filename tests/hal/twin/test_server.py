@@ -101,7 +101,7 @@ def test_it_can_be_closed_while_nobody_reads() -> None:
     sending.join(0.2)
     assert sending.is_alive()
     cable.close()
-    sending.join(5.0)
+    sending.join(60.0)
     assert not sending.is_alive()
 
 
@@ -113,7 +113,7 @@ def test_a_server_ends_while_its_packets_are_not_read() -> None:
     time.sleep(0.3)  # by now the clock's thread waits to send as well
     closing = threading.Thread(target=server.close, daemon=True)
     closing.start()
-    closing.join(10.0)
+    closing.join(60.0)
     assert not closing.is_alive()
 
 

@@ -1,5 +1,6 @@
 """Blocks that do not fit the robot or the graph are in the load report; see also the wrong graphs."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -97,6 +98,24 @@ def test_the_profile_is_in_the_flattened_text() -> None:
     graph = load_text(text, WRONG / "graph.yaml", ["actuators=relaxed"])
     assert "robot: bruce\nactuators: relaxed\n" in graph.text
     assert load_text(graph.text, WRONG / "graph.yaml").robot == graph.robot
+
+
+@pytest.mark.parametrize("robot", ["../own/hopper.yaml", "package://own/hopper.yaml"])
+def test_a_robot_of_a_file_is_found_again_from_the_flattened_text(
+    tmp_path: Path, robot: str
+) -> None:
+    """So that a seed may change and a recording be replayed; a package is no folder."""
+    for folder in ("own", "pieces", "graphs"):
+        (tmp_path / folder).mkdir()
+    shutil.copyfile(WRONG / "pieces" / "arm.yaml", tmp_path / "own" / "hopper.yaml")
+    (tmp_path / "pieces" / "arm.yaml").write_text(
+        blocks("one: {use: blocks.Constant, with: {value: [1]}}", f"robot: {robot}")
+    )
+    graph = load_text(
+        "rate: 500 Hz\ninclude: [../pieces/arm.yaml]\n", tmp_path / "graphs" / "graph.yaml"
+    )
+    again = load_text(graph.text, tmp_path / "graphs" / "graph.yaml")
+    assert again.robot == graph.robot is not None and again.text == graph.text
 
 
 def test_unmet_requirements_needs_no_file() -> None:

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from aloft.files.nodes import plain
 from aloft.runtime.graph import Graph
@@ -346,21 +345,3 @@ def test_too_many_blocks_are_refused(tmp_path: Path) -> None:
     graph = "rate: 1 Hz\nblocks: {top: {use: level14.yaml}}"
     with pytest.raises(LoadError, match="more than 5000 blocks"):
         load(write(tmp_path, graph=graph, **files))
-
-
-@pytest.mark.parametrize(
-    ("named", "in_text"),
-    [
-        ("mine.urdf", "inner/mine.urdf"),
-        ("mine.urdf.xacro", "inner/mine.urdf.xacro"),
-        ("package://hoppers/hopper.yaml", "package://hoppers/hopper.yaml"),
-        ("bruce", "bruce"),
-    ],
-)
-def test_the_text_finds_the_robot_that_an_included_file_names(
-    tmp_path: Path, named: str, in_text: str
-) -> None:
-    (tmp_path / "inner").mkdir()
-    (tmp_path / "inner" / "robot.yaml").write_text(f"robot: {named}\n")
-    (tmp_path / "graph.yaml").write_text("rate: 100 Hz\ninclude: [inner/robot.yaml]\n")
-    assert yaml.safe_load(flatten(tmp_path / "graph.yaml").text)["robot"] == in_text

@@ -69,12 +69,12 @@ def walked(
 
 
 @pytest.mark.parametrize("start", range(1, 31))
-@pytest.mark.parametrize("end", range(31))
-def test_the_last_rung_is_found(start: int, end: int) -> None:
-    found, tried = walked(furthest(start, 30), lambda rung: rung <= end)
-    assert found == end
-    assert len(set(tried)) == len(tried) <= 10
-    assert all(1 <= rung <= 30 for rung in tried)
+def test_the_last_rung_is_found(start: int) -> None:
+    for end in range(31):
+        found, tried = walked(furthest(start, 30), end.__ge__)
+        assert found == end
+        assert len(set(tried)) == len(tried) <= 10
+        assert all(1 <= rung <= 30 for rung in tried)
 
 
 @pytest.mark.parametrize("end", range(7, 21))
