@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from ..needed import needs
 from .conftest import run_for_json, run_here, run_parts_for_json
 from .test_run_machines import BLOCKS, GRAPH
 
-pytest.importorskip("cryptography")
+needs("cryptography")
 
 
 @pytest.fixture
