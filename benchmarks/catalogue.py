@@ -16,7 +16,7 @@ import numpy as np
 from .agreement import agreement
 from .background import background
 from .changed_targets import changed_targets
-from .courses import courses, go2_courses, pushed_courses
+from .courses import courses, pushed_courses
 from .driver import driver
 from .every_robot import every_robot
 from .export import export
@@ -63,7 +63,6 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "identification": identification,
     "frontier": frontier,
     "courses": courses,
-    "go2_courses": go2_courses,
     "pushed_courses": pushed_courses,
     "changed_targets": changed_targets,
     "hopping_on": hopping_on,
@@ -76,7 +75,6 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
-    "go2_courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
     "mutated_robots",
 )  # fmt: skip
@@ -93,7 +91,6 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
         "known_effects",
         "identification",
         "courses",
-        "go2_courses",
         "pushed_courses",
         "changed_targets",
         "hopping_on",
@@ -106,7 +103,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "tsid": ("tick", "export"),
     "since": ("tick",),
     "arms": ("real_robot",),
-    "robot": ("real_robot",),
+    "robot": ("courses", "real_robot"),
     "asked": ("real_robot", "known_effects"),
     "harder": ("jumps",),
     "trial": ("jumps",),

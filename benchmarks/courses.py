@@ -1,7 +1,7 @@
 """Random courses of jumps: each command becomes known when the jump before has landed.
 
 A course has ten jumps of 5 to 30 cm, ahead, back or aside, with turns of up to 45 degrees. They are planned in the
-background by ``graphs/steer.yaml`` in the robust trial, with a position sensor. Virtual time waits for the planner.
+background by ``graphs/steer.yaml``, those of other robots by ``graphs/robots/steer.yaml``, in the robust trial, with a position sensor. Virtual time waits for the planner.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from .rows import Row
 
 SEEDS = range(31700, 31720)
 """Of courses and robots; nothing is tuned on them."""
-GO2_SEEDS = range(33500, 33520)
-"""Of Go2's, the same."""
 PUSHED_SEEDS = range(31900, 31920)
 """Of courses with a push, the same."""
 PUSH = 0.4
@@ -31,8 +29,8 @@ DIRECTIONS = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)
 """Ahead, back, to the left and to the right."""
 MISSED_GOAL = 0.05
 """The largest good share of courses with a fall."""
-GO2_MISSED_GOAL = 0.1
-"""The same for Go2."""
+OTHERS_MISSED_GOAL = 0.1
+"""The same for other robots."""
 PLACE_GOAL = 0.03
 """m"""
 LONGEST = 40.0
@@ -56,16 +54,17 @@ def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:
     return commands
 
 
-def courses(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows: the shares of courses with a fall and off their places, errors of place, times of planning."""
-    return _rows([run_course(seed) for seed in seeds], MISSED_GOAL)
+def courses(seeds: Sequence[int] = SEEDS, robot: str = "bruce") -> list[Row]:
+    """Rows: the shares of courses with a fall and off their places, errors of place, times of planning.
 
-
-def go2_courses(seeds: Sequence[int] = GO2_SEEDS) -> list[Row]:
-    """The same of Go2."""
-    return _rows(
-        [run_course(seed, graph="robots/go2_steer.yaml") for seed in seeds], GO2_MISSED_GOAL
-    )
+    Args:
+        seeds: of courses and trials.
+        robot: its name or file; one that ships no plans of hops needs those that ``aloft steer --robot`` keeps.
+    """
+    if robot == "bruce":
+        return _rows([run_course(seed) for seed in seeds], MISSED_GOAL)
+    found = [run_course(seed, {"robot": robot}, graph="robots/steer.yaml") for seed in seeds]
+    return _rows(found, OTHERS_MISSED_GOAL)
 
 
 def _rows(found: Sequence[Mapping[str, Any]], missed_goal: float) -> list[Row]:

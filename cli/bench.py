@@ -94,7 +94,10 @@ def bench(
         ),
     ] = "",
     robot: Annotated[
-        str, typer.Option(help="Which robot of 'real_robot': go2, g1, solo12; by default bruce.")
+        str,
+        typer.Option(
+            help="The robot of 'courses', or of 'real_robot' (go2, g1, solo12); by default bruce."
+        ),
     ] = "",
     harder: Annotated[
         bool,

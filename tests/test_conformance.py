@@ -39,8 +39,18 @@ ROWS_OF_BRUCE = {
 """What takes others a minute of planning, to find that the example is not for them."""
 
 LONG = {
-    "blocks.OnlinePlanner": ("outputs written", "deterministic", "restored", "inputs kept", "life"),
+    "blocks.OnlinePlanner": (
+        "outputs written",
+        "bounds",
+        "inputs kept",
+        "deterministic",
+        "restored",
+        "live parameters",
+        "array allocations",
+        "life",
+    ),
     "blocks.WholeBodyController": ("live parameters",),
+    "hal.MujocoRobot": ("array allocations",),
     "hal.TwinRobot": (
         "bounds",
         "machine",
@@ -51,7 +61,7 @@ LONG = {
     ),
 }
 """The checks that make several plans, controllers for every parameter or several twins, which takes
-seconds. ``hal.MujocoRobot`` has those of the twin's mechanics among the fast ones."""
+seconds. ``hal.MujocoRobot`` has most of the twin's among the fast ones."""
 
 
 @pytest.mark.parametrize("name", known_names())

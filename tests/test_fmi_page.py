@@ -11,8 +11,10 @@ import pytest
 
 import aloft
 
+from .needed import needs
+
 fmpy = pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+needs("pythonfmu3")
 PAGE = (Path(__file__).parent.parent / "docs" / "fmi.md").read_text(encoding="utf-8")
 
 

@@ -7,7 +7,9 @@ import pytest
 
 from aloft import AloftError, load
 
-pytest.importorskip("gymnasium")
+from .needed import needs
+
+needs("gymnasium")
 
 from gymnasium.utils.env_checker import check_env
 

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
-import nbclient
-import nbformat
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -25,6 +23,8 @@ def made(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 
 
 def test_each_section_is_a_notebook_with_its_text_graph_and_commands(made: dict[str, Path]) -> None:
+    import nbformat
+
     assert len(made) == PAGE.count("\n## ") == 13
     for path in made.values():
         found = nbformat.read(path, as_version=4)
@@ -64,6 +64,9 @@ def test_every_cell_runs(made: dict[str, Path], name: str, monkeypatch: pytest.M
     assert set(made) == set(NAMES)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}:{Path('/usr/bin')}:/bin")
     path = made[name]
+    import nbclient
+    import nbformat
+
     found = nbformat.from_dict(json.loads(path.read_text()))
     cells = []
     for cell in found.cells:

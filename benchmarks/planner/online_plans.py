@@ -11,7 +11,7 @@ import numpy as np
 
 from ...blocks.signals import PlanOutcome
 from ...planner.library.jump_table import table_rows
-from ...planner.online.hop_plans import hop_table, level_reach, shipped_samples, step_reach
+from ...planner.online.hop_plans import hop_table, level_reach, samples_of_hops, step_reach
 from ...planner.online.hop_request import HopRequest
 from ...planner.online.next_hop import HopPlanner
 from ...planner.solving.solver_process import cpu_time
@@ -27,7 +27,8 @@ GOALS = {"straight": (0.02, 0.04), "all coordinates": (0.06, 0.12), "up and down
 
 def requests(kind: str, count: int = COUNT, seed: int = SEED) -> list[HopRequest]:
     """The hops of a kind; the same on every machine."""
-    rng, r, s = np.random.default_rng(seed), level_reach("bruce"), step_reach("bruce")
+    rng, robot = np.random.default_rng(seed), find_robot("bruce")
+    r, s = level_reach(robot), step_reach(robot)
     found = []
     for _ in range(count):
         ahead, aside = rng.uniform(-r.back, r.ahead), rng.uniform(-r.aside, r.aside)
@@ -48,9 +49,7 @@ def requests(kind: str, count: int = COUNT, seed: int = SEED) -> list[HopRequest
 def online_plans(count: int = COUNT) -> list[Row]:
     """Rows for each kind: the median and 99 % of processor time, and where it goes."""
     robot = find_robot("bruce")
-    planner = HopPlanner(
-        robot, shipped_samples(robot.name), shipped_samples(robot.name, steps=True)
-    )
+    planner = HopPlanner(robot, samples_of_hops(robot), samples_of_hops(robot, steps=True))
     planner.prepare()
     rows = []
     for kind, goals in GOALS.items():

@@ -76,13 +76,12 @@ class OnlinePlanner(Block):
         return {"request": {"number": 0}}
 
     def setup(self) -> None:
-        from ...planner.online.hop_plans import hop_table, shipped_samples, shipped_steps
+        from ...planner.online.hop_plans import hop_table, samples_of_hops, samples_of_steps
         from ...planner.online.next_hop import HopPlanner
         from ...planner.task.plan import PlanFileError
 
         try:
-            name = self.robot.name
-            samples = shipped_samples(name), shipped_steps(name)
+            samples = samples_of_hops(self.robot), samples_of_steps(self.robot)
         except PlanFileError as error:
             raise BlockError(str(error)) from error
         self._planner = HopPlanner(self.robot, *samples)

@@ -254,7 +254,7 @@ class SteeredPlan(Block):
         self.directions, points = standing_directions(self.robot)
         self.counted = ~points
         self.constants.of_points = bool(points.all())
-        reach = level_reach(self.robot.name)
+        reach = level_reach(self.robot)
         self.constants.ahead, self.constants.back = reach.ahead, reach.back
         self.constants.aside, self.constants.turn = reach.aside, reach.turn
         self.constants.lead = -1.0 if self.params.lead is None else self.params.lead

@@ -113,8 +113,12 @@ def _without_none(data: Any) -> Any:
 
 def kept_name(task: JumpTask, robot: RobotDescription) -> str:
     """The name of a task's file: its name, for people, and its hash."""
-    readable = re.sub(r"[^A-Za-z0-9_.+]+", "_", task.name).strip("_") or "jump"
-    return f"{readable}-{task.hash(robot)}.npz"
+    return f"{readable_name(task.name) or 'jump'}-{task.hash(robot)}.npz"
+
+
+def readable_name(name: str) -> str:
+    """A name as a part of a file's name."""
+    return re.sub(r"[^A-Za-z0-9_.+]+", "_", name).strip("_")
 
 
 def names_of(robot: RobotDescription) -> dict[str, list[str]]:

@@ -1,67 +1,90 @@
-"""The plans of hops that ship with a robot, and what blocks take from them."""
+"""The stored plans of a robot's hops, those that ship or the user's own, and what blocks take from them."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 from ...mathematics.arrays import Array
-from ...robots.description import RobotDescription
+from ...robots.description import RobotDescription, robot_names
 from ...runtime.language.block import UnmetRequirement
 from ..library.jump_table import JumpTable, table_rows
-from ..library.library import SHIPPED
+from ..library.library import SHIPPED, readable_name, user_folder
 from ..library.reference_table import COARSE_STEPS, reference_table
 from ..task.plan import PlannedJump
+from ..task.task import planned_robot
 from .hop_request import HopReach, StepReach
-from .plan_samples import PlanSamples, read_samples
+from .plan_samples import FILE_FORMAT, PlanSamples, read_samples
+
+LEVEL_FILE, STEPS_FILE = "level.npz", "steps.npz"
 
 
-def samples_path(robot: str, *, steps: bool = False) -> Path:
+def shipped_path(robot: str, *, steps: bool = False) -> Path:
     """Where the plans of hops of a robot ship: those on level ground, or those up and down."""
-    return SHIPPED / "hops" / robot / ("steps.npz" if steps else "level.npz")
+    return SHIPPED / "hops" / robot / (STEPS_FILE if steps else LEVEL_FILE)
+
+
+def own_path(robot: RobotDescription, *, steps: bool = False) -> Path:
+    """Where a user's own are kept: with those of tasks, under the robot's name and content."""
+    whole = {"format": FILE_FORMAT, "robot": planned_robot(robot)}
+    text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
+    name = f"{readable_name(robot.name)}-{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    return user_folder() / "hops" / name / (STEPS_FILE if steps else LEVEL_FILE)
+
+
+def samples_file(robot: RobotDescription, *, steps: bool = False) -> Path | None:
+    """The file of a robot's plans of hops: one that ships comes first, so that a cache changes no run with it."""
+    shipped = shipped_path(robot.name, steps=steps)
+    if shipped.is_file():
+        return shipped
+    own = own_path(robot, steps=steps)
+    return own if own.is_file() else None
 
 
 def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
     """What a block that needs the plans of hops of a robot does not have."""
-    path = samples_path(robot.name)
-    if path.is_file():
+    if samples_file(robot) is not None:
         return
-    there = sorted(file.parent.name for file in path.parent.parent.glob(f"*/{path.name}"))
+    there = sorted(file.parent.name for file in (SHIPPED / "hops").glob(f"*/{LEVEL_FILE}"))
     yield UnmetRequirement(
         f"there are no stored plans of hops for {robot.name}",
-        expected=f"a robot with such plans: {', '.join(there)}",
-        found=f"{robot.name}; python -m aloft.planner.online.make_samples {robot.name} makes them",
-        fix=f"robot: {there[0]}, as a key of the graph" if there else "",
+        expected=f"a robot with such plans: {', '.join(there)}, or those that 'aloft steer --robot' makes",
+        found=robot.name,
+        fix=f"aloft steer --robot {robot.name if robot.name in robot_names() else 'FILE'}",
     )
 
 
-@lru_cache(maxsize=4)
-def shipped_samples(robot: str, *, steps: bool = False) -> PlanSamples:
+_read = lru_cache(maxsize=4)(read_samples)
+
+
+def samples_of_hops(robot: RobotDescription, *, steps: bool = False) -> PlanSamples:
     """The plans of hops of a robot on level ground, or of those up and down.
 
     Raises:
         PlanFileError: there are none, or the file is broken.
     """
-    return read_samples(samples_path(robot, steps=steps))
+    return _read(samples_file(robot, steps=steps) or shipped_path(robot.name, steps=steps))
 
 
-def shipped_steps(robot: str) -> PlanSamples | None:
+def samples_of_steps(robot: RobotDescription) -> PlanSamples | None:
     """The plans of hops of a robot up and down, if it has any."""
-    there = samples_path(robot, steps=True).is_file()
-    return shipped_samples(robot, steps=True) if there else None
+    there = samples_file(robot, steps=True) is not None
+    return samples_of_hops(robot, steps=True) if there else None
 
 
-def level_reach(robot: str) -> HopReach:
+def level_reach(robot: RobotDescription) -> HopReach:
     """How far a robot hops on level ground."""
-    reach = shipped_samples(robot).reach
+    reach = samples_of_hops(robot).reach
     assert isinstance(reach, HopReach)
     return reach
 
 
-def step_reach(robot: str) -> StepReach:
+def step_reach(robot: RobotDescription) -> StepReach:
     """How far a robot hops up and down, which must have such plans."""
-    reach = shipped_samples(robot, steps=True).reach
+    reach = samples_of_hops(robot, steps=True).reach
     assert isinstance(reach, StepReach)
     return reach
 
@@ -73,5 +96,5 @@ def hop_table(plan: PlannedJump, robot: RobotDescription) -> JumpTable:
 
 def standing_row(robot: RobotDescription) -> Array:
     """The row of a table in which the robot stands as every hop begins, (width,)."""
-    first: Array = table_rows(hop_table(shipped_samples(robot.name).plan(0), robot)).rows[0]
+    first: Array = table_rows(hop_table(samples_of_hops(robot).plan(0), robot)).rows[0]
     return first

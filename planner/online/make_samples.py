@@ -1,9 +1,10 @@
-"""Plans the hops from which others are interpolated: ``python -m aloft.planner.online.make_samples ROBOT``.
+"""Plans the hops from which others are interpolated: ``aloft steer --robot FILE`` keeps those of a user's robot, and
+``python -m aloft.planner.online.make_samples ROBOT`` makes those that ship.
 
 Hops are spread evenly over all requests by a Halton sequence. On level ground half of them go ahead and half
 back. They are solved from the shortest to the longest, each from the nearest of those before it or from nothing. Those up and
 down all go ahead, and are solved in the same way, the first from its neighbour on level ground. Those without a
-valid plan are left out. Either takes five minutes of one core for a biped.
+valid plan are left out. Either takes two minutes of processor time for a quadruped, and five for a biped.
 
 What is asked for are the limits of BRUCE, times how high the robot's centre of mass stands, unless options such as ``--back 0.3``
 say other ones. The reach of the plans is the largest share of them within which nine of ten requests have a plan.
@@ -14,17 +15,18 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ...robots.description import RobotDescription, find_robot
+from ...robots.kinematics import ball_feet
 from ..checking.validity import check_plan
 from ..solving.solve import solve_jump
 from ..task.files import PlanError
 from ..task.plan import PlannedJump
 from ..task.scaling import HEIGHT, standing_height
-from .hop_plans import samples_path
+from .hop_plans import shipped_path
 from .hop_request import HopReach, HopRequest, StepReach, coarse, task_of
 from .plan_samples import SCALES, PlanSamples, read_samples, samples_of, write_samples
 
@@ -81,9 +83,9 @@ def scaled(limits: Sequence[float], robot: RobotDescription) -> list[float]:
 
 
 def reach_for(robot: RobotDescription) -> HopReach:
-    """What is asked of a robot on level ground."""
+    """What is asked of a robot on level ground. Back as far as ahead where its feet are balls: it has no heels to land on."""
     ahead, back, aside, rise = scaled((*REACH[:3], REACH.rise), robot)
-    return HopReach(ahead, back, aside, REACH.turn, rise)
+    return HopReach(ahead, ahead if ball_feet(robot) else back, aside, REACH.turn, rise)
 
 
 def step_reach_for(robot: RobotDescription, rise: float) -> StepReach:
@@ -92,11 +94,27 @@ def step_reach_for(robot: RobotDescription, rise: float) -> StepReach:
     return StepReach(least, ahead, aside, STEP_REACH.turn, up, down, rise)
 
 
-def find_samples(robot: RobotDescription, wanted: HopReach, count: int = COUNT) -> PlanSamples:
-    """Plan those on level ground."""
-    requests = (STILL, *(request(index, wanted) for index in range(count)))
-    asked, plans = _find(robot, requests, wanted.rise, [], [])
-    return samples_of(robot.name, plans, asked, reached(wanted, requests, asked))
+Tell = Callable[[HopRequest, bool], None]
+"""Told of each request, and whether it has a valid plan."""
+
+
+def plan_level_hops(
+    robot: RobotDescription, wanted: HopReach, tell: Tell, count: int
+) -> PlanSamples:
+    """Plan those on level ground.
+
+    Raises:
+        PlanError: not even a jump on the spot has a valid plan.
+    """
+    first = _plan_all(robot, [STILL], wanted.rise, [], [], tell)
+    if STILL not in first[0]:
+        raise PlanError(
+            f"{robot.name} has no valid plan of a jump on the spot, {100.0 * wanted.rise:.1f} cm high"
+        )
+    requests = [request(index, wanted) for index in range(count)]
+    others = _plan_all(robot, requests, wanted.rise, *first, tell)
+    asked, plans = [*first[0], *others[0]], [*first[1], *others[1]]
+    return samples_of(robot.name, plans, asked, reached(wanted, [STILL, *requests], asked))
 
 
 def reached(
@@ -111,27 +129,29 @@ def reached(
     return wanted.shortened(0.0)
 
 
-def find_steps(
-    robot: RobotDescription, level: PlanSamples, wanted: StepReach, count: int
+def plan_steps(
+    robot: RobotDescription, level: PlanSamples, wanted: StepReach, count: int, tell: Tell
 ) -> PlanSamples:
     """Plan those up and down, the first from its neighbour on level ground."""
     rows = range(len(level.requests))
     near = [HopRequest(*level.requests[row].tolist()) for row in rows]
     requests = (step_request(index, wanted) for index in range(count))
-    asked, plans = _find(
-        robot, [one for one in requests if not one.level], wanted.rise, near, list(map(level.plan, rows))
+    asked, plans = _plan_all(
+        robot, [one for one in requests if not one.level], wanted.rise, near,
+        list(map(level.plan, rows)), tell,
     )  # fmt: skip
     return samples_of(robot.name, plans, asked, wanted)
 
 
-def _find(
+def _plan_all(
     robot: RobotDescription, requests: Sequence[HopRequest], rise: float, near: Sequence[HopRequest],
-    there: Sequence[PlannedJump],
+    there: Sequence[PlannedJump], tell: Tell,
 ) -> tuple[list[HopRequest], list[PlannedJump]]:  # fmt: skip
     """Plan all requests, from plans that are there and from each other."""
     asked, plans = [*near], [*there]
     for wanted in sorted(requests, key=lambda one: apart(one, STILL)):
         found = _plan(wanted, robot, rise, _nearest(wanted, asked, plans))
+        tell(wanted, found is not None)
         if found is not None:
             asked.append(wanted)
             plans.append(found)
@@ -167,9 +187,7 @@ def _plan(
             plan = solve_jump(task, robot, warm_start=start, knots=task.knots, quick=True)
         except PlanError:
             continue
-        report = check_plan(plan, robot)
-        print(wanted, plan.statistics["iterations"], [t.name for t in report.failed], flush=True)
-        if report.valid:
+        if check_plan(plan, robot).valid:
             return plan
     return None
 
@@ -191,16 +209,19 @@ def main() -> None:
     def told(fields: Sequence[str], prefix: str = "") -> dict[str, float]:
         return {name: given[prefix + name] for name in fields if given[prefix + name] is not None}
 
+    def tell(wanted: HopRequest, valid: bool) -> None:
+        print(wanted, "a plan" if valid else "no plan", flush=True)
+
     robot = find_robot(given["robot"])
     if given["count"]:
         wanted = reach_for(robot)._replace(**told(HopReach._fields))
-        level = find_samples(robot, wanted, given["count"])
-        print(write_samples(samples_path(robot.name), level), level.reach)
+        level = plan_level_hops(robot, wanted, tell, given["count"])
+        print(write_samples(shipped_path(robot.name), level), level.reach)
     if given["steps"]:
-        level = read_samples(samples_path(robot.name))
+        level = read_samples(shipped_path(robot.name))
         own = step_reach_for(robot, level.reach.rise)._replace(**told(StepReach._fields, "step_"))
-        steps = find_steps(robot, level, own, given["steps"])
-        print(write_samples(samples_path(robot.name, steps=True), steps), steps.reach)
+        steps = plan_steps(robot, level, own, given["steps"], tell)
+        print(write_samples(shipped_path(robot.name, steps=True), steps), steps.reach)
 
 
 if __name__ == "__main__":

@@ -413,14 +413,16 @@ class JumpTask(FreeTimes):
         whole = {
             "format": PLAN_FORMAT,
             "task": self.resolved(robot).content(),
-            # The task says itself which actuators it is planned for; no plan depends on sensors that
-            # are mounted on links.
-            "robot": robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(
-                mode="json"
-            ),
+            "robot": planned_robot(robot),
         }
         text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def planned_robot(robot: RobotDescription) -> dict[str, Any]:
+    """What a plan depends on of a robot. The task says itself which actuators it is planned for; no plan
+    depends on sensors that are mounted on links."""
+    return robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(mode="json")
 
 
 def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> dict[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...mathematics.compiling.kernel_call import collect_calls
@@ -15,7 +16,6 @@ from ..language.block import Block, Clock, Context
 from ..language.errors import BlockError
 from ..language.parameters import Parameters
 from ..language.requirements import unmet_requirements
-from ..language.signals import Signal
 from ..language.stages import BlockSpec
 from ..running.memory import Memory, Snapshot
 
@@ -101,11 +101,12 @@ class BlockBench(Generic[B]):
         if not plain:
             compile_calls(calls)
         self._is_moore = block_type.is_moore()
-        self._settable: dict[str, Signal] = {
-            name: self.memory.bus.signal(block_type.inputs[name].signal, f"block.{name}")
+        self._settable: dict[str, Mapping[str, NDArray[Any]]] = {
+            name: self.memory.bus.signal(block_type.inputs[name].signal, f"block.{name}").views()
             for name in names
         }
-        self._settable.update({name: getattr(self.block, name) for name in block_type.states})
+        for name in block_type.states:
+            self._settable[name] = getattr(self.block, name).views()
         self.block.start()
 
     def set(self, port: str, /, **fields: Any) -> None:
@@ -119,15 +120,14 @@ class BlockBench(Generic[B]):
             raise KeyError(
                 f"{port!r} cannot be set; there is {', '.join(self._settable) or 'nothing'}"
             )
-        views = self._settable[port].views()
+        views = self._settable[port]
         for name, value in fields.items():
             if name not in views:
                 raise KeyError(f"{port} has no field {name!r}; it has {', '.join(views)}")
-            if np.shape(value) not in ((), views[name].shape):
-                raise ValueError(
-                    f"{port}.{name} has shape {views[name].shape}, not {np.shape(value)}"
-                )
-            views[name][...] = value
+            view, given = views[name], np.asarray(value)
+            if given.shape not in ((), view.shape):
+                raise ValueError(f"{port}.{name} has shape {view.shape}, not {given.shape}")
+            view[...] = given
 
     def get(self, port: str) -> Any:
         """The signal of an output, an input or a state: views, which the next step changes.
@@ -136,7 +136,7 @@ class BlockBench(Generic[B]):
             KeyError: there is no such port.
         """
         kind = type(self.block)
-        if port not in {**kind.inputs, **kind.outputs, **kind.states}:
+        if port not in kind.inputs and port not in kind.outputs and port not in kind.states:
             raise KeyError(f"{kind.__name__} has no port {port!r}")
         return getattr(self.block, port)
 

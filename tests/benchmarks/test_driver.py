@@ -1,12 +1,20 @@
 """The benchmark of the driver measures cycles of a driver that drives, beside bare bytes on the same ports."""
 
-from aloft.benchmarks.driver import BARE, RECORDED, driver, recorded
+import pytest
+
+from aloft.benchmarks.driver import BARE, RECORDED, Talk, driver, recorded
 from aloft.blocks.signals import DrivePhase
+from aloft.hal.bear.driver import Driver
 from aloft.hal.bear.protocol import BROADCAST, FrameReader, Instruction
 
 
-def test_what_is_said_and_heard_is_the_protocol_of_ten_drives() -> None:
-    made, talk = recorded()
+@pytest.fixture(scope="module")
+def driven() -> tuple[Driver, Talk]:
+    return recorded()
+
+
+def test_what_is_said_and_heard_is_the_protocol_of_ten_drives(driven: tuple[Driver, Talk]) -> None:
+    made, talk = driven
     assert made.loop.phase is DrivePhase.DRIVING and not made.loop.fault
     (request,) = FrameReader().feed(talk.request)
     assert (request.device, request.code) == (BROADCAST, Instruction.BULK)
@@ -18,8 +26,8 @@ def test_what_is_said_and_heard_is_the_protocol_of_ten_drives() -> None:
     assert len(set(talk.packets)) > RECORDED // 2, "an IMU whose numbers never change is frozen"
 
 
-def test_the_goals_are_made_by_machine_code() -> None:
-    made, _ = recorded()
+def test_the_goals_are_made_by_machine_code(driven: tuple[Driver, Talk]) -> None:
+    made, _ = driven
     assert made.loop.goals._make.compiled is not None
 
 

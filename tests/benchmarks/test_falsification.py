@@ -4,7 +4,9 @@ import pytest
 
 from aloft.benchmarks import falsification as benchmark
 
-pytest.importorskip("optuna")
+from ..needed import needs
+
+needs("optuna")
 
 
 @pytest.mark.long

@@ -360,7 +360,17 @@ def trace(
         yield zlib.crc32(bench.memory.state.buffer, zlib.crc32(bench.memory.bus.buffer))
 
 
-@pytest.mark.parametrize("name", list(blocks_with_live_parameters()))
+LONG = ("blocks.WholeBodyController",)
+"""What takes seconds: the controller has many parameters, and each makes a controller."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.long if name in LONG else ())
+        for name in blocks_with_live_parameters()
+    ],
+)
 def test_every_live_parameter_counts(name: str) -> None:
     kind = find_block(name)
     silent: dict[str, None] | None = None

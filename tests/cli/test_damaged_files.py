@@ -15,7 +15,7 @@ from aloft.planner.library.library import shipped_folder
 
 from .conftest import outcome
 
-TRIES = int(os.environ.get("ALOFT_FUZZ", "12"))
+TRIES = int(os.environ.get("ALOFT_FUZZ", "6"))
 
 
 def left(*arguments: str) -> tuple[int, str]:

@@ -9,7 +9,9 @@ import pytest
 
 import aloft
 
-pytest.importorskip("optuna")
+from ..needed import needs
+
+needs("optuna")
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import run_for_json, run_here
+from ..needed import needs
+from .conftest import run_for_json, run_here, run_parts_for_json
 from .test_run_machines import BLOCKS, GRAPH
 
-pytest.importorskip("cryptography")
+needs("cryptography")
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def test_a_run_over_tls_gives_the_bytes_of_one_process(here: Path) -> None:
         "aloft/graph/beacon/ground/onboard", "aloft/graph/tick/ground/onboard",
         "aloft/graph/data/ground/onboard/controller",
     ]  # fmt: skip
-    together = run_for_json("run", "graph.yaml", "--local", "--no-record", "--keys", "keys")
+    together = run_parts_for_json("run", "graph.yaml", "--local", "--no-record", "--keys", "keys")
     expected = run_for_json("run", "graph.yaml", "--no-record")
     assert together["run_hash"] == expected["run_hash"] and together["ticks"] == 60
     shown = run_here("keys", "graph.yaml", "-o", "keys", "--observer", "viewer").stdout

@@ -186,6 +186,6 @@ def test_an_editor_over_standard_input_and_output(tmp_path: Path) -> None:
         assert found["uri"] == uri and found["range"]["start"]["line"] == line
         editor.send("shutdown", None, answered=True)
         editor.send("exit", None)
-        assert editor.process.wait(20) == 0
+        assert editor.process.wait(60.0) == 0
     finally:
         editor.process.kill()

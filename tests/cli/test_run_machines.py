@@ -19,7 +19,7 @@ from aloft.logs.file.reader import read
 from aloft.processes.child_process import ChildProcess
 
 from ..waiting import free_port, is_gone
-from .conftest import run_for_json, run_here
+from .conftest import run_for_json, run_here, run_parts_for_json
 
 BLOCKS = """
 import time
@@ -99,7 +99,7 @@ def alone(*settings: str) -> dict[str, Any]:
 
 @pytest.mark.long
 def test_one_result_and_one_recording_with_the_bytes_of_one_process(here: Path) -> None:
-    together = run_for_json("run", "graph.yaml", "--local")
+    together = run_parts_for_json("run", "graph.yaml", "--local")
     expected = run_for_json("run", "graph.yaml", "--record", "alone.rrd")
     for key in ("success", "reason", "run_hash", "ticks", "metrics", "exit_code"):
         assert together[key] == expected[key], key
@@ -118,7 +118,7 @@ def test_one_result_and_one_recording_with_the_bytes_of_one_process(here: Path) 
 
 @pytest.mark.long
 def test_the_verdict_of_any_part_is_the_verdict(here: Path) -> None:
-    result = run_for_json(
+    result = run_parts_for_json(
         "run", "graph.yaml", "--local", "--no-record", "--set", "controller.good=false",
         "--set", "controller.stop_at=20", code=1,
     )  # fmt: skip
@@ -129,7 +129,7 @@ def test_the_verdict_of_any_part_is_the_verdict(here: Path) -> None:
 @pytest.mark.long
 def test_the_fault_of_a_part_is_the_reason(here: Path) -> None:
     settings = ("--set", "controller.fail_at=20")
-    result = run_for_json("run", "graph.yaml", "--local", *settings, code=3)
+    result = run_parts_for_json("run", "graph.yaml", "--local", *settings, code=3)
     assert result["reason"] == "block 'controller' failed at tick 20 (0.100 s): the spring broke"
     assert result["error"]["block"] == "controller" and result["error"]["tick"] == 20
     assert read("recordings/graph.rrd").ticks.tolist() == list(range(20))

@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("SALib")
+from ..needed import needs
+
+needs("SALib")
 
 GRAPH = """
 rate: 100 Hz

@@ -33,7 +33,7 @@ def test_it_ends_at_a_signal_while_nobody_reads_its_packets(
         assert hardware["bus"]["port"] == ports["bus"] and Path(ports["board"]).exists()
         time.sleep(1.0)  # the board's packets fill the terminal's buffer
         process.send_signal(number)
-        assert process.wait(30.0) == 0
+        assert process.wait(60.0) == 0
     finally:
         process.kill()
         process.wait()

@@ -16,8 +16,9 @@ from aloft.runtime.language.errors import BlockError, RunError
 from aloft.runtime.loading import LoadError
 from aloft.runtime.testing import BlockBench
 
-pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+from ..needed import needs
+
+needs("fmpy", "pythonfmu3")
 
 GRAPH = """\
 rate: 100 Hz

@@ -9,8 +9,9 @@ import pytest
 from aloft.fmi.exporting.write import export
 from aloft.fmi.instance import release_at_exit
 
-pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+from ..needed import needs
+
+needs("fmpy", "pythonfmu3")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the fault is of Linux alone")
 
 GRAPH = """\

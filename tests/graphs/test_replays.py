@@ -52,7 +52,7 @@ def run_python(code: str, arguments: list[str], hash_seed: str) -> str:
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
     command = [sys.executable, "-c", code, *arguments]
     done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=250, check=False
+        command, env=environment, capture_output=True, text=True, timeout=1800, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

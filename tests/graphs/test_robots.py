@@ -15,6 +15,8 @@ from aloft.runtime.loading import check
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 ROBOTS = ("go2", "g1", "solo12", "a1", "anymal_c", "hyq", "talos")
+OF_EACH_KIND = ("go2", "g1", "solo12")
+"""Those that `make test` has: a large and a small quadruped, and a humanoid. A stand takes a second."""
 SQUATS = {"go2": 0.06, "g1": 0.12, "solo12": 0.05}
 JUMPS = {
     "go2_jump": (0.10, 0.0),
@@ -26,7 +28,10 @@ JUMPS = {
 """Every graph of a jump, with its apex above standing and how far ahead it lands [m]."""
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot",
+    [pytest.param(one, marks=() if one in OF_EACH_KIND else pytest.mark.long) for one in ROBOTS],
+)
 def test_it_stands(robot: str) -> None:
     """The beginning of its graph: on its feet and still, in the robust trial."""
     short = {"score.judge_time": 0.34, "score.settle_time": 0.2, "push.speed_change": 0.0}

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
-from scipy.signal import cont2discrete, tf2ss
 
 from aloft.mathematics.linear_systems import (
     advance,
@@ -41,6 +40,8 @@ def test_a_double_integrator() -> None:
 
 
 def test_discretisation_is_scipys() -> None:
+    from scipy.signal import cont2discrete
+
     rng = np.random.default_rng(3)
     a, b = rng.normal(size=(3, 3)), rng.normal(size=(3, 2))
     found = discretise(a.tolist(), b.tolist(), 0.2)
@@ -50,6 +51,8 @@ def test_discretisation_is_scipys() -> None:
 
 
 def test_the_controllable_form_has_the_same_response() -> None:
+    from scipy.signal import tf2ss
+
     a, b, c, d = controllable_form([2.0, 3.0], [4.0, 1.0, 5.0])
     s = 0.3 + 0.7j
     response = (c @ np.linalg.solve(s * np.eye(2) - a, b))[0, 0] + d

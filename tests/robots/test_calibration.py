@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 import aloft
@@ -140,6 +139,8 @@ def test_the_filter_is_not_late_and_a_shift_is() -> None:
 
 def test_the_filter_is_that_of_scipy() -> None:
     """``sosfiltfilt`` of a Butterworth filter of the third order, to the last digits."""
+    from scipy.signal import butter, sosfiltfilt
+
     values = np.cumsum(np.random.default_rng(1).normal(size=(3000, 4)), axis=0)
     sections = butter(3, 2.0 * 6.0 * 0.002, output="sos")
     np.testing.assert_allclose(

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from aloft.ros2.codec import Codec, MessageType, WrongMessageError, type_store
 from aloft.runtime.language.errors import BlockError
 
+from ..needed import needs
 from .cdr_writer import imu, joint_state, transforms
 
-pytest.importorskip("rosbags")
+needs("rosbags")
 NAMES = ["hip", "knee", "ankle"]
 TIME = 1_700_000_000_123_456_789
 
@@ -163,9 +164,6 @@ def test_texts_that_do_not_fit() -> None:
         Codec(kind, {}, {"transforms.child_frame_id": ["a"]})
     with pytest.raises(BlockError, match=r"has no text 'name'; its texts are transforms.header"):
         Codec(kind, {}, {"name": "x"})
-
-
-pytest.importorskip("rosbags")
 
 
 def fields(name: str, **sizes: int | str) -> dict[str, tuple[object, ...]]:

@@ -8,8 +8,9 @@ import pytest
 import aloft
 
 from ..cli.conftest import run_here
+from ..needed import needs
 
-pytest.importorskip("rosbags")
+needs("rosbags")
 GRAPH = """
 rate: 100 Hz
 duration: 1 s

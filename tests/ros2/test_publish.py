@@ -10,9 +10,10 @@ from aloft.ros2.publish import SLOTS, Publish
 from aloft.runtime.loading import LoadError, load_text
 from aloft.runtime.testing.bench import BlockBench
 
+from ..needed import needs
 from ..waiting import wait_for
 
-pytest.importorskip("rosbags")
+needs("rosbags")
 BOOL = "RIHS01_feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9"
 
 

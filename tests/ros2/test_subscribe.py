@@ -10,9 +10,10 @@ from aloft.ros2.node import attachment
 from aloft.ros2.subscribe import Subscribe
 from aloft.runtime.testing.bench import BlockBench
 
+from ..needed import needs
 from ..waiting import wait_for
 
-pytest.importorskip("rosbags")
+needs("rosbags")
 TWIST = MessageType("geometry_msgs/msg/Twist", "jazzy", {})
 
 

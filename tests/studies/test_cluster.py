@@ -13,8 +13,9 @@ from aloft.studies.reading import read_study
 from aloft.studies.summary import make_table, write_table
 
 from ..local_cluster import local_cluster
+from ..needed import needs
 
-pytest.importorskip("distributed")
+needs("distributed")
 
 
 @pytest.fixture

@@ -32,7 +32,9 @@ from aloft.studies.falsification import (
 from aloft.studies.journal import Outcome
 from aloft.studies.study import MarginTerm, Range, Study
 
-pytest.importorskip("optuna")
+from ..needed import needs
+
+needs("optuna")
 
 Read = Callable[[str], Study]
 Judge = Callable[[Run], Outcome]

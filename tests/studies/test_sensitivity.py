@@ -16,7 +16,9 @@ from aloft.studies.sensitivity import (
 )
 from aloft.studies.study import Study
 
-pytest.importorskip("SALib")
+from ..needed import needs
+
+needs("SALib")
 A, B = 7.0, 0.1
 ISHIGAMI = [Varied(name, -np.pi, np.pi) for name in ("x.a", "x.b", "x.c")]
 

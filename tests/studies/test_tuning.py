@@ -28,7 +28,9 @@ from aloft.studies.tuning import (
     write_tuned,
 )
 
-pytest.importorskip("optuna")
+from ..needed import needs
+
+needs("optuna")
 
 Read = Callable[[str], Study]
 TEXT = """

@@ -4,6 +4,7 @@ import pytest
 
 from aloft.benchmarks.planner.online_plans import GOALS, online_plans, requests
 from aloft.planner.online.hop_plans import level_reach, step_reach
+from aloft.robots.description import find_robot
 
 
 @pytest.mark.parametrize("kind", GOALS)
@@ -13,7 +14,8 @@ def test_requests_are_of_their_kind(kind: str) -> None:
     assert all(one.level is (kind != "up and down") for one in found)
     assert all((one.aside == 0.0) is (kind == "straight") for one in found)
     if kind != "all coordinates":  # an ellipse bounds these, so some are shortened
-        reach = step_reach("bruce") if kind == "up and down" else level_reach("bruce")
+        bruce = find_robot("bruce")
+        reach = step_reach(bruce) if kind == "up and down" else level_reach(bruce)
         assert all(reach.nearest(one) == one for one in found)
 
 

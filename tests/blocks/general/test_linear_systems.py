@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete, dlsim
 
 from aloft.blocks.general.linear_systems import (
     StateSpace,
@@ -70,6 +69,8 @@ def run(inputs: np.ndarray, **params: object) -> list[float]:
 
 
 def test_a_continuous_one_is_scipys() -> None:
+    from scipy.signal import cont2discrete, dlsim
+
     inputs = np.random.default_rng(2).normal(size=40)
     system = cont2discrete(([0.2, 1.0, 3.0], [2.0, 0.5, 3.0]), 0.05)
     expected = dlsim((np.ravel(system[0]), system[1], 0.05), inputs)[1][:, 0]

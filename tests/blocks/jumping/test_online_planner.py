@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,9 @@ def test_a_jump_out_of_reach_is_replaced_by_the_nearest() -> None:
     assert bench.block.metrics()["plans_nearest"] == 1
 
 
-def test_a_robot_without_stored_plans_is_refused() -> None:
+def test_a_robot_without_stored_plans_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # where a user's own plans are kept
     with pytest.raises(BlockError, match="there are no stored plans of hops for solo12"):
         BlockBench(OnlinePlanner, robot="solo12", rate=100.0)

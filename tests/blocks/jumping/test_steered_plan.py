@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from aloft.blocks.jumping.steered_plan import SteeredPlan
 from aloft.blocks.signals import Phase, PlanOutcome
 from aloft.blocks.signals.steering import PART_ROWS
 from aloft.planner.library.jump_table import table_rows
-from aloft.planner.online.hop_plans import hop_table, shipped_samples
+from aloft.planner.online.hop_plans import hop_table, samples_of_hops
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import standing_feet
 from aloft.runtime.language.errors import BlockError
@@ -42,7 +43,7 @@ def hand_over(
     bench: BlockBench[SteeredPlan], number: int, outcome: PlanOutcome, row: int = 0
 ) -> None:
     """Give all parts of a stored plan."""
-    samples = shipped_samples("bruce")
+    samples = samples_of_hops(find_robot("bruce"))
     table = hop_table(samples.plan(row), ROBOT)
     rows, n = table_rows(table).rows, len(table.time)
     parts = -(-n // PART_ROWS)
@@ -237,7 +238,7 @@ def test_what_cannot_be_done_moves_the_goal_to_what_is_done() -> None:
     bench.set("command", number=1, ahead=0.9, aside=0.0, turn=0.0)
     bench.step()
     hand_over(bench, 1, PlanOutcome.UNSOLVED, row=1)
-    ahead, aside, turn, _ = shipped_samples("bruce").requests[1]
+    ahead, aside, turn, _ = samples_of_hops(find_robot("bruce")).requests[1]
     goal = bench.get("goal")
     assert np.asarray(goal.position) == pytest.approx([ahead, aside])
     assert float(goal.heading) == pytest.approx(turn)
@@ -265,7 +266,10 @@ def test_point_feet_give_the_direction_together(heading: float) -> None:
     assert float(request.turn) == pytest.approx(-heading)
 
 
-def test_a_robot_without_stored_plans_is_refused() -> None:
+def test_a_robot_without_stored_plans_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # where a user's own plans are kept
     with pytest.raises(BlockError, match="no stored plans of hops for a1"):
         BlockBench(SteeredPlan, robot="a1")
 

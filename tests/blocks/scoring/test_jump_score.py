@@ -47,24 +47,36 @@ def com_of(time: float) -> tuple[float, float]:
     return STANDING + SPEED * flown - 9.81 / 2 * flown**2, SPEED - 9.81 * flown
 
 
+LEAN = quaternion(0.01)
+ON_GROUND: Fields = {
+    "contact_position": np.column_stack([FEET, np.zeros(4)]),
+    "contact_force": np.tile([0.0, 0.0, WEIGHT / 4], (4, 1)),
+    "contact_touched": np.ones(4, bool),
+    "motor_torque": np.full(10, -3.0),
+    "motor_speed": np.full(10, 2.0),
+    "base_angular_velocity": np.zeros(3),
+    "ground_height": np.zeros(4),
+}
+IN_AIR: Fields = {
+    **ON_GROUND,
+    "contact_position": np.column_stack([FEET, np.full(4, 0.05)]),
+    "contact_force": np.zeros((4, 3)),
+    "contact_touched": np.zeros(4, bool),
+}
+
+
 def perfect(time: float) -> Fields:
     """The truth of a perfect jump on the spot."""
     height, speed = com_of(time)
     air = in_air(time)
     return {
+        **{name: value.copy() for name, value in (IN_AIR if air else ON_GROUND).items()},
         "base_position": [0.0, 0.0, height + 0.05],
-        "base_orientation": quaternion(0.01),
+        "base_orientation": LEAN,
         "com": [0.0, 0.0, height],
         "com_velocity": [0.0, 0.0, speed],
         "angular_momentum": [0.0, time, 0.0] if time < LIFT_OFF else [0.03, -0.04, 0.0],
-        "contact_position": np.column_stack([FEET, np.full(4, 0.05 if air else 0.0)]),
-        "contact_force": np.tile([0.0, 0.0, 0.0 if air else WEIGHT / 4], (4, 1)),
-        "contact_touched": np.full(4, not air),
-        "motor_torque": np.full(10, -3.0),
-        "motor_speed": np.full(10, 2.0),
         "saturated_share": 0.25 if air else 0.0,
-        "base_angular_velocity": np.zeros(3),
-        "ground_height": np.zeros(4),
         "forbidden_contacts": 0,
         "joint_limit_violation": 0.0,
         "motor_overload": 0.0,

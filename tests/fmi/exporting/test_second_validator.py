@@ -13,9 +13,9 @@ import pytest
 
 from aloft.fmi.exporting.write import export
 
-checker = pytest.importorskip("fmu_manipulation_toolbox.checker", reason="no second validator")
-pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+from ...needed import needs
+
+needs("fmu_manipulation_toolbox", "fmpy", "pythonfmu3")
 
 PART = """\
 inputs: {setpoint: }
@@ -35,6 +35,7 @@ blocks:
 
 def remarks(file: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
     """What both checks of the toolbox have to say against an FMU."""
+    from fmu_manipulation_toolbox import checker
     from fmu_manipulation_toolbox.operations import FMU
 
     caplog.clear()

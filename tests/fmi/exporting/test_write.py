@@ -16,8 +16,10 @@ from aloft.fmi.exporting.slave import RunningGraph
 from aloft.fmi.exporting.write import export
 from aloft.runtime.language.errors import AloftError
 
+from ...needed import needs
+
 fmpy = pytest.importorskip("fmpy")
-pytest.importorskip("pythonfmu3")
+needs("pythonfmu3")
 
 CONTROLLER = """\
 inputs:

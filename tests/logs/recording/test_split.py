@@ -38,7 +38,7 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
         def record(self, tick: int) -> None:
             if tick == on_tick:
                 assert recorder.link is not None
-                end = time.monotonic() + 30.0
+                end = time.monotonic() + 60.0
                 while not (folder / "run-part002.part.rrd").exists() and time.monotonic() < end:
                     time.sleep(0.01)
                 os.kill(recorder.link.process_id, signal.SIGKILL)

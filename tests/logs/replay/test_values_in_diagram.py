@@ -62,16 +62,16 @@ def test_values_are_those_of_the_run(ran: tuple[RunResult, OpenedRun]) -> None:
 def test_the_page_asks_for_the_values_of_a_tick(
     base: str, ran: tuple[RunResult, OpenedRun]
 ) -> None:
-    with urllib.request.urlopen(f"{base}/", timeout=20) as answer:
+    with urllib.request.urlopen(f"{base}/", timeout=60) as answer:
         text = answer.read().decode()
     assert '<input type="range" id="tick" min="0" max="49" value="0">' in text
     data = json.loads(text.partition('id="data">')[2].partition("</script>")[0])
     assert data["blocks"]["twice"]["sources"] == {"u": "wave.y"}
     assert data["recorded"]["times"].keys() == {"wave", "plain", "twice"}
-    with urllib.request.urlopen(f"{base}/at?tick=17", timeout=20) as answer:
+    with urllib.request.urlopen(f"{base}/at?tick=17", timeout=60) as answer:
         assert json.loads(answer.read()) == TickValues(ran[1].file).at(17)
     with pytest.raises(urllib.error.HTTPError, match="404"):
-        urllib.request.urlopen(f"{base}/at?tick=x", timeout=20)
+        urllib.request.urlopen(f"{base}/at?tick=x", timeout=60)
 
 
 def test_a_page_without_a_run_has_no_slider(ran: tuple[RunResult, OpenedRun]) -> None:
@@ -79,10 +79,10 @@ def test_a_page_without_a_run_has_no_slider(ran: tuple[RunResult, OpenedRun]) ->
     threading.Thread(target=server.serve_forever, daemon=True).start()
     base = f"http://127.0.0.1:{server.server_address[1]}"
     try:
-        with urllib.request.urlopen(f"{base}/", timeout=20) as answer:
+        with urllib.request.urlopen(f"{base}/", timeout=60) as answer:
             assert b'id="tick"' not in answer.read()
         with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"{base}/at?tick=1", timeout=20)
+            urllib.request.urlopen(f"{base}/at?tick=1", timeout=60)
     finally:
         server.shutdown()
         server.server_close()

@@ -18,7 +18,7 @@ from aloft.logs.file.reader import RecordedRun
 
 Pixels = NDArray[np.int64]
 DRIVERS = [*Path("/usr/share/vulkan/icd.d").glob("lvp*"), *Path("/etc/vulkan/icd.d").glob("lvp*")]
-TIMEOUT = 600.0
+TIMEOUT = 1800.0
 """Seconds that anything may take on a machine with much else to do."""
 SCENE = (0.07, 0.57, 0.0, 0.395)
 """Top, bottom, left and right of the robot in 3D."""

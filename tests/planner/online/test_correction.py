@@ -7,7 +7,7 @@ import pytest
 
 from aloft.planner.online import correction
 from aloft.planner.online.correction import Corrector
-from aloft.planner.online.hop_plans import shipped_samples
+from aloft.planner.online.hop_plans import samples_of_hops
 from aloft.planner.online.hop_request import HopRequest, coarse, task_of
 from aloft.planner.problem.unpacking import pack
 from aloft.planner.solving.solve import make_problem
@@ -15,7 +15,7 @@ from aloft.planner.solving.solver import VIOLATION, violation_of
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-SAMPLES = shipped_samples("bruce")
+SAMPLES = samples_of_hops(find_robot("bruce"))
 
 
 def problem_and_guess(wanted: HopRequest):

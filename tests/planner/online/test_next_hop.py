@@ -10,14 +10,16 @@ import pytest
 from aloft.blocks.signals import PlanOutcome
 from aloft.planner.checking.validity import require_valid
 from aloft.planner.online import correction
-from aloft.planner.online.hop_plans import shipped_samples
+from aloft.planner.online.hop_plans import samples_of_hops
 from aloft.planner.online.hop_request import HopRequest
 from aloft.planner.online.next_hop import HopPlanner
 from aloft.planner.task.plan import plan_bytes
 from aloft.robots.description import find_robot
 
 ROBOT = find_robot("bruce")
-PLANNER = HopPlanner(ROBOT, shipped_samples("bruce"), shipped_samples("bruce", steps=True))
+PLANNER = HopPlanner(
+    ROBOT, samples_of_hops(find_robot("bruce")), samples_of_hops(find_robot("bruce"), steps=True)
+)
 
 
 @pytest.mark.long
@@ -55,14 +57,14 @@ def test_where_the_motion_between_plans_leads_to_none_one_near_the_nearest_is_lo
 )
 def test_a_robot_with_four_points_for_feet_hops_too(wanted: HopRequest) -> None:
     robot = find_robot("go2")
-    found = HopPlanner(robot, shipped_samples("go2"), None).plan(wanted)
+    found = HopPlanner(robot, samples_of_hops(find_robot("go2")), None).plan(wanted)
     assert (found.outcome, found.done) == (PlanOutcome.PLANNED, wanted)
     require_valid(found.plan, robot)
 
 
 @pytest.mark.long
 def test_without_plans_up_and_down_all_jumps_are_level() -> None:
-    planner = HopPlanner(ROBOT, shipped_samples("bruce"), None)
+    planner = HopPlanner(ROBOT, samples_of_hops(find_robot("bruce")), None)
     found = planner.plan(HopRequest(0.2, 0.0, 0.0, 0.05))
     assert (found.outcome, found.done) == (PlanOutcome.NEAREST, HopRequest(0.2, 0.0, 0.0))
 

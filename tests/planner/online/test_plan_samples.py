@@ -8,15 +8,17 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from aloft.planner.online.hop_plans import samples_path, shipped_samples
+from aloft.planner.online.hop_plans import samples_of_hops, shipped_path
 from aloft.planner.online.hop_request import HopReach, HopRequest, StepReach
-from aloft.planner.online.make_samples import reach_for, reached, request
+from aloft.planner.online.make_samples import plan_level_hops, reach_for, reached, request
 from aloft.planner.online.plan_samples import read_samples, write_samples
+from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import ARRAYS, PlanFileError
 from aloft.robots.description import find_robot
+from aloft.studies.check_up import with_stronger_motors
 
-SAMPLES = shipped_samples("bruce")
-STEPS = shipped_samples("bruce", steps=True)
+SAMPLES = samples_of_hops(find_robot("bruce"))
+STEPS = samples_of_hops(find_robot("bruce"), steps=True)
 REACH = HopReach(ahead=0.32, back=0.1, aside=0.3, turn=0.87, rise=0.09)
 UP = StepReach(least=0.12, ahead=0.32, aside=0.1, turn=0.35, up=0.06, down=0.04, rise=0.09)
 
@@ -55,7 +57,18 @@ def test_reach_is_told_by_the_file_and_asked_for_by_size() -> None:
     assert SAMPLES.reach == REACH == reach_for(find_robot("bruce"))
     other = find_robot("go2")
     assert reach_for(other).ahead < REACH.ahead, "it stands lower"
-    assert shipped_samples("go2").reach != reach_for(other), "more was asked for"
+    assert samples_of_hops(other).reach != reach_for(other), "more was asked for"
+    assert reach_for(other).back == reach_for(other).ahead, "balls have no heels"
+
+
+def test_a_robot_without_a_jump_on_the_spot_is_refused_at_once() -> None:
+    weak = with_stronger_motors(find_robot("go2"), 0.2)
+    asked = []
+    with pytest.raises(
+        PlanError, match=r"go2 has no valid plan of a jump on the spot, 7.8 cm high"
+    ):
+        plan_level_hops(weak, reach_for(weak), lambda wanted, valid: asked.append(wanted), 4)
+    assert asked == [HopRequest(0.0, 0.0, 0.0)]
 
 
 def test_weights_reproduce_every_linear_function() -> None:
@@ -92,7 +105,7 @@ def test_the_file_gives_what_was_written(tmp_path: Path, steps: bool) -> None:
     samples = STEPS if steps else SAMPLES
     path = write_samples(tmp_path / "hops.npz", samples)
     again = read_samples(path)
-    assert members(path) == members(samples_path("bruce", steps=steps))
+    assert members(path) == members(shipped_path("bruce", steps=steps))
     for name in ARRAYS:
         np.testing.assert_array_equal(again.arrays[name], samples.arrays[name])
 

@@ -105,7 +105,7 @@ def test_a_process_that_died_is_started_again(thread: None) -> None:
     process = _helper._process
     assert process is not None
     os.kill(process.pid, signal.SIGKILL)
-    assert process.wait(30.0) == -signal.SIGKILL
+    assert process.wait(60.0) == -signal.SIGKILL
     assert call_bounded(solver, arguments(0.0), 20)[0]
 
 

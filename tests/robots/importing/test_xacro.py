@@ -7,7 +7,9 @@ import pytest
 
 from aloft.robots.description import RobotError, read
 
-pytest.importorskip("xacro", reason="the library xacro is not installed (pip install xacro)")
+from ...needed import needs
+
+needs("xacro")
 
 MACROS = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
   <xacro:property name="mass" value="${2 * 0.75}"/>

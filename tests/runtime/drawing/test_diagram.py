@@ -95,7 +95,7 @@ def test_the_page_is_served_to_this_machine_only(graph: CheckedGraph) -> None:
     try:
         assert server.server_address[0] == "127.0.0.1"
         base = f"http://127.0.0.1:{server.server_address[1]}"
-        with urllib.request.urlopen(f"{base}/?closed=control", timeout=20) as answer:
+        with urllib.request.urlopen(f"{base}/?closed=control", timeout=60) as answer:
             assert answer.headers["Content-Security-Policy"] == policy()
             text = answer.read().decode()
         assert 'data-path="control"' in text and 'data-path="control/pid"' not in text
@@ -104,7 +104,7 @@ def test_the_page_is_served_to_this_machine_only(graph: CheckedGraph) -> None:
             urllib.request.Request(f"{base}/etc/passwd"),
         ):
             with pytest.raises(urllib.error.HTTPError, match=r"403|404"):
-                urllib.request.urlopen(request, timeout=20)
+                urllib.request.urlopen(request, timeout=60)
     finally:
         server.shutdown()
         server.server_close()

@@ -49,7 +49,7 @@ class Running:
     def stop(self, reason: str = "the test is over") -> None:
         """End the run and wait for its end."""
         self.bound.clock.stop_reason = reason
-        self.thread.join(20)
+        self.thread.join(60.0)
         assert not self.thread.is_alive()
 
 

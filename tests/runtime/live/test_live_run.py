@@ -34,7 +34,7 @@ blocks:
 
 def wait_for(run: LiveRun, state: str, tick: int = 0) -> dict[str, Any]:
     """What the run says once it has that state."""
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 60.0
     while time.monotonic() < end:
         found = run.now()
         if found["state"] == state and found.get("tick", tick) >= tick:

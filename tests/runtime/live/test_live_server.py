@@ -28,7 +28,7 @@ def ask(
         "X-Aloft-Token": server.token, "Host": f"127.0.0.1:{port}", "Content-Type": JSON,
         **{name.replace("_", "-"): value for name, value in headers.items()},
     }  # fmt: skip
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     sent = body if isinstance(body, bytes) else json.dumps(body or {}).encode()
     connection.putrequest(method, path, skip_host=True)
     for name, value in given.items():

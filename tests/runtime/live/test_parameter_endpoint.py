@@ -43,7 +43,7 @@ def running(path: Path) -> Iterator[BoundGraph]:
     thread.start()
     yield bound
     bound.clock.stop_reason = "the test is over"
-    thread.join(10)
+    thread.join(60.0)
     assert not path.exists()
 
 

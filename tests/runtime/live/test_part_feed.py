@@ -38,7 +38,7 @@ class Kept:
 
 
 def wait_until(holds: Any) -> None:
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 60.0
     while not holds():
         assert time.monotonic() < end
         time.sleep(0.01)
@@ -64,7 +64,7 @@ def messages(graph_file: Path) -> tuple[BoundGraph, Kept]:
     transport.is_open = True  # as once the links are there
     wait_until(lambda: len(transport.messages) > 2)
     bound.clock.stop_reason = "enough"
-    thread.join(30.0)
+    thread.join(60.0)
     assert not thread.is_alive()
     return bound, transport
 

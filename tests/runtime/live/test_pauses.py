@@ -65,7 +65,7 @@ def test_a_run_in_virtual_time_from_another_process(running: Running, live: Live
         "paused before tick 800, 4.000 s at its end (the duration is over)"
     )
     live.control("go on")
-    running.thread.join(20)  # the state is shown first, the reason a little later
+    running.thread.join(60.0)  # the state is shown first, the reason a little later
     assert wait_for(live, "ended")["said"] == "the run has ended: ran to its end"
     with pytest.raises(EndpointError, match="no running graph answers"):
         live.control("look")

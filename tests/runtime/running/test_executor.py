@@ -373,7 +373,7 @@ def test_it_runs_in_another_thread() -> None:
     results = []
     thread = threading.Thread(target=lambda: results.append(run(chain(Filter))))
     thread.start()
-    thread.join(10.0)
+    thread.join(60.0)
     assert results[0].success
 
 

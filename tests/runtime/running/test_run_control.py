@@ -46,7 +46,7 @@ class Running:
 
     def wait(self, holds: Callable[[dict[str, Any]], Any] = lambda about: about["paused"]) -> Any:
         """What the control says once it is so; by default once the run stands still."""
-        end = time.monotonic() + 30.0
+        end = time.monotonic() + 60.0
         while True:
             if not self.control.refusal and holds(about := self.control.about()):
                 return about
@@ -70,7 +70,7 @@ class Running:
             self.control.go_on()
         elif not about.get("over"):
             self.bound.clock.stop_reason = "the test is over"
-        self._thread.join(30.0)
+        self._thread.join(60.0)
         assert not self._thread.is_alive()
         return self._results[0]
 

@@ -33,10 +33,11 @@ from aloft.runtime.transports.zenoh_session import (
 )
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
+from ...needed import needs
 from ...waiting import free_port, wait_for
 from ..links.example_graphs import ring
 
-pytest.importorskip("cryptography")
+needs("cryptography")
 COMMANDS = "aloft/{}/data/far/onboard/last"
 
 

@@ -17,8 +17,9 @@ from aloft.runtime.language.errors import AloftError
 from aloft.studies.batch.jobs import JobResult, job_results, running_loop
 
 from ...local_cluster import local_cluster
+from ...needed import needs
 
-pytest.importorskip("distributed")
+needs("distributed")
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +70,6 @@ def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(AloftError, match=r"pip install 'aloft-robotics\[cluster\]'"):
         results(math.sqrt, [1.0], "tcp://127.0.0.1:1")
-
-
-pytest.importorskip("distributed")
 
 
 async def _thread_name() -> str:
