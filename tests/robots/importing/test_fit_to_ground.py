@@ -59,7 +59,9 @@ def test_feet_are_below_the_hips_of_legs_that_cannot_straighten() -> None:
     angles = np.array([pose.angles[joint.name] for joint in robot.joints])
     poses = link_poses_in_base(robot, angles)
     hips = {side: poses[f"{side}_upperleg"][1][0] for side in ("lf", "lh")}
-    soles = {f.name: (poses[f.link][1] + poses[f.link][0] @ np.array(f.sole))[0] for f in robot.feet}
+    soles = {
+        f.name: (poses[f.link][1] + poses[f.link][0] @ np.array(f.sole))[0] for f in robot.feet
+    }
     assert soles["lf"] - soles["lh"] == pytest.approx(hips["lf"] - hips["lh"], abs=0.05)
 
 
