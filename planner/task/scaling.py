@@ -73,7 +73,7 @@ SAME_PLACE = 0.01
 LEAST_CHANGE = 0.02
 """m for each rad; what bends a leg by less is no knee."""
 BOTH_WAYS = 0.5
-"""rad beyond straight, to either side; a knee that may be bent by less to one of them folds to the other only."""
+"""rad beyond straight; a knee that may be bent by no more than that to one side folds to the other only."""
 LEAST_LOAD = 1e-6
 """Motors that a load on the toes takes a smaller share of their torque of do not carry it."""
 PART_OF_STANDING = 0.8
@@ -147,8 +147,9 @@ def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[floa
 
 @per_robot
 def one_way_knees(robot: RobotDescription) -> Mapping[int, tuple[float, float]]:
-    """Limits [rad] of the knees that the description lets fold to either side, by the joint's index: they keep the side to
-    which they are bent as the robot stands. A leg that passes through straight on its way cannot push."""
+    """Limits [rad] of the knees that the description lets fold to either side, by the joint's index: they fold to the side to
+    which they are bent as the robot stands only, as those of other robots do. A leg that folds over to the other side while it
+    carries passes through straight, where it cannot push."""
     found = dict[int, tuple[float, float]]()
     for foot in robot.feet:
         knee = _knee(robot, foot.link, foot.sole)
@@ -158,7 +159,7 @@ def one_way_knees(robot: RobotDescription) -> Mapping[int, tuple[float, float]]:
         low, high = (float(limit) for limit in robot.joint_limits[index])
         if min(straight - low, high - straight) > BOTH_WAYS:
             bent = float(robot.standing_position[index]) > straight
-            found[index] = (straight, high) if bent else (low, straight)
+            found[index] = (straight - BOTH_WAYS, high) if bent else (low, straight + BOTH_WAYS)
     return found
 
 

@@ -539,10 +539,12 @@ def test_a_knee_that_folds_to_the_other_side_is_named(by_hand: PlannedJump) -> N
         for k, joint in enumerate(ROBOT.joints)
     )
     position = by_hand.position.copy()
-    position[10, 7 + knee] = 0.3
+    position[10, 7 + knee] = 0.8
     report = check_plan(replace(by_hand, position=position), ROBOT.changed(joints=both_ways))
     (test,) = (test for test in report.tests if test.name == "joint_limits")
-    assert test.value == pytest.approx(0.3, abs=0.05), "from straight, not from the limit"
+    assert test.value == pytest.approx(0.3, abs=0.05), (
+        "from 0.5 rad beyond straight, not from the limit"
+    )
     assert not test.passed and test.where.startswith("left_knee at ")
 
 
