@@ -6,7 +6,6 @@ import math
 from functools import lru_cache
 from typing import NamedTuple
 
-from ..task.recipe import JOINTS
 from ..task.sequence import PhaseSpec
 from ..task.task import JumpTask, Knots, make_task
 
@@ -117,15 +116,11 @@ def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
 
 
 def coarse(task: JumpTask) -> JumpTask:
-    """A task whose parameters are all chosen, on the few intervals of plans that are made in the loop, and with no more
-    room at the joints for a turn than without: where they lead is all that tasks of one problem differ in."""
+    """A task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
 
     def on_fewer(span: PhaseSpec) -> PhaseSpec:
         return span if span.knots is None else span.model_copy(update={"knots": TOE_KNOTS})
 
     phases = task.phases and tuple(on_fewer(span) for span in task.phases)
     knots = STEP_KNOTS if task.landing_height else KNOTS
-    margins = task.margins and task.margins.model_copy(
-        update={"joints": min(JOINTS, task.margins.joints)}
-    )
-    return task.model_copy(update={"knots": knots, "phases": phases, "margins": margins})
+    return task.model_copy(update={"knots": knots, "phases": phases})

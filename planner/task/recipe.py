@@ -58,10 +58,6 @@ CONTACT = 0.6
 KNOTS = {"squat": 12, "thrust": 12, "flight": 16, "landing": 12}
 LANDING_LEAN, KNEE_BEND, JOINTS = 0.1, 0.4, 0.06
 """rad"""
-TURN_LAG = 0.12
-"""By which share of a turn the base lags behind its plan on balls: ANYmal C by 1.6 degrees of 30 at lift-off, 2.6 at touchdown
-and 4 in the squat after it, A1 by 1.6. Hips take that in, and joints keep as much farther from their limits: 61 mrad for 30
-degrees. Without, a hip of ANYmal C passed its limit by up to 1.7 mrad, though planned 97 off it."""
 STEP, STEP_HEIGHT, FOOT_CLEARANCE = 0.012, 0.05, 0.12
 """m from a step, how much more for each m that it goes up or down, and the feet's height in the middle of
 the flight as a share of that of the centre of mass."""
@@ -333,13 +329,8 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         )
         yield Choice("margins.step", rounded(edge + knee_sag(robot)), why)
     if "joints" not in said:
-        turn = max(abs(hop.twist or 0.0) for hop in hops) if ball_feet(robot) else 0.0
-        wanted = JOINTS + TURN_LAG * turn
-        room = math.floor(100.0 * min(wanted, 0.5 * least_distance_to_limits(robot))) / 100.0
-        why = "joints keep off their limits" + (
-            ", and the base lags behind the turn" if turn else ""
-        )
-        yield Choice("margins.joints", max(Margins().joints, room), why)
+        room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
+        yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
 
 
 def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:

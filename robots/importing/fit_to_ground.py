@@ -4,8 +4,8 @@ A pose in which a robot stands has feet on one level, soles flat, and weight ove
 damped Gauss-Newton over the angles of the legs with the base upright. What must hold has a large
 weight: the lowest points of all contacts at one height, soles that are flat parallel to the
 ground, the centre of mass over the middle of the soles. What is wanted has a small one: feet below
-the places where they are with straight legs, legs a little shorter than straight, and angles near
-those of the start. The same robot gives the same angles, rounded to nine digits.
+the places where straight legs have them, whether or not knees can straighten, legs a little shorter than the limits let
+them be, and angles near those of the start. The same robot gives the same angles, rounded to nine digits.
 """
 
 from __future__ import annotations
@@ -239,11 +239,12 @@ class _GroundFit:
         self.foot_of_point = np.array(robot.foot_of_contact())
         self.centres = contact_centres(robot)
         self.flat = [k for k in range(len(robot.feet)) if self._is_flat(k)]
-        straight = np.clip(np.zeros(len(robot.joints)), limits[:, 0], limits[:, 1])
-        straight[held] = self.start[held]
-        centres = self._points(self._poses(straight[None]))[1][0]
-        self.places = centres[:, :2]
-        self.height = height * (0.0 - centres[:, 2].mean())
+        straight = np.where(held, self.start, 0.0)
+        reached = np.where(held, self.start, np.clip(straight, limits[:, 0], limits[:, 1]))
+        # Knees that cannot straighten put the feet ahead of or behind where they are below the hips.
+        wanted, highest = self._points(self._poses(np.array([straight, reached])))[1]
+        self.places = wanted[:, :2]
+        self.height = height * (0.0 - highest[:, 2].mean())
 
     def _bend(self, link: str, carrier: Mapping[str, tuple[int, str]]) -> None:
         """Start a leg that is straight in the middle of its limits a little bent: a straight leg does not

@@ -50,12 +50,3 @@ def test_jumps_of_other_structure_are_of_another_kind() -> None:
         for wanted in ((0.1, 0, 0), (-0.05, 0, 0), (0.2, 0, 0, 0.04), (0.2, 0, 0, -0.04))
     )
     assert len({ahead, back, up, down}) == 4
-
-
-def test_turns_of_a_robot_on_balls_share_their_kind() -> None:
-    robot = find_robot("go2")
-    kinds = {
-        kind_of(coarse(task_of(HopRequest(0.1, 0.0, turn), "go2", 0.1).resolved(robot)))
-        for turn in (0.0, 0.2, 0.5)
-    }
-    assert len(kinds) == 1

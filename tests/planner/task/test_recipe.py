@@ -8,7 +8,7 @@ from tests.robots.limbed_robots import quadruped
 from aloft.planner.task.recipe import choices, demand
 from aloft.planner.task.scaling import size_of
 from aloft.planner.task.task import JumpTask, make_task
-from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.description import find_robot
 
 BRUCE = find_robot("bruce")
 ASKED = {"name": "a", "rise": "12 cm", "distance_x": "8 cm", "twist": "10 deg"}
@@ -217,18 +217,6 @@ def test_a_robot_without_soles_has_no_toe_phase() -> None:
     assert task.phases is None
     assert task.margins is not None
     assert task.margins.landing_limits, "it has knees all the same"
-
-
-def test_hips_of_robots_on_balls_keep_the_room_that_a_turn_takes() -> None:
-    def room(robot: RobotDescription, **turn: str) -> float:
-        margins = make_task({"name": "a", "rise": "10 cm", **turn}).resolved(robot).margins
-        assert margins is not None
-        return margins.joints
-
-    four, soles = find_robot("anymal_c"), find_robot("bruce")
-    assert (room(four), room(four, twist="30 deg")) == (0.06, 0.12)
-    assert room(four, twist="-30 deg") == 0.12
-    assert room(soles, twist="30 deg") == 0.06  # they hold the turn
 
 
 def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:

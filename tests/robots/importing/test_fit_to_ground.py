@@ -51,6 +51,20 @@ def test_a_lower_stand_bends_the_knees_more_and_held_joints_stay() -> None:
     assert {name: low.angles[name] for name in robot.held} == dict(robot.held)
 
 
+@needs_robots
+def test_feet_are_below_the_hips_of_legs_that_cannot_straighten() -> None:
+    robot = find_robot("hyq")  # knees bend by at least 0.35 rad, fore ones back and hind ones ahead
+    pose = find_standing_pose(robot, robot.standing, height=0.7)
+    assert pose.holds
+    angles = np.array([pose.angles[joint.name] for joint in robot.joints])
+    poses = link_poses_in_base(robot, angles)
+    hips = {side: poses[f"{side}_upperleg"][1][0] for side in ("lf", "lh")}
+    soles = {
+        f.name: (poses[f.link][1] + poses[f.link][0] @ np.array(f.sole))[0] for f in robot.feet
+    }
+    assert soles["lf"] - soles["lh"] == pytest.approx(hips["lf"] - hips["lh"], abs=0.05)
+
+
 def test_what_cannot_stand_says_by_how_much() -> None:
     # One ball under a body that is far to the side, and no joint to bring it there.
     data = hopper()
