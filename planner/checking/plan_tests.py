@@ -17,7 +17,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
 from ..models.link_shapes import arms
-from ..task.margins import Margins, joint_bounds, plan_limits
+from ..task.margins import Margins, joint_bounds
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
@@ -312,7 +312,7 @@ def momentum(e: Evidence) -> Iterator[PlanTestResult]:
 def machine(e: Evidence) -> Iterator[PlanTestResult]:
     """Joints stay within their limits, motors within what they can do at their speed."""
     robot, s = e.robot, e.replay.samples
-    angles, limits = s.position[:, 7:], plan_limits(robot)
+    angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
     sample, joint = worst(excess)
     yield PlanTestResult("joint_limits", excess.max(), 5e-3, "rad", "how far a joint passes its limit",

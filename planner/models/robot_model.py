@@ -23,6 +23,12 @@ HARD, HARD_TURN = 40.0, 100.0
 """m/s^2 and rad/s^2 of a link in a hard jump, gravity included."""
 MATTERS = 0.5
 """Held joints that need less than this share of their motors in such a motion have no constraint."""
+TWIN = 10.0
+"""How many times as far apart as usual the left and right angles of a mirrored twin's pose may be meant to be the same."""
+ROUNDED = 6
+"""Digits of such an angle."""
+SAME = {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)}
+"""What all links have where only the joints of limbs are compared."""
 
 
 def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
@@ -46,15 +52,32 @@ def symmetric_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFi
 
 
 @per_robot
-def _model(robot: RobotDescription, symmetric: bool) -> tuple[SymbolicModel, StanceFinder]:
+def _model(
+    robot: RobotDescription, symmetric: bool, loosely: float = 1.0
+) -> tuple[SymbolicModel, StanceFinder]:
     try:
         part = welded(robot)
     except ValueError as error:
         raise PlanError(str(error), family="stance") from error
     robot, loads = part.robot, [load for load in part.loads if _matters(load)]
-    pairs = mirrored_pairs(robot) if symmetric else None
+    compared = robot
+    if loosely > 1.0:
+        links = tuple(link.model_copy(update=SAME) for link in robot.links)
+        compared = robot.changed(links=links)
+    pairs = mirrored_pairs(compared) if symmetric else None
     model = SymbolicModel(symmetrised(robot, pairs) if pairs else robot, loads)
-    return model, StanceFinder(model.robot, pairs or ())
+    return model, StanceFinder(model.robot, pairs or (), loosely)
+
+
+def twin_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder] | None:
+    """The same of a robot whose limbs mirror each other but whose masses do not, as Talos' do not by a little, made the
+    same left and right: its jumps are good guesses for the robot's. ``None`` for other robots.
+
+    Raises:
+        PlanError: held joints share motors with others.
+    """
+    found = _model(robot, True, TWIN)
+    return found if found[1].pairs and not symmetric_model_of(robot)[1].pairs else None
 
 
 def _matters(load: HeldLoad) -> bool:
@@ -96,9 +119,12 @@ UPRIGHT_REACH = 1e-7
 class StanceFinder:
     """Places a robot on the ground for given joint angles, with all contact points on it."""
 
-    def __init__(self, robot: RobotDescription, pairs: Sequence[Pair] = ()) -> None:
-        """``pairs`` of limbs get the same angles where they are to have almost the same ones."""
-        self.robot, self.pairs = robot, tuple(pairs)
+    def __init__(
+        self, robot: RobotDescription, pairs: Sequence[Pair] = (), loosely: float = 1.0
+    ) -> None:
+        """``pairs`` of limbs get the same angles where they are to have almost the same ones; ``loosely`` multiplies
+        what almost means."""
+        self.robot, self.pairs, self.loosely = robot, tuple(pairs), loosely
         self._body = ExactDynamics(robot)
         self._placed: dict[tuple[bytes, StanceLocation], Stance] = {}
         self._levelled: dict[bytes, Array] = {}
@@ -172,7 +198,12 @@ class StanceFinder:
         if key not in self._levelled:
             if len(self._levelled) > MOST_PLACED:
                 self._levelled.clear()
-            q = np.concatenate([np.zeros(6), symmetrised_angles(self.pairs, joints)])
+            alike = self.loosely * symmetrised_angles(self.pairs, joints / self.loosely)
+            if (
+                self.loosely > 1.0
+            ):  # what one side leans to the other is the rest of a sum, not exactly zero
+                alike = alike.round(ROUNDED)
+            q = np.concatenate([np.zeros(6), alike])
             for _ in range(LEANS):
                 # Balls touch elsewhere as the base leans, so one step is not quite enough for them.
                 points = self._body.points(pose_of(q))

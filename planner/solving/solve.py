@@ -23,7 +23,13 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
 from ..models.coordinates import Coordinates
-from ..models.robot_model import Stance, model_of, stances_of, symmetric_model_of
+from ..models.robot_model import (
+    Stance,
+    model_of,
+    stances_of,
+    symmetric_model_of,
+    twin_model_of,
+)
 from ..models.symbolic_model import SymbolicModel
 from ..problem.guess import USUAL_TIMES, ballistic_guess, displaced_guess
 from ..problem.layout import ProblemPhase, layout
@@ -329,8 +335,9 @@ def problems_like(
 
 def _builder(
     task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
+    *, twin: bool = False,
 ) -> ProblemBuilder:  # fmt: skip
-    """See ``make_problem``."""
+    """See ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left and right."""
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)
@@ -338,7 +345,7 @@ def _builder(
     chosen = None
     wanted = (coordinates,) if coordinates else _mirrors(task)
     if any(name != "full" for name in wanted):
-        alike, finder = symmetric_model_of(robot)
+        alike, finder = (twin and twin_model_of(robot)) or symmetric_model_of(robot)
         placed = stances_of(task, robot, finder)
         chosen = _choose(alike, wanted, placed, stretches)
         if chosen is not None:
@@ -456,18 +463,22 @@ def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
 
 
 def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
-    """A guess from a simpler jump that can be solved: the same straight ahead, or, where that needs all
-    coordinates, too, one in place on level ground."""
+    """A guess from a simpler jump that can be solved: the same straight ahead, of the robot or of its mirrored twin;
+    or, where that needs all coordinates, too, one in place on level ground."""
     if problem.coordinates.name != "full":
         return None
-    for task in (straight_ahead(problem.task), in_place(problem.task)):
-        if task == problem.task:
+    straight, twin = straight_ahead(problem.task), twin_model_of(robot) is not None
+    for task, mirrored in ((straight, twin), (in_place(problem.task), False)):
+        if task == problem.task and not mirrored:
             continue
-        simpler = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+        compiled = not problem.assembly.interpreted
+        simpler = _builder(task, robot, compiled, None, "", twin=mirrored).build()
+        if task == problem.task and simpler.coordinates.name == "full":
+            continue  # the twin does not stand the same left and right
         solution = solve(simpler, ballistic_guess(simpler), solver="fatrop")
         if solution.solved:
             return displaced_guess(problem, simpler, solution.values)
-        if simpler.coordinates.name != "full":
+        if simpler.coordinates.name != "full" and not mirrored:
             break
     return None
 

@@ -9,7 +9,6 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
-from .scaling import one_way_knees
 
 LIMIT_MARGIN = 0.005
 """rad; between two knots a joint at its limit would pass it by about as much."""
@@ -78,17 +77,9 @@ def unknown_joints(margins: Margins, names: list[str]) -> list[str]:
     return [key for key in margins.landing_limits if not any(_means(key, name) for name in names)]
 
 
-def plan_limits(robot: RobotDescription) -> Array:
-    """The joints' limits [rad], (n_joints, 2), with knees on the side to which they are bent as the robot stands."""
-    limits = robot.joint_limits.copy()
-    for knee, kept in one_way_knees(robot).items():
-        limits[knee] = kept
-    return limits
-
-
 def joint_bounds(robot: RobotDescription, margins: Margins, landed: bool) -> Array:
     """The joints' limits in a plan [rad], (n_joints, 2)."""
-    bounds = plan_limits(robot) + np.array([margins.joints, -margins.joints])
+    bounds = robot.joint_limits + np.array([margins.joints, -margins.joints])
     if landed:
         for key, (low, high) in margins.landing_limits.items():
             for i, joint in enumerate(robot.joints):

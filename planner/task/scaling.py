@@ -72,8 +72,6 @@ SAME_PLACE = 0.01
 """Contact points of a foot closer together than this [m], along it, are no heel and toe."""
 LEAST_CHANGE = 0.02
 """m for each rad; what bends a leg by less is no knee."""
-BOTH_WAYS = 0.5
-"""rad beyond straight, to either side; a knee that may be bent by less to one of them folds to the other only."""
 LEAST_LOAD = 1e-6
 """Motors that a load on the toes takes a smaller share of their torque of do not carry it."""
 PART_OF_STANDING = 0.8
@@ -142,23 +140,6 @@ def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[floa
     short = {name.partition("_")[2] for name in found}
     if len(short) == 1 and "" not in short and len(set(found.values())) == 1:
         return {short.pop(): next(iter(found.values()))}
-    return found
-
-
-@per_robot
-def one_way_knees(robot: RobotDescription) -> Mapping[int, tuple[float, float]]:
-    """Limits [rad] of the knees that the description lets fold to either side, by the joint's index: they keep the side to
-    which they are bent as the robot stands. A leg that passes through straight on its way cannot push."""
-    found = dict[int, tuple[float, float]]()
-    for foot in robot.feet:
-        knee = _knee(robot, foot.link, foot.sole)
-        if knee is None:
-            continue
-        index, straight = knee
-        low, high = (float(limit) for limit in robot.joint_limits[index])
-        if min(straight - low, high - straight) > BOTH_WAYS:
-            bent = float(robot.standing_position[index]) > straight
-            found[index] = (straight, high) if bent else (low, straight)
     return found
 
 

@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
-from tests.robots.limbed_robots import quadruped
+from tests.planner.models.test_symmetry import askew
+from tests.robots.limbed_robots import humanoid, quadruped
 
-from aloft.planner.models.robot_model import Stance, model_of
+from aloft.planner.models.coordinates import sagittal_coordinates
+from aloft.planner.models.robot_model import Stance, model_of, symmetric_model_of, twin_model_of
 from aloft.planner.task.files import PlanError
 from aloft.planner.task.sequence import StanceLocation, ground_axes
 from aloft.robots.description import RobotDescription, find_robot
+
+AT_ORIGIN = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def stand(robot: RobotDescription, heading: float = 0.0, **angles: float) -> Stance:
@@ -88,3 +92,26 @@ def test_nothing_to_stand_on() -> None:
     robot = find_robot("bruce").changed(contacts=())
     with pytest.raises(PlanError, match="bruce has no contact points to stand on"):
         stand(robot)
+
+
+def test_talos_has_a_mirrored_twin_that_stands_in_the_sagittal_plane() -> None:
+    """Its pelvis with the arms is heavier on one side, and it leans by 2 mrad to stand over the middle of its soles."""
+    robot = find_robot("talos")
+    assert symmetric_model_of(robot)[1].pairs == ()
+    found = twin_model_of(robot)
+    assert found is not None
+    model, finder = found
+    plane = sagittal_coordinates(model)
+    assert plane is not None
+    angles = np.array([robot.standing[joint.name] for joint in model.robot.joints])
+    stance = finder.on_ground(angles, AT_ORIGIN)
+    assert plane.contains(stance.coordinates[None])
+    askew_stance = model_of(robot)[1].on_ground(angles, AT_ORIGIN)
+    assert np.abs(stance.coordinates - askew_stance.coordinates).max() < 5e-3
+    assert {load.joint for load in model.loads} == {load.joint for load in model_of(robot)[0].loads}
+
+
+def test_only_a_robot_whose_limbs_mirror_each_other_has_a_twin() -> None:
+    assert twin_model_of(quadruped()) is None  # is the same left and right by itself
+    assert twin_model_of(askew(quadruped(), 0.05)) is not None
+    assert twin_model_of(humanoid()) is None

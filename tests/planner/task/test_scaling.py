@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.robots.limbed_robots import LIGHT_QUADRUPED, quadruped
+from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.task.margins import Margins, joint_bounds
 from aloft.planner.task.scaling import (
     KEPT,
     knee_limits,
     least_distance_to_limits,
-    one_way_knees,
     per_robot,
     scaled_defaults,
     standing_height,
@@ -125,19 +123,6 @@ def test_the_knee_is_what_bends_the_leg_most() -> None:
     standing = BRUCE.standing_position[[joint.name for joint in BRUCE.joints].index("left_knee")]
     nearly = knee_limits(BRUCE, 2.0)["knee"]
     assert nearly[1] == pytest.approx(0.8 * standing, abs=0.01), "no more than where it stands"
-
-
-def test_knees_that_fold_both_ways_keep_the_side_on_which_the_robot_stands() -> None:
-    light = quadruped(LIGHT_QUADRUPED)
-    knees = [k for k, joint in enumerate(light.joints) if joint.name.endswith("knee")]
-    assert one_way_knees(light) == dict.fromkeys(knees, (-2.8, 0.0))
-    standing = {**light.standing, light.joints[knees[0]].name: 1.5}
-    assert one_way_knees(light.changed(standing=standing))[knees[0]] == (0.0, 2.8)
-    assert one_way_knees(quadruped()) == {}, "these fold one way only"
-    bounds = joint_bounds(light, Margins(joints=0.01), landed=False)
-    assert bounds[knees].tolist() == [[-2.79, -0.01]] * 4
-    others = np.delete(bounds - light.joint_limits, knees, axis=0)
-    np.testing.assert_allclose(others, np.tile([0.01, -0.01], (8, 1)), atol=1e-12)
 
 
 def test_the_room_is_that_of_the_standing_joint_nearest_to_a_limit() -> None:
