@@ -323,7 +323,8 @@ class PlanLibrary:
         """A valid plan of a task, and whether it was kept already.
 
         The exact plan where it is kept; else solved, from the nearest plan if there is one and
-        from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan.
+        from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan. One in the
+        user's own folder that fails the check is planned anew: an older version may have kept it.
 
         Raises:
             JumpTaskError: what is asked for contradicts itself or the robot.
@@ -331,12 +332,19 @@ class PlanLibrary:
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
+        from ..checking.validity import InvalidPlanError
         from .once import require_valid_once
 
-        kept = None if anew else self.find(task)
-        if kept is not None:
-            require_valid_once(kept, self.robot)
-            return kept, True
+        path = None if anew else self.path_of(task)
+        kept = self.find(task) if path is not None else None
+        if kept is not None and path is not None:
+            try:
+                require_valid_once(kept, self.robot)
+            except InvalidPlanError:
+                if path.parent != user_folder():
+                    raise
+            else:
+                return kept, True
         near = None if anew else self.nearest(task)
         plan = solve_and_check(task, self.robot, near[0] if near else None, solve)
         self.add(plan)

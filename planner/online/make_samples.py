@@ -40,6 +40,8 @@ COUNT = 96
 MARGIN = 1.08
 """How much further than the reach they go, so that requests at its edge lie between them."""
 BASES = (2, 3, 5, 7)
+RISES = (1.0, 0.8, 0.8)
+"""How high jumps are, each as a share of the one before, which has no plan on the spot."""
 STILL = HopRequest(0.0, 0.0, 0.0)
 
 
@@ -101,13 +103,17 @@ Tell = Callable[[HopRequest, bool], None]
 def plan_level_hops(
     robot: RobotDescription, wanted: HopReach, tell: Tell, count: int
 ) -> PlanSamples:
-    """Plan those on level ground.
+    """Plan those on level ground, lower than asked for where the motors are too weak.
 
     Raises:
-        PlanError: not even a jump on the spot has a valid plan.
+        PlanError: not even the lowest jump on the spot has a valid plan.
     """
-    first = _plan_all(robot, [STILL], wanted.rise, [], [], tell)
-    if STILL not in first[0]:
+    for share in RISES:
+        wanted = wanted._replace(rise=round(share * wanted.rise, 3))
+        first = _plan_all(robot, [STILL], wanted.rise, [], [], tell)
+        if first[0]:
+            break
+    else:
         raise PlanError(
             f"{robot.name} has no valid plan of a jump on the spot, {100.0 * wanted.rise:.1f} cm high"
         )

@@ -121,6 +121,18 @@ def test_a_kept_plan_that_is_not_valid_is_not_handed_over(
         library.plan(task, Planner(good))
 
 
+def test_what_an_older_version_kept_for_the_user_is_planned_anew_where_it_is_not_valid(
+    tmp_path: Path, good: PlannedJump, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    library = PlanLibrary(ROBOT)
+    path = library.add(replace(good, task=near(), position=good.position + 0.01))
+    plan, kept = library.plan(near(), Planner(good))
+    assert not kept and library.path_of(near()) == path
+    np.testing.assert_array_equal(plan.position, good.position)
+    assert library.plan(near(), Planner(None))[1], "the new one is kept"
+
+
 def test_a_damaged_file_is_an_error_that_names_it(tmp_path: Path, good: PlannedJump) -> None:
     library = PlanLibrary(ROBOT, tmp_path, others=())
     path = library.add(replace(good, task=near()))
