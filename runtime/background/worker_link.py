@@ -20,8 +20,9 @@ from ..language.parameters import Parameters
 from .job_memory import JobMemory
 from .worker import BELL, CHANGE, MESSAGE, RESTORE, WAKE, WorkerTask, main
 
-START_TIME = 120.0
-"""Seconds that a worker may take to be ready: it may have to compile its block's kernels first."""
+START_TIME = 900.0
+"""Seconds that a worker may take to be ready: it may have to compile its block's kernels first, or the planner's functions
+of a new robot, which takes minutes where others need the processor, too. That it has died is noticed at once."""
 LOOK_EVERY, LOOK_SHARE = 1e-3, 0.02
 """Seconds after which a worker in real time looks for jobs, at most, and as a share of the latency."""
 
