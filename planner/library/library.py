@@ -335,13 +335,13 @@ class PlanLibrary:
         from ..checking.validity import InvalidPlanError
         from .once import require_valid_once
 
-        path = None if anew else self.path_of(task)
-        kept = self.find(task) if path is not None else None
-        if kept is not None and path is not None:
+        kept = None if anew else self.find(task)
+        if kept is not None:
             try:
                 require_valid_once(kept, self.robot)
             except InvalidPlanError:
-                if path.parent != user_folder():
+                path = self.path_of(task)
+                if path is None or path.parent != user_folder():
                     raise
             else:
                 return kept, True

@@ -199,9 +199,8 @@ class StanceFinder:
             if len(self._levelled) > MOST_PLACED:
                 self._levelled.clear()
             alike = self.loosely * symmetrised_angles(self.pairs, joints / self.loosely)
-            if (
-                self.loosely > 1.0
-            ):  # what one side leans to the other is the rest of a sum, not exactly zero
+            if self.loosely > 1.0:
+                # What one side leans to the other is the rest of a sum, not exactly zero.
                 alike = alike.round(ROUNDED)
             q = np.concatenate([np.zeros(6), alike])
             for _ in range(LEANS):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +13,7 @@ from ..library.jump_table import JumpTable, table_rows
 from ..library.library import SHIPPED, readable_name, user_folder
 from ..library.reference_table import COARSE_STEPS, reference_table
 from ..task.plan import PlannedJump
-from ..task.task import planned_robot
+from ..task.task import content_name, planned_robot
 from .hop_request import HopReach, StepReach
 from .plan_samples import FILE_FORMAT, PlanSamples, read_samples
 
@@ -29,9 +27,8 @@ def shipped_path(robot: str, *, steps: bool = False) -> Path:
 
 def own_path(robot: RobotDescription, *, steps: bool = False) -> Path:
     """Where a user's own are kept: with those of tasks, under the robot's name and content."""
-    whole = {"format": FILE_FORMAT, "robot": planned_robot(robot)}
-    text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
-    name = f"{readable_name(robot.name)}-{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    content = content_name({"format": FILE_FORMAT, "robot": planned_robot(robot)})
+    name = f"{readable_name(robot.name)}-{content}"
     return user_folder() / "hops" / name / (STEPS_FILE if steps else LEVEL_FILE)
 
 

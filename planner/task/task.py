@@ -415,8 +415,13 @@ class JumpTask(FreeTimes):
             "task": self.resolved(robot).content(),
             "robot": planned_robot(robot),
         }
-        text = json.dumps(whole, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()[:20]
+        return content_name(whole)
+
+
+def content_name(content: object) -> str:
+    """A name for a file that follows from plain data: the same for the same data."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def planned_robot(robot: RobotDescription) -> dict[str, Any]:
