@@ -132,8 +132,9 @@ def _value(found: Estimate) -> Value:
 
 
 def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
-    """The values as a graph's ``set``, for a controller with ``controllers/late_sensors.yaml``; ``source``
-    is where they come from."""
+    """Return the values as a graph's ``set``, for a controller with ``controllers/late_sensors.yaml``; ``source`` is
+    where they come from.
+    """
 
     def bounded(value: Value, least: float, most: float = 1e9) -> float:
         return min(most, max(least, value.value))
@@ -195,7 +196,7 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
 def _beyond(
     parameter: str, unit: str, share: float, robot: RobotDescription, found: dict[str, Value], known: Array,
 ) -> list[str]:  # fmt: skip
-    """A share of what is found beyond the description's; for compensation, which must not push, never less."""
+    """Return a share of what is found beyond the description's; for compensation, which must not push, never less."""
     least = 0.0 if share < 1.0 else -math.inf
     values = {
         joint.name: share * max(least, found[joint.name].value - float(nominal))

@@ -58,7 +58,7 @@ class Leg(NamedTuple):
 
 
 def read_leg(robot: RobotDescription, foot: int) -> Leg:
-    """The leg that ends in foot number ``foot``.
+    """Return the leg that ends in foot number ``foot``.
 
     Raises:
         ValueError: the chain from base to foot is not a leg of the kind described above.
@@ -84,14 +84,14 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
 
 
 def find_leg(robot: RobotDescription, foot: int) -> Leg | None:
-    """The leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
+    """Return the leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
     if _mismatch(robot, foot, chain_to(robot, robot.feet[foot].link)):
         return None
     return read_leg(robot, foot)
 
 
 def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str:
-    """The reason why a chain of joints is no leg of this kind; empty if it is one."""
+    """Return the reason why a chain of joints is no leg of this kind; empty if it is one."""
     joints = [robot.joints[i] for i in chain]
     if len(joints) != len(_AXES):
         return f"expected 5 joints from {robot.base}, found {len(joints)}"
@@ -184,7 +184,7 @@ def inverse(
     level: float,
     out: Array1D,
 ) -> tuple[bool, float]:
-    """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
+    """Return the joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
 
     The leg plane contains the hip, the sole and the line; in it the knee follows from the law of
     cosines and the ankle from the line's slope. For a target out of reach errors are allowed in
@@ -324,7 +324,7 @@ def _two_links(
     upper: float,
     softness: float,
 ) -> tuple[float, float, float, bool]:
-    """The knee's and the first link's angle that bring the end of two links to (x, z).
+    """Return the knee's and the first link's angle that bring the end of two links to (x, z).
 
     Of the two solutions it is the one on the side of the middle of the robot's limits. Also returns
     how far the distance follows the target's (1, or less near full stretch), and whether the target

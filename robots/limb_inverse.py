@@ -52,7 +52,7 @@ _STILL = 1e-18
 
 
 def limb_scratch(joints: int) -> Array:
-    """The scratch array that the kernels of this file need for a limb with that many joints."""
+    """Return the scratch array that the kernels of this file need for a limb with that many joints."""
     return np.zeros((2 * joints + 16, max(joints, 6)))
 
 

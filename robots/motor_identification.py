@@ -200,7 +200,7 @@ def _differences(n: int) -> Array:
 def _motor_angles(
     robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors
 ) -> Array:
-    """The angles of the motors [rad], tick by tick while the robot stands."""
+    """Return the angles of the motors [rad], tick by tick while the robot stands."""
     return _seated(motion, sensors, standing_span(robot, motion)) @ robot.joint_to_motor.T
 
 
@@ -223,8 +223,9 @@ def most_alike(error: Array, waves: Mapping[float, Array]) -> float:
 
 
 def _link_spread(robot: RobotDescription, spreads: Spreads) -> tuple[Array, Array]:
-    """The links' nominal parameters in Pinocchio's order (10 each), and how these change with independent
-    numbers of variance one."""
+    """Return the links' nominal parameters in Pinocchio's order (10 each), and how these change with independent
+    numbers of variance one.
+    """
     import pinocchio as pin
 
     rng = np.random.default_rng(0)
@@ -259,8 +260,9 @@ def _equations(
     robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors, nominal: Array,
     spread: Array,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """The projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities), and the projections
-    (ticks, n_velocities, n_velocities)."""
+    """Return the projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities), and the projections
+    (ticks, n_velocities, n_velocities).
+    """
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
@@ -309,7 +311,7 @@ def _equations(
 
 
 def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Array:
-    """The joints' angles without the play of their gears."""
+    """Return the joints' angles without the play of their gears."""
     width = np.array([each.value for each in sensors.play.values()])
     return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
 
@@ -326,7 +328,7 @@ def filtered_motion(
     motion: MeasuredRun, sensors: IdentifiedSensors, span: slice,
     cutoff: float = CUTOFF,
 ) -> tuple[Array, ...]:  # fmt: skip
-    """The filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
+    """Return the filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
     angular velocity and acceleration, the specific force of its origin, and the joints' torques.
 
     The robot ends as it began, so its mean angular velocity is the gyroscope's bias; it stands still at first.

@@ -122,7 +122,7 @@ def _sensors(found: Calibration) -> IdentifiedSensors:
 
 
 def _given(robot: RobotDescription, found: Calibration, speeds: Array, torque: Array) -> Array:
-    """The torques that motors give the joints of those that they report, (n, n_joints)."""
+    """Return the torques that motors give the joints of those that they report, (n, n_joints)."""
     constant = np.array([each.value for each in found.torque_constant.values()])
     peak = np.asarray(robot.motors.peak_torque)
     reported = torque @ robot.torque_to_motor.T

@@ -202,7 +202,7 @@ def _draw(axes: Axes, robot: RobotDescription, poses: Poses, axis: int, sign: fl
 
 
 def _limb_colours(robot: RobotDescription) -> dict[str, str]:
-    """The base is grey, and every limb, with all that it carries, has a colour of its own."""
+    """Return the base is grey, and every limb, with all that it carries, has a colour of its own."""
     colours, limbs = {robot.base: FAINT}, 0
     for joint in robot.joints:
         if joint.parent == robot.base:
@@ -214,6 +214,6 @@ def _limb_colours(robot: RobotDescription) -> dict[str, str]:
 
 
 def _outline(corners: Array, radius: float) -> Array:
-    """The outline (n, 2) of a shape with these corners (m, 2) that reaches beyond them by ``radius``."""
+    """Return the outline (n, 2) of a shape with these corners (m, 2) that reaches beyond them by ``radius``."""
     ahead = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=1)
     return np.asarray(corners[(corners @ ahead.T).argmax(axis=0)] + radius * ahead)

@@ -119,7 +119,7 @@ class Joint(Part):
     limits: tuple[float, float] | None = None
 
     def unit(self, hinge: str) -> str:
-        """The unit of a quantity of this joint that a hinge has in the unit ``hinge``."""
+        """Return the unit of a quantity of this joint that a hinge has in the unit ``hinge``."""
         return SLIDE_UNITS.get(hinge, hinge) if self.kind == "slide" else hinge
 
 
@@ -385,7 +385,7 @@ class RobotDescription(Part):
         return BASE_VELOCITIES[self.base_joint]
 
     def with_profile(self, name: str) -> Self:
-        """The same robot with another actuator profile in use.
+        """Return the same robot with another actuator profile in use.
 
         Raises:
             LookupError: it has no such profile; the message names those that it has.
@@ -396,7 +396,7 @@ class RobotDescription(Part):
         return self if name == self.motors.profile else self.changed(profile=name)
 
     def freed(self, names: Sequence[str]) -> Self:
-        """The same robot with those held joints, by name or pattern, free to move; it stands with them as it
+        """Return the same robot with those held joints, by name or pattern, free to move; it stands with them as it
         held them. Joints that are free already stay so.
 
         Raises:
@@ -415,7 +415,7 @@ class RobotDescription(Part):
         )
 
     def changed(self, **fields: Any) -> Self:
-        """A copy with other values in some fields, which are not validated again."""
+        """Return a copy with other values in some fields, which are not validated again."""
         copy = self.model_copy(update=fields)
         for name in list(vars(copy)):  # pydantic copies cached properties too
             if name not in type(self).model_fields:
@@ -423,7 +423,9 @@ class RobotDescription(Part):
         return copy
 
     def content(self) -> dict[str, Any]:
-        """All that is computed with, also by a simulator, as plain data from which the robot can be read again."""
+        """Return all that is computed with, also by a simulator, as plain data from which the robot can be read
+        again.
+        """
         return self.model_dump(mode="json", context={"simulated": True})
 
     @cached_property
@@ -459,7 +461,7 @@ class RobotDescription(Part):
         return self.rotor_matrix_of(1.0)
 
     def rotor_matrix_of(self, factor: Array | float) -> Array:
-        """The same with a factor on the inertia of each rotor, (n_motors,)."""
+        """Return the same with a factor on the inertia of each rotor, (n_motors,)."""
         matrix = self.joint_to_motor
         return product(matrix.T * (self.motors.rotor_inertia * factor), matrix)
 
@@ -504,7 +506,7 @@ class RobotDescription(Part):
         return self.total_mass * GRAVITY
 
     def link(self, name: str) -> Link:
-        """The link called ``name``."""
+        """Return the link called ``name``."""
         return next(link for link in self.links if link.name == name)
 
     def foot_of_contact(self) -> tuple[int, ...]:

@@ -123,7 +123,7 @@ def _filtered(numerator: Array, denominator: Array, columns: Array) -> Array:
 
 
 def slope(values: Array, period: float) -> Array:
-    """The time derivatives of columns."""
+    """Return the time derivatives of columns."""
     return np.asarray(np.gradient(values, period, axis=0))
 
 
@@ -134,7 +134,7 @@ def shifted(values: Array, ticks: float) -> Array:
 
 
 def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
-    """The longest time in which every foot has a closed switch, up to bounces of some ticks.
+    """Return the longest time in which every foot has a closed switch, up to bounces of some ticks.
 
     Where that is too short the switches are too heavy for their loads, as a sway lifts no foot, and a closed
     switch of any foot counts.
@@ -153,7 +153,7 @@ def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
 
 
 def _longest(loaded: NDArray[np.bool_], period: float) -> tuple[int, int]:
-    """The first tick of the longest stance and the one after its last."""
+    """Return the first tick of the longest stance and the one after its last."""
     window = max(3, round(0.2 / period))
     share = np.convolve(loaded, np.ones(window) / window, mode="same")
     firm = np.concatenate([[False], share > 0.3, [False]])
@@ -214,7 +214,7 @@ def play_positions(torque: Array, period: float) -> Array:
 def _encoders(
     robot: RobotDescription, motion: MeasuredRun, span: slice
 ) -> tuple[dict[str, Estimate], Estimate, float]:
-    """The play of every joint and the age of the velocities beside the angles, and what is left [rad/s].
+    """Return the play of every joint and the age of the velocities beside the angles, and what is left [rad/s].
 
     The angles less the integrated velocities are fitted. Noise of the velocities makes a random walk of them; where
     a torque is so small that what is not measured of it may move the rotor across its play, they are
@@ -271,8 +271,9 @@ def _encoders(
 
 
 def base_motion(robot: RobotDescription, position: Array, *velocities: Array) -> tuple[Array, ...]:
-    """The base over standing feet: for each of the joints' ``velocities`` (n, n_joints) its own, linear and angular in
-    its own frame, (n, 6); last the middle of the contact points in that frame, (n, 3)."""
+    """Return the base over standing feet: for each of the joints' ``velocities`` (n, n_joints) its own, linear and
+    angular in its own frame, (n, 6); last the middle of the contact points in that frame, (n, 3).
+    """
     jacobians, places = contact_jacobians(robot, position)
     of_base, of_joints = jacobians[..., :6], jacobians[..., 6:]
     across = of_base.transpose(0, 2, 1)
@@ -323,7 +324,7 @@ def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, 
 
 
 def _up(centres: Array) -> Array:
-    """The vertical by the plane through the centres (n, balls, 3), (n, 3)."""
+    """Return the vertical by the plane through the centres (n, balls, 3), (n, 3)."""
     if centres.shape[1] < 3:
         return np.tile([0.0, 0.0, 1.0], (len(centres), 1))
     apart = centres - centres.mean(axis=1, keepdims=True)
@@ -395,8 +396,9 @@ def _accelerometer(
 
 
 def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
-    """The vertical in the base's frame by integration from level; how it changes with the tilt at first
-    (n, 3, 2), and with biases of the gyroscope (n, 3, 3)."""
+    """Return the vertical in the base's frame by integration from level; how it changes with the tilt at first (n, 3,
+    2), and with biases of the gyroscope (n, 3, 3).
+    """
     n = len(turning)
     middle = np.concatenate([0.5 * (turning[1:] + turning[:-1]), turning[-1:]]) * period
     steps = np.eye(3) + _rotation_beyond(middle)
@@ -410,7 +412,7 @@ def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
 
 
 def _rotation_beyond(vectors: Array) -> Array:
-    """The matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
+    """Return the matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     safe = np.maximum(angle, 1e-9)
     across = _cross(vectors)
@@ -456,7 +458,7 @@ def _three(values: Array, std: Array) -> tuple[Estimate, ...]:
 
 
 def _cross(vectors: Array) -> Array:
-    """The matrices of cross products with vectors (..., 3)."""
+    """Return the matrices of cross products with vectors (..., 3)."""
     out = np.zeros((*vectors.shape, 3))
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x

@@ -72,12 +72,12 @@ class WeldedRobot:
         return whole
 
     def reduce(self, values: Array) -> Array:
-        """The values of the welded robot's joints from those of all joints (..., n)."""
+        """Return the values of the welded robot's joints from those of all joints (..., n)."""
         return np.asarray(values[..., list(self.moving)])
 
 
 def welded(robot: RobotDescription) -> WeldedRobot:
-    """The robot with its ``held`` joints welded at their angles.
+    """Return the robot with its ``held`` joints welded at their angles.
 
     Link frames of the result are parallel to the base's at its zero pose, as in every description.
     A robot that holds nothing comes back as it is.
@@ -107,7 +107,7 @@ class _Place:
         return np.asarray(self.origin + self.rotation @ np.array(place))
 
     def vector(self, place: Sequence[float]) -> Vector3:
-        """The same as plain numbers."""
+        """Return the same as plain numbers."""
         return _vector(self.point(place))
 
 
@@ -216,7 +216,7 @@ def _moved_contact(robot: RobotDescription, places: dict[str, _Place], contact: 
 
 
 def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Link:
-    """A link with all that is welded to it."""
+    """Return a link with all that is welded to it."""
     parts = [link for link in robot.links if places[link.name].link == name]
     mass, com, inertia = _lumped(places, parts)
     shapes = list[Shape]()

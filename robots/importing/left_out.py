@@ -25,7 +25,7 @@ MOST = 4
 
 
 def left_out(model: Any, spec: Any) -> Iterator[str]:
-    """The sentences for a compiled MJCF model and what it was compiled from."""
+    """Yield the sentences for a compiled MJCF model and what it was compiled from."""
     yield from _contacts(model)
     yield from _joints(model)
     yield from _servos(model)
@@ -150,7 +150,7 @@ def _tied(model: Any, spec: Any) -> Iterator[str]:
 
 
 def by_value(rows: list[str], names: list[str], usual: str) -> str:
-    """Each value that is not the usual one, with the names that have it; empty where all are usual."""
+    """Return each value that is not the usual one, with the names that have it; empty where all are usual."""
     found: dict[str, dict[str, None]] = {}
     for row, name in zip(rows, names, strict=True):
         if row != usual:

@@ -37,7 +37,7 @@ TRUE = ("1", "true", "True")
 
 
 def left_out_of_urdf(file: XmlFile) -> Iterator[str]:
-    """The sentences for a URDF."""
+    """Yield the sentences for a URDF."""
     links = [*_said(file, "link", ("contact", "surface"))]
     yield from _contacts(links)
     yield from _joints(file)
@@ -129,7 +129,7 @@ def _soft_limits(file: XmlFile) -> Iterator[str]:
 
 
 def _values(said: Iterable[Said], words: Iterable[str], called: Any = None) -> str:
-    """The values that elements of these names have, with the links or joints that have them; zeros are none."""
+    """Return the values that elements of these names have, with the links or joints that have them; zeros are none."""
     found: dict[str, dict[str, str]] = {}
     for name, each in said:
         if each.tag in words and _text(each) and _differ(_text(each), "0"):

@@ -83,7 +83,7 @@ def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
 
 
 def _material_color(material: ElementTree.Element) -> str | None:
-    """The color of a URDF's material; None where it has a texture or no color."""
+    """Return the color of a URDF's material; None where it has a texture or no color."""
     color = material.find("color")
     if color is None or material.find("texture") is not None:
         return None
@@ -110,7 +110,7 @@ def _simple(shape: ElementTree.Element) -> list[fit.Capsule]:
 
 
 def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
-    """The rotation and position of an ``origin``: about fixed x, then y, then z."""
+    """Return the rotation and position of an ``origin``: about fixed x, then y, then z."""
     zero = (0.0, 0.0, 0.0)
     if element is None:
         return np.eye(3), np.zeros(3)
@@ -121,7 +121,7 @@ def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
 
 
 def numbers(text: str | None, usual: Sequence[float]) -> Array:
-    """The numbers of an attribute, as many as usual; the usual ones where it has not those."""
+    """Return the numbers of an attribute, as many as usual; the usual ones where it has not those."""
     try:
         values = np.array([float(part) for part in (text or "").split()])
     except ValueError:

@@ -66,7 +66,7 @@ def _how_many(joints: list[str]) -> str:
 
 
 def _pairs(model: RawModel) -> Iterator[tuple[RawBody, RawBody]]:
-    """The pairs of bodies that are mirror images by place, as are those that carry them."""
+    """Yield the pairs of bodies that are mirror images by place, as are those that carry them."""
     children: dict[str, list[RawBody]] = {}
     for body in model.bodies.values():
         children.setdefault(body.parent, []).append(body)
@@ -97,7 +97,7 @@ def _place(body: RawBody, frame: tuple[Array, Array]) -> Array:
 
 
 def _image(body: RawBody, others: list[RawBody], frame: tuple[Array, Array]) -> RawBody | None:
-    """The body at the mirrored place; of several the one of the most alike mass and joints."""
+    """Return the body at the mirrored place; of several the one of the most alike mass and joints."""
     wanted = MIRROR * _place(body, frame)
     near = [
         each for each in others

@@ -85,7 +85,7 @@ class XmlFile:
         return bool(self.root.tag == "robot")
 
     def error(self, message: str, expected: str = "", found: str = "", fix: str = "") -> RobotError:
-        """An error of the file as a whole."""
+        """Return an error of the file as a whole."""
         return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
 
     def has(self, tag: str, name: str) -> bool:
@@ -107,7 +107,7 @@ def _blanked(comment: re.Match[str]) -> str:
 
 
 def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
-    """Every joint's effort, speed and mimic by name."""
+    """Return every joint's effort, speed and mimic by name."""
     found = {}
     for joint in file.root.findall("joint"):
         limit, mimic = joint.find("limit"), joint.find("mimic")
@@ -121,7 +121,7 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
 
 
 def _range(joint: ElementTree.Element) -> str:
-    """The ``range`` of a ``UrdfJoint``."""
+    """Return the ``range`` of a ``UrdfJoint``."""
     limit = joint.find("limit")
     if limit is None or joint.get("type") not in ("revolute", "prismatic"):
         return ""

@@ -18,7 +18,7 @@ from .structure import check_bodies, check_joints, check_looks, check_names, che
 
 
 def find_faults(data: Any) -> tuple[RobotFault, ...]:
-    """Every fault of a description, given as plain data: mappings, lists, numbers and text.
+    """Return every fault of a description, given as plain data: mappings, lists, numbers and text.
 
     A value of a wrong type is reported and otherwise passed over, so that it hides nothing else.
     Data without a fault can be read by ``RobotDescription.model_validate``.
@@ -89,7 +89,7 @@ def _in_data(location: Path) -> Path:
 
 
 def shown(value: Any) -> str:
-    """A value as it would be written in the file, cut off where it is long."""
+    """Return a value as it would be written in the file, cut off where it is long."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
