@@ -145,7 +145,7 @@ def write_marks(table: TableRows, time: float, reference: JumpReference) -> None
 
 @kernel
 def locate(times: Array1D, time: float) -> tuple[int, float]:
-    """The row before ``time`` and the share of the way from it to the next, from 0 to 1."""
+    """Return the row before ``time`` and the share of the way from it to the next, from 0 to 1."""
     low, high = 0, times.shape[0] - 1
     if time <= times[0]:
         return 0, 0.0
@@ -162,7 +162,7 @@ def locate(times: Array1D, time: float) -> tuple[int, float]:
 
 @kernel
 def present_jump(time: float, touchdowns: Array1D) -> int:
-    """The jump that is under way or comes next, by when the jumps end; behind the last one that."""
+    """Return the jump that is under way or comes next, by when the jumps end; behind the last one that."""
     number = 0
     while number + 1 < touchdowns.shape[0] and time >= touchdowns[number]:
         number += 1
@@ -178,7 +178,7 @@ def planned_phase(
     touchdown_time: float,
     recover_time: float,
 ) -> int:
-    """The phase a plan is in at ``time``, from when its phases begin."""
+    """Return the phase a plan is in at ``time``, from when its phases begin."""
     if time < squat_time:
         return 0
     if time < thrust_time:

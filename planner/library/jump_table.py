@@ -55,7 +55,7 @@ class JumpTable:
     contact: NDArray[np.bool_] | None = None
 
     def as_arrays(self) -> Mapping[str, NDArray[Any]]:
-        """All of it as arrays, for a file; ``from_arrays`` is the way back."""
+        """Return all of it as arrays, for a file; ``from_arrays`` is the way back."""
         arrays: dict[str, NDArray[Any]] = {f"{_COLUMN}{n}": c for n, c in self.columns.items()}
         arrays["time"] = self.time
         arrays["marks"] = np.array([getattr(self, name) for name in _MARKS])
@@ -66,7 +66,7 @@ class JumpTable:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> JumpTable:
-        """The table whose ``as_arrays`` these are."""
+        """Return the table whose ``as_arrays`` these are."""
         columns = {
             name.removeprefix(_COLUMN): array
             for name, array in arrays.items()
@@ -104,7 +104,7 @@ class TableRows(NamedTuple):
 
 
 def table_rows(table: JumpTable) -> TableRows:
-    """A table as ``read_table`` takes it."""
+    """Return a table as ``read_table`` takes it."""
     n = len(table.time)
     columns = [table.columns[name].reshape(n, -1) for name in COLUMNS]
     fed = _fed([rows.shape[1] for rows in columns])
@@ -133,7 +133,7 @@ def fed_forward(n_feet: int, n_joints: int) -> NDArray[np.bool_]:
 
 
 def row_dimensions(robot: RobotDescription | None) -> dict[str, int]:
-    """The dimension ``plan_width`` of blocks that have the rows of a table in their signals."""
+    """Return the dimension ``plan_width`` of blocks that have the rows of a table in their signals."""
     return (
         {}
         if robot is None
@@ -151,7 +151,7 @@ def lands_in_part(times: Array, contact: NDArray[np.bool_], touchdowns: Array) -
 
 
 def integral(times: Array, rows: Array) -> Array:
-    """The integral of rows (n, ...) that are linear between ``times`` (n,) up to each of them."""
+    """Return the integral of rows (n, ...) that are linear between ``times`` (n,) up to each of them."""
     steps = np.diff(times).reshape(-1, *(1,) * (rows.ndim - 1))
     sums = np.zeros_like(rows)
     np.cumsum(0.5 * steps * (rows[1:] + rows[:-1]), axis=0, out=sums[1:])
@@ -185,7 +185,7 @@ class FlightRotation(NamedTuple):
 
 
 def flight_rotation(table: JumpTable, robot: RobotDescription) -> FlightRotation | None:
-    """The rotation of a plan that turns over in its only flight; ``None`` for every other plan."""
+    """Return the rotation of a plan that turns over in its only flight; ``None`` for every other plan."""
     if table.later_jumps:
         return None
     first, end = (
@@ -209,7 +209,7 @@ def flight_rotation(table: JumpTable, robot: RobotDescription) -> FlightRotation
 
 
 def _inertia(table: JumpTable, rows: slice, robot: RobotDescription) -> Array:
-    """The inertia of the whole robot about its pitch axis [kg m^2] in those rows."""
+    """Return the inertia of the whole robot about its pitch axis [kg m^2] in those rows."""
     dynamics, spin = ExactDynamics(robot), np.zeros(6 + len(robot.joints))
     spin[3 + PITCH] = 1.0
     poses = zip(

@@ -57,7 +57,7 @@ def reference_table(
     stand_time: float,
     steps: Mapping[Phase, float] | None = None,
 ) -> JumpTable:
-    """The plan as a table that begins with standing still for ``stand_time`` [s].
+    """Return the plan as a table that begins with standing still for ``stand_time`` [s].
 
     Two rows are at most ``STEP`` apart, or what ``steps`` says for a phase [s].
     """
@@ -138,7 +138,7 @@ class _States(NamedTuple):
 
 
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
-    """The motion, knots and what lies between them; two rows at an impact."""
+    """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
     lengths = np.diff(plan.time)
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
@@ -226,7 +226,7 @@ def _middle_values(
 
 
 def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
-    """The reference's fields in n states under those forces (n, n_contacts, 3)."""
+    """Return the reference's fields in n states under those forces (n, n_contacts, 3)."""
     feet = dynamics.feet(q, v)
     arms = feet.points - feet.com[:, None]
     moments = arms[:, :, AFTER] * force[:, :, BEFORE] - arms[:, :, BEFORE] * force[:, :, AFTER]

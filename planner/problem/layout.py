@@ -106,7 +106,7 @@ class ProblemPhase:
 
 
 def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
-    """The stretches of a task in the order of time.
+    """Return the stretches of a task in the order of time.
 
     Raises:
         JumpTaskError: a phase on the ground names no contact point.
