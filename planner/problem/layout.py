@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ..task.phase import Phase
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, JumpTaskError
 
@@ -106,7 +106,7 @@ class ProblemPhase:
 
 
 def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
-    """The stretches of a task in the order of time.
+    """Return the stretches of a task in the order of time.
 
     Raises:
         JumpTaskError: a phase on the ground names no contact point.
