@@ -1,4 +1,4 @@
-"""What has been found of one robot, with standard deviations, and the values that a graph takes of it."""
+"""Calibration of one robot: identified values with standard deviations, and the values that a graph takes of it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .sensor_identification import IdentifiedSensors, identify_sensors
 COMPENSATED = 0.8
 """The share of the friction that is compensated: with more a joint may creep."""
 USUAL_DELAY = 0.002
-"""From sensing to torque where a run does not tell it [s]."""
+"""Delay from sensing to torque where a run does not determine it [s]."""
 BALANCE = 0.003
 """The error of a balance, as a share of the mass."""
 
@@ -100,7 +100,9 @@ def calibration_of(
     robot: RobotDescription, sensors: IdentifiedSensors, motors: IdentifiedMotors,
     pack: IdentifiedPack | None, delay: Estimate | None,
 ) -> Calibration:  # fmt: skip
-    """What was found, as one model. Joints that are held do not move and tell nothing: theirs is the description's."""
+    """Combine the identified values into one model. Held joints do not move and reveal nothing: theirs are the
+    description's.
+    """
 
     def named(values: dict[str, Estimate], known: Array | None = None) -> dict[str, Value]:
         found = {name: _value(each) for name, each in values.items()}

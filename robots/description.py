@@ -50,7 +50,7 @@ OTHER_FORMATS = {
 }
 """Formats of robots that are not read, and what to do instead."""
 DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
-"""What to install for a package of files, where it is not called as the package."""
+"""Distribution to install for a package of files, where their names differ."""
 _KIND = ("a robot's description", "name, base, links, joints")
 
 
@@ -97,7 +97,7 @@ class PlacedYaml:
         return node.where.line, node.where.column
 
     def holds(self, path: tuple[str | int, ...]) -> bool:
-        """Whether the file has something at that path."""
+        """Check whether the file has an entry at that path."""
         return len(locate(self.tree, path)[0]) == len(path)
 
     def placed(self, fault: RobotFault) -> RobotFault:
@@ -252,7 +252,7 @@ def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
 
 
 def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:
-    """The fault with its place: in the YAML where that says it, else in the URDF or MJCF file."""
+    """Return the fault with its place: in the YAML where that sets the value, else in the URDF or MJCF file."""
     from .importing.description_data import placed_in_model, written_path
 
     path = written_path(fault, imported.data)

@@ -116,7 +116,7 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
 
 @kernel
 def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> None:
-    """The sole centre (3,) and the foot's rotation (3, 3) to the base, from the joint angles."""
+    """Compute the sole centre (3,) and the foot's rotation (3, 3) to the base from the joint angles."""
     hip, plane = leg.hip, leg.plane
     a, b, c, k, n = _canonical(leg.signs, angles)
     _thigh_rotation(a, b, c, rotation)
@@ -134,7 +134,7 @@ def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> 
 
 @kernel
 def jacobian(plane: Array2D, signs: Array1D, angles: Array1D, out: Array2D) -> None:
-    """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
+    """Compute the sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
     a, b, c, k, n = _canonical(signs, angles)
     (sin_a, cos_a), (sin_b, cos_b) = sincos(a), sincos(b)
     sin_c, cos_c = sincos(c)
@@ -282,8 +282,8 @@ def inverse(
 
 @kernel
 def yaw_share(flat: float, level: float) -> float:
-    """How much of the hip's exact yaw counts where ``flat`` is the cosine of its pitch: all of it
-    from ``level`` on, nothing in gimbal lock, and between them 3 s^2 - 2 s^3 with s = flat / level.
+    """Return the share of the hip's exact yaw that counts where ``flat`` is the cosine of its pitch: all of it from
+    ``level`` on, nothing in gimbal lock, and between them 3 s^2 - 2 s^3 with s = flat / level.
     """
     part = min(abs(flat) / max(level, LEVEL), 1.0)
     return part * part * (3.0 - 2.0 * part)
@@ -365,7 +365,7 @@ _JUMP = 0.1
 
 @kernel
 def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
-    """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
+    """Compute the x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
     sine, cosine = sincos(pitch)
     out[:] = cosine * rotation[:, 0] - sine * rotation[:, 2]
 
@@ -434,7 +434,7 @@ def slide(
 
 @kernel
 def within_limits(leg: Leg, angles: Array1D) -> bool:
-    """Whether no joint above the ankle is at a limit."""
+    """Check that no joint above the ankle is at a limit."""
     inside = True
     for i in range(4):
         inside = inside and leg.limits[i, 0] < angles[i] < leg.limits[i, 1]
@@ -476,7 +476,7 @@ def slow_stretch(
 
 @kernel
 def line_rate(line: Array1D, last: Array1D, period: float, known: bool, out: Array1D) -> None:
-    """The time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
+    """Compute the time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
     x, y, z = line[0], line[1], line[2]
     largest = max(abs(x), abs(y), abs(z))
     if largest < 1e-300:

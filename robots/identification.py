@@ -1,4 +1,4 @@
-"""What a recorded run says about a robot: its mass, its torso, its friction, and its delay.
+"""Identification of a robot from a recorded run: its mass, its torso, its friction, and its delay.
 
 Mass, the torso's centre of mass and joint friction follow by least squares on inverse dynamics. The delay is
 that from a tick's instant to the torques computed in it, from commanded and measured torques.
@@ -109,7 +109,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class IdentifiedBody:
-    """What was found.
+    """Identified mass, torso and friction.
 
     Attributes:
         mass: of the robot [kg].
@@ -128,7 +128,7 @@ class IdentifiedBody:
 
 
 class IdentificationError(ValueError):
-    """The run does not tell what was asked; the text says what it lacks."""
+    """The run does not determine the wanted values; the text names what it lacks."""
 
 
 def identify_rigid_body(
@@ -331,7 +331,7 @@ _PARTS = 10
 
 @dataclass(frozen=True)
 class IdentifiedDelay:
-    """What was found.
+    """Identified delay.
 
     Attributes:
         delay: from a tick's instant until its command acts [s].
@@ -390,8 +390,9 @@ def identify_delay(
 
 
 def _fit(changes: Array, measured: Array, used: NDArray[np.int64], j: int) -> tuple[float, float]:
-    """How well measured changes correlate with those of the commands j + 1 and j + 2 ticks earlier,
-    and the share of the latter."""
+    """Return the correlation of measured changes with those of the commands j + 1 and j + 2 ticks earlier, and the
+    share of the latter.
+    """
     seen = (measured[used] - measured[used - 1]).ravel()
     first = changes[used - 1 - j].ravel()
     step = changes[used - 2 - j].ravel() - first

@@ -166,7 +166,7 @@ def fall_height(robot: RobotDescription) -> float:
 
 
 def standing_contacts(robot: RobotDescription) -> Array:
-    """Where the contact points are in the standing pose, from the middle between the feet, (n_contacts, 3)."""
+    """Return the contact points in the standing pose, from the middle between the feet, (n_contacts, 3)."""
     poses = link_poses_in_base(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
     points = np.array(
@@ -192,7 +192,7 @@ def standing_com(robot: RobotDescription) -> Array:
 
 
 def joints_above(robot: RobotDescription, link: str) -> list[bool]:
-    """Which joints lie between the base and a link, in the description's order."""
+    """Return which joints lie between the base and a link, in the description's order."""
     above = [False] * len(robot.joints)
     while link != robot.base:
         index = next(k for k, joint in enumerate(robot.joints) if joint.child == link)
@@ -255,5 +255,5 @@ def standing_directions(robot: RobotDescription) -> tuple[Array, Flags1D]:
 
 
 def foot_sides(feet: Array) -> tuple[float, ...]:
-    """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
+    """Return the side of every foot: 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
     return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())

@@ -204,7 +204,7 @@ def place_limb(
 
 @kernel
 def limb_jacobian(links: Array2D, anchors: Array2D, pose: Array2D, out: Array2D) -> None:
-    """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, n).
+    """Compute the sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, n).
 
     Args:
         links: of the ``Limb``.
@@ -354,7 +354,7 @@ def weigh_rows(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, rows:
 def turning(
     tip: Array1D, last: Rows3, target: Rows3, period: float, limit: float, out: Array1D
 ) -> None:
-    """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
+    """Compute the angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
     It is that of a line's direction for a line foot and zero for a point foot. A target that has
     turned by more than ``limit`` [rad] is a new target and has no angular velocity.

@@ -263,6 +263,6 @@ def limb_velocity(
 
 @kernel
 def _stuck(limits: Array2D, joint: int, angle: float, direction: float) -> bool:
-    """Whether a joint stands at a limit and ``direction`` points beyond it."""
+    """Check whether a joint stands at a limit and ``direction`` points beyond it."""
     lower, upper = limits[joint, 0], limits[joint, 1]
     return (angle <= lower and direction <= 0.0) or (angle >= upper and direction >= 0.0)

@@ -1,4 +1,4 @@
-"""What a robot that sways over standing feet tells of its motors, joints and links, and of its pack.
+"""Identification of motors, joints, links and pack from a run in which the robot sways over standing feet.
 
 The equations of motion are linear in what is unknown: masses, first moments and inertias of all links, a factor
 on the rotors, friction and damping of the joints, the torque constants of the motors, and what iron and
@@ -42,11 +42,11 @@ from .sensor_identification import (
 from .transmission import SLIDING_SPEED
 
 EVERY = 8
-"""Of the filtered ticks every eighth is used."""
+"""Stride of the filtered ticks that are used."""
 SOFT_SPEED = 0.08
 """The joint speed at which most of the Coulomb friction acts [rad/s]."""
 CORRELATED = 0.6
-"""What the model lacks repeats for about so long [s]."""
+"""Time over which the model's errors are correlated [s]."""
 PERIODS = np.arange(20.0, 181.0, 2.0)
 """The periods in a turn of the output that are looked for in what motors give beside their torque."""
 RIPPLE = 0.01
@@ -74,7 +74,7 @@ class Spreads:
 
 @dataclass(frozen=True)
 class IdentifiedMotors:
-    """What was found.
+    """Identified motors, joints and links.
 
     Attributes:
         torque_constant: factor on the nominal one, by motor.
@@ -213,7 +213,7 @@ def waves_of(turned: Array, periods: float, period: float) -> Array:
 
 
 def most_alike(error: Array, waves: Mapping[float, Array]) -> float:
-    """Of the periods the one whose waves are most like the errors of the motors' torques."""
+    """Return the period whose waves are most like the errors of the motors' torques."""
     twice = np.tile(error, 2)
     scores = {
         often: float((((twice * wave).sum(axis=0)) ** 2 / (wave**2).sum(axis=0)).sum())
@@ -317,8 +317,9 @@ def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Arr
 
 
 def free_projection(jacobians: Array) -> Array:
-    """What takes the contact forces out of the equations of motion, (n, n_velocities, n_velocities): the projections
-    onto what Jacobians of contact points (n, rows, n_velocities) map to zero."""
+    """Return the projections that take the contact forces out of the equations of motion, (n, n_velocities,
+    n_velocities): onto what Jacobians of contact points (n, rows, n_velocities) map to zero.
+    """
     _, sizes, directions = np.linalg.svd(jacobians, full_matrices=False)
     used = directions * (sizes > 1e-6 * sizes[:, :1])[..., None]
     return np.asarray(np.eye(jacobians.shape[2]) - used.transpose(0, 2, 1) @ used)
@@ -359,8 +360,8 @@ def filtered_motion(
 def identify_pack(
     robot: RobotDescription, motion: MeasuredRun, voltage: Array, recovery_time: float = 10.0
 ) -> IdentifiedPack | None:
-    """Fit the pack to the voltage that the drives report; None where they report none, or the description says
-    nothing of what feeds the motors.
+    """Fit the pack to the voltage that the drives report; None where they report none, or the description gives no
+    supply of the motors.
 
     Args:
         voltage: at the drives (n,) [V].

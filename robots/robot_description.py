@@ -72,8 +72,9 @@ class TurnedPart(Part):
 
 
 class Appearance(Part):
-    """What a link is drawn as, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts,
-    and capsules for the rest of what an imported file shows."""
+    """Appearance of a link, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts, and capsules
+    for the rest of what an imported file shows.
+    """
 
     later = ("boxes", "turned")
 
@@ -98,7 +99,7 @@ SLIDE_UNITS: Mapping[str, str] = {
     "rad": "m", "rad/s": "m/s", "rad/s^2": "m/s^2", "N m": "N", "N m s": "N s", "N m/rad": "N/m",
     "N m s/rad": "N s/m", "kg m^2": "kg",
 }  # fmt: skip
-"""What a quantity of a joint that turns, or of its motor, is measured in where the joint slides."""
+"""Units of a sliding joint's quantities, or its motor's, by those of one that turns."""
 
 
 class Joint(Part):
@@ -226,7 +227,7 @@ class Motors:
 
 
 class PowerSupply(Part):
-    """What feeds the motors: a pack, or a supply on a bench.
+    """Supply of the motors: a pack, or a supply on a bench.
 
     ``rated_voltage`` [V] is that at which the motors reach the speeds of their profile. A pack that is nearly full has
     ``open_voltage`` [V] without load, behind ``resistance`` [ohm]; ``recovery_resistance`` [ohm] builds up under load.
@@ -346,14 +347,14 @@ class RobotDescription(Part):
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
     thrusters: Mapping[str, Thruster] = {}
-    """What drives the robot without joints, such as the rotors of a quadrotor, by name."""
+    """Actuators that drive the robot without joints, such as the rotors of a quadrotor, by name."""
     supply: PowerSupply | None = None
-    """What feeds the motors; ``None``: nobody has said it."""
+    """Supply of the motors; ``None`` where it is unknown."""
     looks: Mapping[str, Appearance] = {}
-    """What links are drawn as, by name; others are drawn as their collision shapes."""
+    """Appearance of links, by name; others are drawn as their collision shapes."""
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are equal; pydantic compares cached arrays, too."""
+        """Check whether all fields are equal; pydantic compares cached arrays, too."""
         if not isinstance(other, RobotDescription):
             return NotImplemented
         return all(getattr(self, n) == getattr(other, n) for n in type(self).model_fields)
@@ -477,7 +478,7 @@ class RobotDescription(Part):
         return np.ascontiguousarray(inverse(self.joint_to_motor).T)
 
     def motor_unit(self, motor: int, hinge: str) -> str:
-        """As ``Joint.unit``, for a motor; one that moves slides only has their units."""
+        """Return the unit of a motor's quantity, as ``Joint.unit``; one that moves slides only has their units."""
         gears = self.joint_to_motor[motor].tolist()
         units = {j.unit(hinge) for j, gear in zip(self.joints, gears, strict=True) if gear}
         return units.pop() if len(units) == 1 else hinge
@@ -510,6 +511,6 @@ class RobotDescription(Part):
         return next(link for link in self.links if link.name == name)
 
     def foot_of_contact(self) -> tuple[int, ...]:
-        """For every contact point the index of its foot."""
+        """Return the index of each contact point's foot."""
         names = [foot.name for foot in self.feet]
         return tuple(names.index(contact.foot) for contact in self.contacts)

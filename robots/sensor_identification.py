@@ -1,4 +1,4 @@
-"""What a robot that sways over standing feet tells of its IMU and its encoders.
+"""Identification of IMU and encoders from a run in which the robot sways over standing feet.
 
 The feet stand still, so the joints' velocities say how the base moves, and the IMU's readings follow::
 
@@ -33,7 +33,7 @@ from .robot_description import RobotDescription
 from .transmission import PLAY_TIME, PLAY_TORQUE
 
 CUTOFF = 6.0
-"""Of the filter that all signals pass [Hz]."""
+"""Cutoff of the filter that all signals pass [Hz]."""
 PADDING = 12
 """Ticks by which columns go on at both ends while they are filtered."""
 EDGE = 0.3
@@ -44,7 +44,7 @@ CORRELATED = 3.0 / (2.0 * CUTOFF)
 """Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
 cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
 ITERATIONS = 8
-"""Of a fit, as the weights follow from what is left."""
+"""Iterations of a fit, as the weights follow from the residuals."""
 TYPICAL = 1.4826
 """The standard deviation of normal numbers over the median of their sizes."""
 OUTLYING = 1.5
@@ -54,23 +54,25 @@ NOISE_CUTOFF = 20.0
 SAMPLED = 0.02
 """The time between samples of the angles that are fitted [s]."""
 HIDDEN_TORQUE = 0.1
-"""Torque that currents do not tell, such as ripple [N m]: with no more than this a rotor may be anywhere in its play."""
+"""Torque that currents do not show, such as ripple [N m]: with no more than this a rotor may be anywhere in its
+play.
+"""
 USUAL_PLAY, RESOLVED = 0.01, 2e-4
-"""The play by which the error of an unseated rotor is weighted, and what an encoder tells at best [rad]."""
+"""Play by which the error of an unseated rotor is weighted, and an encoder's best resolution [rad]."""
 USUAL_COMPLIANCE = 2e-3
 """The compliance of gears is of this size beforehand [rad/(N m)]."""
 LEAST_COMPLIANCE = 3e-4
-"""No compliance is claimed to be known better [rad/(N m)]: play that is not seated looks like one."""
+"""Least standard deviation of a compliance [rad/(N m)]: play that is not seated looks like one."""
 LEAST_AGE, LEAST_PLAY = 1.5e-4, 1.5e-3
-"""No age [s] and no play [rad] is claimed to be known better."""
+"""Least standard deviations of an age [s] and of a play [rad]."""
 
 STOOD = 3.0
-"""The shortest stance that tells enough [s]."""
+"""Shortest stance that suffices [s]."""
 
 
 @dataclass(frozen=True)
 class IdentifiedSensors:
-    """What was found.
+    """Identified sensors.
 
     Attributes:
         imu_position: from the base's origin [m, base].
@@ -201,7 +203,7 @@ def _sum(first: Estimate, second: Estimate, more: float = 0.0) -> Estimate:
 
 
 def play_positions(torque: Array, period: float) -> Array:
-    """Where in its play each rotor is, from -1 to 1, by the torques."""
+    """Return the place of each rotor in its play, from -1 to 1, by the torques."""
     ends = np.tanh(torque / PLAY_TORQUE)
     out, share = np.empty_like(ends), -math.expm1(-period / PLAY_TIME)
     here = ends[0]

@@ -49,7 +49,7 @@ class Hull(Part):
 
 
 def _kind_of_shape(shape: Any) -> str:
-    """Which kind of shape data, or a shape, is: the keys of a hull are none of a capsule's."""
+    """Return the kind of shape data, or of a shape: the keys of a hull are none of a capsule's."""
     is_hull = "corners" in shape if isinstance(shape, Mapping) else isinstance(shape, Hull)
     return "hull" if is_hull else "capsule"
 
@@ -68,13 +68,13 @@ Edge = tuple[Vector3, Vector3]
 
 
 def is_body(hull: Hull) -> bool:
-    """Whether the corners are finite and lie in no plane."""
+    """Check whether the corners are finite and lie in no plane."""
     corners = np.array(hull.corners)
     return bool(np.isfinite(corners).all()) and spread(corners) >= THINNEST
 
 
 def spread(corners: Array) -> float:
-    """How far corners (n, 3) reach across the plane that fits them best [m]."""
+    """Return the reach of corners (n, 3) across the plane that fits them best [m]."""
     middle = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(middle.T @ middle)
     return float(np.ptp(middle @ directions[:, 0]))

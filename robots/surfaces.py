@@ -21,7 +21,7 @@ from .part import Vector3
 from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart
 
 MOST_TRIANGLES = 24_000
-"""Of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""
+"""Greatest number of triangles of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""
 AROUND = 24
 """The flat pieces around a turned part."""
 
@@ -87,7 +87,7 @@ def joined(surfaces: list[Surface]) -> Surface:
 def _meshes(
     link: str, look: Appearance, most: int, known: dict[Path, Surface]
 ) -> Iterator[Surface]:
-    """The meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence to tell."""
+    """Yield the meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence for the user."""
     for mesh in look.meshes:
         path = _path(mesh)
         if path is None:

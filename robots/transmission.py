@@ -85,7 +85,7 @@ class MotorGains:
 
     @property
     def exact(self) -> bool:
-        """Whether the drives give the joints exactly the wanted gains."""
+        """True if the drives give the joints exactly the wanted gains."""
         return not self.losses
 
 

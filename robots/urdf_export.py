@@ -61,7 +61,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _add_world(root: Element, robot: RobotDescription) -> None:
-    """What holds a base that does not float: a world, and joints as the base has motions."""
+    """Add what holds a base that does not float: a world, and joints as the base has motions."""
     if robot.base_joint == "floating":
         return
     SubElement(root, "link", name="world")

@@ -21,7 +21,7 @@ from .kinematics import from_base_outwards
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """What hangs on a held joint: a rigid body that is part of a link of the welded robot, and what moves on it.
+    """Load on a held joint: a rigid body that is part of a link of the welded robot, and what moves on it.
 
     Attributes:
         joint: the held joint's index in the whole robot.
@@ -97,7 +97,7 @@ def _welded(text: str) -> WeldedRobot:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a link's frame is in the link that it has become part of."""
+    """Place of a link's frame in the link that it has become part of."""
 
     link: str
     rotation: Array
@@ -183,8 +183,9 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
 
 
 def _load(robot: RobotDescription, places: dict[str, _Place], index: int) -> HeldLoad | None:
-    """What hangs on a held joint; ``None`` for a slide, and where something that stands on the ground
-    hangs on it."""
+    """Return the load on a held joint; ``None`` for a slide, and where something that stands on the ground hangs on
+    it.
+    """
     joint = robot.joints[index]
     rigid, beyond, carried = {joint.child}, {joint.child}, list[int]()
     for k, other in from_base_outwards(robot):

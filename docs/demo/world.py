@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aloft.blocks.signals.jumping import Phase
 from aloft.clib.cut import Cut
 from aloft.clib.module import Module
 from aloft.clib.part import NeedsPython, Part, needs_python
@@ -29,6 +28,7 @@ from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.compiling.library_call import LibraryCall
+from aloft.planner.task.phase import Phase
 from aloft.robots.surfaces import robot_surfaces
 from aloft.runtime.loading.load import load
 from aloft.runtime.running.memory import BoundGraph

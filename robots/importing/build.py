@@ -219,7 +219,7 @@ def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
 
 
 def _is_planar(body: RawBody) -> bool:
-    """Whether a body is carried by slides along x and z and a hinge about y, without motors."""
+    """Check whether a body is carried by slides along x and z and a hinge about y, without motors."""
     kinds = sorted(
         (joint.kind, tuple(tidy(joint.axis)))
         for joint in body.joints

@@ -20,7 +20,7 @@ SHORTEST = 4e-4
 
 @dataclass(frozen=True)
 class Capsule:
-    """From ``start`` to ``end`` [m], each (3,), of ``radius`` [m]."""
+    """Capsule from ``start`` to ``end`` [m], each (3,), of ``radius`` [m]."""
 
     start: Array
     end: Array

@@ -39,7 +39,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 RADIUS = 0.005
 """The radius of a contact point for which the YAML gives none [m]."""
 ROOM = 0.1
-"""How far from a limit joints stand that cannot be at zero [rad, m]."""
+"""Distance from a limit at which joints stand that cannot be at zero [rad, m]."""
 
 
 class Overlay:
@@ -342,7 +342,7 @@ def _estimate_rotors(
 
 
 def _tells_rotors(profiles: Any) -> bool:
-    """Whether a YAML's profiles say the inertia of any rotor."""
+    """Check whether a YAML's profiles give the inertia of any rotor."""
     ratings = list(profiles.values()) if isinstance(profiles, Mapping) else []
     for profile in list(ratings):
         motors = profile.get("motors") if isinstance(profile, Mapping) else None
@@ -379,8 +379,9 @@ def placed_in_model(fault: RobotFault, data: Mapping[str, Any], model: RawModel)
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import gives: the description's ``data``, the ``faults`` of the YAML, what the file
-    lacks or what is approximated in ``notes``, and the ``model`` and tree it was made from."""
+    """Result of an import: the description's ``data``, the ``faults`` of the YAML, what the file lacks or what is
+    approximated in ``notes``, and the ``model`` and tree it was made from.
+    """
 
     data: dict[str, Any]
     faults: list[RobotFault]
@@ -441,7 +442,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
 
 
 def _stand_within_limits(data: dict[str, Any]) -> None:
-    """Let joints that cannot be at zero, and that nobody says more of, stand near that limit."""
+    """Let joints that cannot be at zero, and of which nothing else is given, stand near that limit."""
     standing, held = data["standing"], data.get("held") or {}
     if not isinstance(standing, Mapping) or not isinstance(held, Mapping):
         return

@@ -98,7 +98,7 @@ def _unknown_of_mjcf(model: Any) -> Iterator[tuple[str, str]]:
 
 
 def _gazebo(file: XmlFile) -> Iterator[tuple[str, str, Any]]:
-    """Every sensor told to Gazebo: what it refers to, its type and its element."""
+    """Yield every sensor declared for Gazebo: its reference, type and element."""
     for gazebo in file.root.findall("gazebo"):
         for sensor in gazebo.findall("sensor"):
             yield gazebo.get("reference", ""), sensor.get("type", ""), sensor

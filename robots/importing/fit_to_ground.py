@@ -118,7 +118,7 @@ def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
 
 
 def _cut(hull: Hull, rotation: Array, room: float) -> Hull | None:
-    """What of the hull is above: its corners there, and where its edges pass through that height."""
+    """Return the part of the hull that is above: its corners there, and where its edges pass through that height."""
     corners = np.array(hull.corners)
     heights = corners @ rotation[2] - room
     if heights.min() > 0.0:
@@ -158,9 +158,9 @@ PULL = 1e-3
 PLACE = 1e-2
 """Weight of the feet's places and of the height."""
 WIDEST = 1.6
-"""How far from zero a joint starts at most [rad], where its limits' middle is farther."""
+"""Largest start angle of a joint [rad], where its limits' middle is farther from zero."""
 BENT = (0.4, -0.8, 0.4)
-"""Where the pitch joints of a straight leg start, from the hip down [rad]."""
+"""Start angles of a straight leg's pitch joints, from the hip down [rad]."""
 SHARPEST = 1e-4
 """The tolerance of the conditions that must hold [m, rad]."""
 MARGIN = 0.02
@@ -179,7 +179,7 @@ class StandingPose:
 
     @property
     def holds(self) -> bool:
-        """Whether the robot stands in it."""
+        """True if the robot stands in it."""
         return max(self.level, self.flatness, self.balance) < SHARPEST
 
 
@@ -263,7 +263,7 @@ class _GroundFit:
                 self.start[index] = angle * np.sign(self.robot.joints[index].axis[1])
 
     def _is_flat(self, foot: int) -> bool:
-        """Whether a foot has three contact points that are not in a line."""
+        """Check whether a foot has three contact points that are not in a line."""
         points = np.array([
             contact.position
             for contact in self.robot.contacts
@@ -297,8 +297,9 @@ class _GroundFit:
         return np.array(heights).T, np.moveaxis(np.array(soles), 0, 1)
 
     def parts(self, angles: Array) -> tuple[Array, Array, Array, Array]:
-        """Of many poses (n, n_joints): heights, flatness and balance, which must be zero, and
-        what is only wanted, each (n, some)."""
+        """Return the residuals of many poses (n, n_joints): heights, flatness and balance, which must be zero, and what
+        is only wanted, each (n, some).
+        """
         poses = self._poses(angles)
         heights, soles = self._points(poses)
         level = heights - heights.mean(axis=1, keepdims=True)

@@ -24,7 +24,7 @@ INSIDE = 0.01
 TIED = 1e-6
 """m; how nearly alike two directions lack reach, to be served together, so that mirrored meshes have mirrored hulls."""
 UNEVEN = 1e-4
-"""How much a mesh's spread is made uneven, as a share, so that round ones have directions too."""
+"""Share by which a mesh's spread is made uneven, so that round ones have directions too."""
 AT_ONCE = 16
 """Directions looked along together: a mesh may have a hundred thousand corners."""
 
@@ -77,7 +77,9 @@ def of_points(points: Array) -> list[RawShape]:
 
 
 def _some_corners(corners: Array, most: Array) -> Array:
-    """As few of the corners as reach nearly as far as ``most`` [m] in each direction, those first that add most."""
+    """Return as few of the corners as reach nearly as far as ``most`` [m] in each direction, those first that add
+    most.
+    """
     found = corners[:0]
     ahead = DIRECTIONS[:8]
     while True:

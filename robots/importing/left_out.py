@@ -1,5 +1,5 @@
-"""What an MJCF file says and a description has no place for, one sentence each, with where it may be written instead.
-Of URDFs ``left_out_urdf`` tells.
+"""Content of an MJCF file that a description has no place for, one sentence each, with where it may be written instead.
+``left_out_urdf`` does the same for URDFs.
 
 A description holds what a robot is. Friction and softness of contacts belong to the simulated ground, gains to the
 controller, and gravity to the world: what a file says of them is reported and not taken over. What is as MuJoCo
@@ -127,7 +127,7 @@ def _servos(model: Any) -> Iterator[str]:
 
 
 def _tied(model: Any, spec: Any) -> Iterator[str]:
-    """What ties or sets apart bodies and joints beside the tree."""
+    """Yield sentences on what ties or sets apart bodies and joints beside the tree."""
     import mujoco
 
     if model.ntendon:

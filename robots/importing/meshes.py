@@ -26,13 +26,13 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("ext
 FINEST = 5000.0
 """Cells along the longest side of a mesh at first, which joins corners at nearly the same place."""
 COARSER = 1.15
-"""How much larger the cells become from one try to the next, at least."""
+"""Least factor by which the cells grow from one try to the next."""
 _PLACES = np.array([1 << 40, 1 << 20, 1])
 """Makes one number of the three of a cell."""
 
 
 def mesh_triangles(path: Path) -> Array:
-    """The triangles of an STL, OBJ or COLLADA file [m, as it says or else as it is], (n, 3, 3).
+    """Return the triangles of an STL, OBJ or COLLADA file [m, or the unit that it declares], (n, 3, 3).
 
     Raises:
         OSError: the file cannot be read.

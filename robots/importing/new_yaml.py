@@ -85,7 +85,7 @@ def _placed(imported: Imported, faults: Any) -> list[Any]:
 SAME_DIRECTION = 1e-6
 """Sensors turned by about half of that [rad] or less are parallel to their link."""
 REACH = 0.1
-"""By how much less than the farthest limb a foot reaches down, as a share."""
+"""Share by which a foot reaches down less than the farthest limb, at most."""
 LEVEL = 0.01
 """Contact points lie within this height [m]."""
 JOINTS_WITH_ANKLE, NARROW, SOLE_RADIUS = 5, 0.03, 0.005
@@ -116,7 +116,7 @@ def _limb_ends(built: LinkTree) -> list[str]:
 
 
 def _origins(built: LinkTree) -> dict[str, Any]:
-    """Where every link is at the zero of all joints [m, base frame]."""
+    """Return the origin of every link at the zero of all joints [m, base frame]."""
     places = {built.base: np.zeros(3)}
     for joint in built.joints:
         places[joint["child"]] = places[joint["parent"]] + np.array(joint["origin"])

@@ -28,7 +28,7 @@ MIRROR = np.array([1.0, -1.0, 1.0])
 
 
 def odd_bodies(model: RawModel) -> Iterator[str]:
-    """What seems odd, one sentence each."""
+    """Yield what seems odd, one sentence each."""
     pairs = [*_pairs(model)]
     moved = {name: _movers(body) for name, body in model.bodies.items()}
     lost = [
@@ -90,7 +90,7 @@ def _pairs(model: RawModel) -> Iterator[tuple[RawBody, RawBody]]:
 
 
 def _place(body: RawBody, frame: tuple[Array, Array]) -> Array:
-    """Where a body is in the frame of the root [m]."""
+    """Return the place of a body in the frame of the root [m]."""
     rotation, position = frame
     place: Array = rotation.T @ (body.position - position)
     return place

@@ -35,7 +35,7 @@ def find_package(package: str, folder: Path) -> Path | None:
 
 
 def _roots(package: str, folder: Path) -> Iterator[Path]:
-    """Where a package may be, the nearest first."""
+    """Yield the folders in which a package may be, the nearest first."""
     here = folder.resolve()
     for above in (here, *here.parents):
         yield from (root for root in (above, above / package) if root.name == package)
@@ -50,7 +50,9 @@ def package_of(name: str) -> str:
 
 
 def _shared() -> list[Path]:
-    """Where installed packages keep shared files: ``share`` folders, then the packages themselves."""
+    """Return the folders in which installed packages keep shared files: ``share`` folders, then the packages
+    themselves.
+    """
     sites = [Path(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")]
     shares = [site / "cmeel.prefix" / "share" for site in sites]
     return list(dict.fromkeys([*shares, Path(sys.prefix) / "share", *sites]))

@@ -121,7 +121,7 @@ class RawBody:
 
 @dataclass(frozen=True)
 class RawModel:
-    """All bodies of a file but the world, each behind its parent, branch by branch.
+    """Bodies of a file but the world, each behind its parent, branch by branch.
 
     Attributes:
         name: what the file calls the robot.

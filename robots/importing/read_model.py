@@ -41,7 +41,7 @@ class TakenMesh(NamedTuple):
 
 
 def read_model(path: Path) -> RawModel:
-    """What the file holds.
+    """Return the content of the file.
 
     Raises:
         RobotError: it is no URDF and no MJCF, or MuJoCo cannot make sense of it.
@@ -303,7 +303,7 @@ def _actuators_on(model: Any, j: int) -> list[int]:
 
 
 def _geared(model: Any, j: int, what: str) -> float:
-    """What the ``armature`` or ``damping`` of actuators, at their side of the gear, is at the joint."""
+    """Return the ``armature`` or ``damping`` of actuators, given at their side of the gear, at the joint."""
     values = getattr(model, f"actuator_{what}")
     return sum(
         float(values[k]) * float(model.actuator_gear[k][0]) ** 2 for k in _actuators_on(model, j)

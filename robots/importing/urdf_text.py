@@ -17,7 +17,7 @@ from .xacro_text import XACRO, expand_xacro
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
 DECLARED = re.compile(r"\s*<\?xml[^>]*?\sencoding\s*=\s*[\"']([^\"']*)[\"']")
-"""The encoding that a file says it is in."""
+"""Pattern of the encoding that a file declares."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class XmlFile:
 
     @property
     def is_urdf(self) -> bool:
-        """Whether it is a URDF, else it is MJCF."""
+        """True for a URDF, false for MJCF."""
         return bool(self.root.tag == "robot")
 
     def error(self, message: str, expected: str = "", found: str = "", fix: str = "") -> RobotError:
@@ -89,7 +89,7 @@ class XmlFile:
         return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
 
     def has(self, tag: str, name: str) -> bool:
-        """Whether the root has an element with this tag and name."""
+        """Check whether the root has an element with this tag and name."""
         return any(element.get("name") == name for element in self.root.findall(tag))
 
     def place(self, tag: str, name: str) -> tuple[int, int]:

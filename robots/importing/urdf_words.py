@@ -18,7 +18,7 @@ NEAR = 0.8
 LEAST_INERTIA = -1e-12
 """Rounding of what wrote the file [kg m^2]."""
 PRODUCTS = ("ixy", "ixz", "iyz")
-"""What may be negative of an inertia."""
+"""Elements of an inertia that may be negative."""
 CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),

@@ -1,4 +1,4 @@
-"""What is wrong with a robot's description, the error that carries all of it, and the description while it is checked."""
+"""Faults of a robot's description, the error that carries all of them, and the description while it is checked."""
 
 from __future__ import annotations
 
