@@ -15,7 +15,6 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     flight_rotation,
-    read_table,
     table_rows,
 )
 from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
@@ -29,6 +28,7 @@ from .plan_progress import (
     ProgressParameters,
     follow_plan,
 )
+from .table_reading import read_table
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport

@@ -17,11 +17,8 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     integral,
-    interpolate_rows,
     row_dimensions,
     table_rows,
-    write_columns,
-    write_marks,
 )
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output, State
@@ -44,6 +41,7 @@ from .plan_progress import (
     keep_in_time,
     plan_time,
 )
+from .table_reading import interpolate_rows, write_columns, write_marks
 
 if TYPE_CHECKING:
     from ...planner.task.task import JumpTask

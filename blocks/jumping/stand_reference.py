@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...planner.library.jump_table import JumpTable, TableRows, read_table
+from ...planner.library.jump_table import JumpTable, TableRows
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Input, State
@@ -26,6 +26,7 @@ from .guided_motion import (
     MotionRecorder,
     check_limits,
 )
+from .table_reading import read_table
 
 
 class StandReference(GuidedReference):

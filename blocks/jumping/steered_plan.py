@@ -12,13 +12,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import hypot, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
-from ...planner.library.jump_table import (
-    FlightRotation,
-    TableRows,
-    fed_forward,
-    integrate_rows,
-    row_dimensions,
-)
+from ...planner.library.jump_table import FlightRotation, TableRows, fed_forward, row_dimensions
 from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
 from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
@@ -71,6 +65,7 @@ from .plan_progress import (
     read_plan,
 )
 from .received_plan import BEHIND, FollowedPlan, ReceivedPlan, receive
+from .table_reading import integrate_rows
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
@@ -28,6 +27,7 @@ from ..models.exact_dynamics import dynamics_of
 from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import LEVEL, edge_of, ground_axes

@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
 from ..models.link_shapes import arms
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.whole_body_motion import MotionTerms
@@ -27,6 +26,7 @@ from ..models.exact_dynamics import (
     joint_motions,
     rotation_between,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 FLIGHT_STEP = 0.002

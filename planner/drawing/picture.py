@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...plotting import (
     COLOURS,
@@ -31,6 +30,7 @@ from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
 from ..models.link_shapes import legs
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:

@@ -63,7 +63,7 @@ def _code() -> bytes:
 KEPT = 32
 """Number of results that are kept, of the plans used last."""
 
-TABLE_FOLDERS = (*FOLDERS, "planner/library", "blocks/signals")
+TABLE_FOLDERS = (*FOLDERS, "planner/library")
 """The code that decides on a table."""
 
 _Result = TypeVar("_Result")

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
@@ -40,6 +39,7 @@ from ..models.exact_dynamics import (
     dynamics_of,
     joint_motions,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 

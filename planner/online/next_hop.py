@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...blocks.signals import PlanOutcome
 from ...robots.description import RobotDescription
 from ..checking.validity import checked
 from ..problem.problem import FullProblem
@@ -15,6 +14,7 @@ from ..task.plan import PlannedJump
 from .correction import Corrector
 from .hop_problems import HopProblems
 from .hop_request import HopRequest, coarse, task_of
+from .plan_outcome import PlanOutcome
 from .plan_samples import PlanSamples
 
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
 from .hop_request import HopReach, HopRequest, StepReach, task_of
 

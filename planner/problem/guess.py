@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ..task.phase import Phase
 from .layout import ProblemPhase
 from .problem import FullProblem
 

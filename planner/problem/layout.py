@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ..task.phase import Phase
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, JumpTaskError
 

@@ -35,13 +35,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models import simple_models as centroidal
 from ..models.euler_angles import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, Grid, SimpleProblem, ballistic_flight, uniform_grid

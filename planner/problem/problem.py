@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.kinematics import fall_height
@@ -23,6 +22,7 @@ from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .arm_range import arm_ranges

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Assembly, Knot, NonlinearProgram
 from .stage_functions import StageFunction

@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.robot_model import Stance
@@ -36,6 +35,7 @@ from ..models.symbolic_model import (
     base_angular_velocity,
     base_rotation,
 )
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, SimpleProblem, ballistic_flight, uniform_grid

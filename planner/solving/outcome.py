@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.program import SimpleProblem, joint_torques
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .solver import Solution

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
@@ -27,6 +26,7 @@ from ..problem import rigid_body_problem as stages
 from ..problem.program import SimpleProblem
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions

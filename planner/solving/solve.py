@@ -18,7 +18,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
@@ -38,6 +37,7 @@ from ..problem.stage_functions import PIECES, SLOPED, SLOPED_PIECES, make_coordi
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
 from ..task.files import JumpTaskError, PlanError, need_planner
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES, Hop

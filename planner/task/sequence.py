@@ -32,11 +32,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import model_validator
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .contact_groups import ALL, contact_points
+from .phase import Phase
 
 FREE = "free"
 Slope = tuple[float, float]
