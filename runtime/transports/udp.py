@@ -65,7 +65,7 @@ _OPEN_TO_ALL = "watch/"
 
 
 class Kind(IntEnum):
-    """What a datagram is."""
+    """Kind of a datagram."""
 
     ANNOUNCE = 0
     LEAVE = 1
@@ -109,7 +109,7 @@ class _Peer:
     all_done_below: int = 0
 
     def is_done(self, number: int) -> bool:
-        """Whether a reliable message has been received whole before."""
+        """Return whether a reliable message has been received whole before."""
         return number < self.all_done_below or number in self.done
 
     def set_done(self, number: int) -> None:
@@ -167,7 +167,7 @@ class UdpTransport(NetworkTransport):
 
     @classmethod
     def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
-        """The transport of a machine or an observer; there are no keys."""
+        """Return the transport of a machine or an observer; there are no keys."""
         if keys is not None:
             raise AloftError(
                 f"links over UDP stay on one machine and take no keys: leave out --keys {keys}, or "
@@ -228,11 +228,11 @@ class UdpTransport(NetworkTransport):
 
     @property
     def is_open(self) -> bool:
-        """Whether the socket is open."""
+        """True if the socket is open."""
         return self._socket is not None
 
     def before_close(self, call: Callable[[], None]) -> None:
-        """Have this called before the others are told that this machine leaves."""
+        """Register a call that is made before the others learn that this machine leaves."""
         self._closing_calls.append(call)
 
     def close(self) -> None:
@@ -257,11 +257,12 @@ class UdpTransport(NetworkTransport):
     # -- publishing and subscribing ----------------------------------------------------------------
 
     def publisher(self, key: str) -> MessageCallback:
-        """What sends a message to all that subscribe to ``key``, reliably in lockstep."""
+        """Return a function that sends a message to all that subscribe to ``key``, reliably in
+        lockstep."""
         return self._publisher(key, Kind.RELIABLE if self._reliable else Kind.ONCE)
 
     def background_publisher(self, key: str) -> MessageCallback:
-        """What sends a message once to all that subscribe to ``key``."""
+        """Return a function that sends a message once to all that subscribe to ``key``."""
         return self._publisher(key, Kind.ONCE)
 
     def _publisher(self, key: str, kind: Kind) -> MessageCallback:
