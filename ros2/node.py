@@ -228,7 +228,7 @@ _LOCK = threading.Lock()
 
 def join(address: NodeAddress) -> Node:
     """Return the node of this address, for one more block. Raises ``MissingExtraError``."""
-    need_extra("zenoh", "ros2", "a topic of ROS 2")
+    need_extra("rosbags", "ros2", "a topic of ROS 2")
     with _LOCK:
         node = _NODES.setdefault(address, Node(address))
         node.users += 1

@@ -1,5 +1,4 @@
-"""What the control thread asks of the operating system while it ticks: a processor, a priority,
-memory.
+"""Requests of the control thread to the operating system: a processor, a priority, memory.
 
 Everything is requested just before the first tick and given back after the last one, so that
 threads that blocks and recorders have started before keep what they have.
