@@ -31,7 +31,8 @@ _SPLIT = 134217729.0
 
 @kernel
 def sum_of(a: float, b: float) -> tuple[float, float]:
-    """``a + b`` exactly, as a sum of two numbers (D. E. Knuth, The Art of Computer Programming 2, 4.2.2)."""
+    """Compute ``a + b`` exactly, as a sum of two numbers (D. E. Knuth, The Art of Computer
+    Programming 2, 4.2.2)."""
     high = a + b
     part = high - a
     return high, (a - (high - part)) + (b - part)
@@ -39,7 +40,7 @@ def sum_of(a: float, b: float) -> tuple[float, float]:
 
 @kernel
 def product_of(a: float, b: float) -> tuple[float, float]:
-    """``a b`` exactly, as a sum of two numbers, where nothing leaves the range (Dekker)."""
+    """Compute ``a b`` exactly, as a sum of two numbers, where nothing leaves the range (Dekker)."""
     high = a * b
     x, y = _SPLIT * a, _SPLIT * b
     a_high, b_high = x - (x - a), y - (y - b)
@@ -63,7 +64,8 @@ def _less_turns(
 
 @kernel
 def reduce_angle(angle: float) -> tuple[float, float, int]:
-    """What an angle [rad] exceeds the nearest quarter turn by, as a sum of two numbers, and which of the four it is.
+    """Reduce an angle [rad] to its distance from the nearest quarter turn, as a sum of two numbers,
+    and the index of that quarter turn.
 
     Not a number beyond 2^53, where neighbouring numbers are more than a radian apart.
     """
@@ -113,7 +115,7 @@ def _cosine(r: float, low: float) -> float:
 
 @kernel
 def sin(angle: float) -> float:
-    """The sine of an angle [rad]."""
+    """Return the sine of an angle [rad]."""
     if abs(angle) < 1e-9:
         return angle
     r, low, quarter = reduce_angle(angle)
@@ -123,7 +125,7 @@ def sin(angle: float) -> float:
 
 @kernel
 def cos(angle: float) -> float:
-    """The cosine of an angle [rad]."""
+    """Return the cosine of an angle [rad]."""
     r, low, quarter = reduce_angle(angle)
     value = _cosine(r, low) if quarter % 2 == 0 else _sine(r, low)
     return value if quarter == 0 or quarter == 3 else -value
@@ -143,7 +145,8 @@ def sincos(angle: float) -> tuple[float, float]:
 
 @kernel
 def _first_octant(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
-    """The arc tangent of (a + a_low) / (b + b_low), between 0 and 1, as a sum of two numbers.
+    """Return the arc tangent of (a + a_low) / (b + b_low), between 0 and 1, as a sum of two
+    numbers.
 
     Of the angles 0, atan 1/2 and pi/4 one near is taken off: tan(x - y) = (tan x - tan y) / (1 + tan x tan y).
     """
@@ -173,7 +176,7 @@ def _first_octant(a: float, a_low: float, b: float, b_low: float) -> tuple[float
 
 @kernel
 def _angle_of(y: float, y_low: float, x: float, x_low: float) -> float:
-    """The angle of the point (x + x_low, y + y_low) with y not below zero, from 0 to pi."""
+    """Return the angle of the point (x + x_low, y + y_low) with y not below zero, from 0 to pi."""
     side, side_low = (x, x_low) if x >= 0.0 else (-x, -x_low)
     if y <= side:
         high, low = _first_octant(y, y_low, side, side_low)
@@ -189,7 +192,7 @@ def _angle_of(y: float, y_low: float, x: float, x_low: float) -> float:
 
 @kernel
 def atan2(y: float, x: float) -> float:
-    """The angle of the point (x, y) [rad], from -pi to pi. Signs of zeros count, as in C."""
+    """Return the angle of the point (x, y) [rad], from -pi to pi. Signs of zeros count, as in C."""
     above, side = abs(y), abs(x)
     if math.isnan(x) or math.isnan(y):
         return math.nan
@@ -213,7 +216,7 @@ def atan2(y: float, x: float) -> float:
 
 @kernel
 def acos(cosine: float) -> float:
-    """The arc cosine [rad], from 0 to pi; not a number beyond -1 and 1."""
+    """Return the arc cosine [rad], from 0 to pi; not a number beyond -1 and 1."""
     if not abs(cosine) <= 1.0:
         return math.nan
     less, less_low = sum_of(1.0, -cosine)
@@ -228,7 +231,7 @@ def acos(cosine: float) -> float:
 
 @kernel
 def _root_of(high: float, low: float) -> tuple[float, float]:
-    """The square root of ``high + low``, above zero, as a sum of two numbers."""
+    """Return the square root of ``high + low``, above zero, as a sum of two numbers."""
     root = math.sqrt(high)
     square, error = product_of(root, root)
     return root, ((high - square) - error + low) / (2.0 * root)
@@ -288,7 +291,7 @@ def _exponential(x: float) -> tuple[float, float, int]:
 
 @kernel
 def exp(x: float) -> float:
-    """The exponential function."""
+    """Return the exponential function."""
     if math.isnan(x):
         return math.nan
     if x > 709.782712893384:
@@ -320,7 +323,8 @@ def expm1(x: float) -> float:
 
 @kernel
 def tanh(x: float) -> float:
-    """The hyperbolic tangent: 1 - 2 / (e^2x + 1), and (e^2x - 1) / (e^2x + 1) where it is small."""
+    """Return the hyperbolic tangent: 1 - 2 / (e^2x + 1), and (e^2x - 1) / (e^2x + 1) where it is
+    small."""
     size = abs(x)
     if math.isnan(x):
         return math.nan
@@ -344,7 +348,7 @@ def tanh(x: float) -> float:
 
 @kernel
 def parts_of(x: float) -> tuple[float, int]:
-    """A number above zero as ``m`` 2^k with ``m`` from sqrt(1/2) to sqrt(2)."""
+    """Split a number above zero into ``m`` 2^k with ``m`` from sqrt(1/2) to sqrt(2)."""
     k, scale = 0, 512
     if x < 2.2250738585072014e-308:
         x *= 2.0**54
@@ -365,7 +369,8 @@ def parts_of(x: float) -> tuple[float, int]:
 
 @kernel
 def log(x: float) -> float:
-    """The natural logarithm: of ``m`` 2^k as k log 2 + 2 artanh((m - 1) / (m + 1)), as in Sun's fdlibm."""
+    """Return the natural logarithm: of ``m`` 2^k as k log 2 + 2 artanh((m - 1) / (m + 1)), as in
+    Sun's fdlibm."""
     if not x > 0.0:
         return -math.inf if x == 0.0 else math.nan
     if math.isinf(x):

@@ -106,8 +106,8 @@ def add_plane(
     program: QuadraticProgram,
     memory: ActiveSetMemory,
 ) -> None:
-    """A plane along the cone's ``direction``. Where all are in use, it takes the place of the one that
-    is not active and farthest from it."""
+    """Add a plane along the cone's ``direction``. Where all are in use, it takes the place of the
+    one that is not active and farthest from it."""
     x, y = cones.direction[point, 0], cones.direction[point, 1]
     place = cones.used[point]
     if place < PLANES:
@@ -234,8 +234,8 @@ def add_bending(count: int, cones: Cones, x: Array1D, gradient: Array1D) -> None
 
 @kernel
 def turned(count: int, friction: float, cones: Cones, x: Array1D) -> float:
-    """How far the solution is from its cones: the largest angle [rad] between a pressed cone's
-    ``direction`` and its force, or share by which a force leaves its cone."""
+    """Return the distance of the solution from its cones: the largest angle [rad] between a pressed
+    cone's ``direction`` and its force, or share by which a force leaves its cone."""
     worst = 0.0
     for point in range(count):
         a, b = x[3 * point], x[3 * point + 1]
@@ -255,8 +255,8 @@ CUTS = 60
 STEPS = 12
 """The most Newton steps after each approach."""
 APPROACHES = 4
-"""How often planes are added again, each time until forces leave their cones by a hundredth of what they
-did before, where Newton's steps do not converge."""
+"""Number of times that planes are added again, each time until forces leave their cones by a
+hundredth of the previous share, where Newton's steps do not converge."""
 FIRST = 3e-2
 """The share by which forces may leave their cones before the first Newton step."""
 EXACT = 1e-12

@@ -27,7 +27,7 @@ from .llvm_code import (
 
 
 class CompileError(Exception):
-    """A kernel cannot be compiled; the text says which, where and why."""
+    """A kernel cannot be compiled; the text gives kernel, place and reason."""
 
 
 class Translated(NamedTuple):
@@ -148,7 +148,7 @@ class ExpressionTranslator:
         return Value(value.type, value.parts, counts=counts) if counts else value
 
     def _outer(self, node: ast.expr) -> Any:
-        """A module, function or constant that the kernel's module has.
+        """Find a module, function or constant that the kernel's module has.
 
         Raises:
             Refused: it has none of this name, or the name is the kernel's own.
@@ -250,7 +250,7 @@ class ExpressionTranslator:
                 code.branch(code.truth(self._value(node)), yes, no)
 
     def _flag(self, node: ast.expr) -> Value:
-        """The value of a condition of several parts."""
+        """Write the value of a condition of several parts."""
         if isinstance(node, ast.BoolOp):
             for each in node.values:
                 if not _is_flag(each) and self._kind_of(each) != BOOL:
@@ -267,7 +267,7 @@ class ExpressionTranslator:
         return code.load(BOOL, room)
 
     def _kind_of(self, node: ast.expr) -> ArgumentType:
-        """The type of an expression, of which nothing is written."""
+        """Return the type of an expression, without writing its code."""
         kept = len(self._code.lines), len(self._code.entry), self._code.reachable
         kind = self._value(node).type
         del self._code.lines[kept[0] :], self._code.entry[kept[1] :]
@@ -342,14 +342,14 @@ _NOT_CALLED = "no kernel, and nothing that kernels may call"
 
 
 def _is_flag(node: ast.expr) -> bool:
-    """Whether an expression is a flag by its form."""
+    """Return whether an expression is a flag by its form."""
     return isinstance(node, ast.Compare | ast.BoolOp) or (
         isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
     )
 
 
 def _assignments(tree: ast.FunctionDef) -> tuple[set[str], set[str]]:
-    """The names that a function assigns, and those of them that only loops assign."""
+    """Return the names that a function assigns, and those of them that only loops assign."""
     nodes = list(ast.walk(tree))  # walked once: a walk is slow
     counters = {id(node.target) for node in nodes if isinstance(node, ast.For)}
     stored = [n for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]

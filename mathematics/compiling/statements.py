@@ -25,7 +25,7 @@ def translate(
     name: str,
     callee: Callee,
 ) -> Translated:
-    """A kernel in LLVM's language.
+    """Translate a kernel into LLVM's language.
 
     Args:
         function: the kernel; its module has the names that it reads.
@@ -51,10 +51,10 @@ class _Function(ExpressionTranslator):
     """One pass through the statements of a function."""
 
     def translated(self, name: str) -> Translated:
-        """The function as it is after this pass."""
+        """Return the function as it is after this pass."""
         code = self._code
         self._loops: list[tuple[str, str]] = []
-        """Where 'continue' and 'break' go, of the loops around a statement."""
+        """Targets of 'continue' and 'break' in the loops around a statement."""
         names = [each.arg for each in self._tree.args.args]
         if len(names) != len(self._signature):
             self._refuse(
@@ -150,7 +150,7 @@ class _Function(ExpressionTranslator):
         self._code.store(self._code.convert(value, widest), self._rooms[name])
 
     def _target(self, node: ast.Subscript) -> tuple[Value, str | None]:
-        """A part of an array, or the array and the address of one element of it."""
+        """Write a part of an array, or return the array and the address of one element of it."""
         whole, indices = self._value(node.value), self._indices(node)
         numbers = [index for index in indices if isinstance(index, Value)]
         if len(numbers) == len(indices) == whole.array.dimensions:

@@ -54,7 +54,8 @@ def _entry_points() -> Mapping[str, str]:
 
 
 def known_names() -> tuple[str, ...]:
-    """Return the names of all blocks of aloft and of installed packages, sorted; none is imported."""
+    """Return the names of all blocks of aloft and of installed packages, sorted; none is
+    imported."""
     return tuple(sorted({**_own_blocks(), **_entry_points()}))
 
 
@@ -124,7 +125,8 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
 
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """Return the module of aloft that has the class: first the one that convention gives, then any."""
+    """Return the module of aloft that has the class: first the one that convention gives, then
+    any."""
     stem = snake_case(class_name)
     for path in files_of(_ROOT / package):
         if path.stem == stem:

@@ -71,7 +71,8 @@ def _read(seconds: float) -> bytes | None:
 
 
 def _stacks(pid: int) -> str:
-    """Return the stacks of all threads; empty where the process is suspended, or goes on after all."""
+    """Return the stacks of all threads; empty where the process is suspended, or goes on after
+    all."""
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGUSR1)
     text = b""
@@ -124,7 +125,8 @@ def _is_installed(file: str, description: dict[str, object]) -> bool:
 
 
 def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
-    """Return the paths of the blocks whose class has the outermost frame that belongs to a block."""
+    """Return the paths of the blocks whose class has the outermost frame that belongs to a
+    block."""
     known = description["blocks"]
     assert isinstance(known, list)
     for file, line, _ in reversed(frames):

@@ -146,7 +146,8 @@ _RUNTIME = (COORDINATOR, PREPARED, STARTED)
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """Result of a run: whether it succeeded and why, its metrics, its parts, and its duration [s]."""
+    """Result of a run: whether it succeeded and why, its metrics, its parts, and its duration
+    [s]."""
 
     success: bool
     reason: str
