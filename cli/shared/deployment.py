@@ -19,9 +19,9 @@ from importlib.metadata import PackageNotFoundError, distribution, packages_dist
 from pathlib import Path
 
 from ... import __version__
-from ...logs.file.surroundings import files_read, parameter_files
+from ...logs.file.dependencies import files_read, parameter_files
 from ...planner.library.library import shipped_folder, user_folder
-from ...runtime.carried import copy_module, is_own_module, with_robot_beside
+from ...runtime.bundle import copy_module, is_own_module, with_robot_beside
 from ...runtime.graph import load
 from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import CheckedGraph

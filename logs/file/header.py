@@ -16,7 +16,7 @@ from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.terrain import SupportsScene, Terrain
 from ...runtime.running.memory import BoundGraph
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
-from .surroundings import contents, digests, files_read, parameter_files, project_state
+from .dependencies import contents, digests, files_read, parameter_files, project_state
 
 RECORDED_VERSIONS = (
     "aloft", "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",

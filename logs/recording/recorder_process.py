@@ -331,9 +331,8 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-class WithoutPandas:
-    """Finds for Python that there is no pandas. Arrow would import it where it is installed, only to see
-    that no value here comes from it, which takes longer than all else that this process does for a short run."""
+class _NoPandas:
+    """Finds for Python that there is no pandas."""
 
     def find_spec(self, name: str, *_: Any) -> None:
         """Raises ``ModuleNotFoundError`` for pandas; all else is for other finders."""
@@ -341,12 +340,18 @@ class WithoutPandas:
             raise ModuleNotFoundError(name)
 
 
+def block_pandas_import() -> None:
+    """Let imports of pandas fail in this process. Arrow would import it where it is installed, only to see that no
+    value here comes from it, which takes longer than all else that this process does for a short run."""
+    sys.meta_path.insert(0, _NoPandas())
+
+
 def main(tasks: str) -> None:
     """Do what the task from the socket ``tasks`` says, until standard input ends."""
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    sys.meta_path.insert(0, WithoutPandas())
+    block_pandas_import()
     import_module("rerun")  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)

@@ -29,10 +29,10 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
-from ..file.surroundings import digests, files_read, named_file, other_files, unpacked
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)

@@ -66,12 +66,12 @@ class PlacedFile:
     def place_of_words(self, text: str) -> str:
         """Where the last of the file's keys is that a message speaks of; the start of the file
         where it speaks of none."""
-        describe_task = [
+        named_keys = [
             entry.key_where
             for entry in self.tree
             if re.search(rf"\b{re.escape(entry.key)}\b", text)
         ]
-        return str(max(describe_task, default=self.tree.where))
+        return str(max(named_keys, default=self.tree.where))
 
 
 def read_placed(path: Path, example: str) -> PlacedFile:
