@@ -16,7 +16,7 @@ from ..runtime.running.sinks import Sink
 
 
 def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:
-    """What the recorded graph remembered before a tick, found by running it up to there.
+    """Return the state of the recorded graph before a tick, found by running it up to there.
 
     Raises:
         ReplayError: the recording does not reach it, or the run does not repeat itself.

@@ -23,7 +23,7 @@ SHORTEST = 0.02
 LONG = 0.04
 """A detector holds a contact for 20 ms after its switch has opened; from here on [s] it is no such wait."""
 HEIGHT, SPEED, TILT = 0.002, 0.03, 0.005
-"""What a contact that is wrong for less must do to the estimate to count [m, m/s, rad]."""
+"""Smallest effects on the estimate for which a brief wrong contact counts [m, m/s, rad]."""
 LOAD = 3.0
 """A point with less [N] need not close its switch."""
 LATER = 0.05
@@ -61,7 +61,7 @@ class ContactError:
 
     @property
     def effect(self) -> str:
-        """What it did to the estimate, in words."""
+        """Effect on the estimate, in words."""
         x, y, z = self.velocity
         return (
             f"height {1e3 * self.height:+.1f} mm, place {1e3 * self.forward:+.1f}, "
@@ -70,7 +70,7 @@ class ContactError:
 
     @property
     def matters(self) -> bool:
-        """Whether it lasted long, or did something to the estimate."""
+        """True if it lasted long or changed the estimate."""
         moved = max(abs(self.height), abs(self.forward), abs(self.left))
         return (
             self.duration >= LONG or moved > HEIGHT or self.tilt > TILT
@@ -78,7 +78,7 @@ class ContactError:
         )  # fmt: skip
 
     def as_deviation(self, run: RobotRun) -> Deviation:
-        """The same as a link of the chain."""
+        """Return the same as a link of the chain."""
         end = float(run.time[self.last])
         name = f"{'false' if self.false else 'missed'} contact of {self.point}"
         if not self.false:
@@ -91,7 +91,7 @@ class ContactError:
 
 
 def contact_errors(run: RobotRun) -> list[ContactError]:
-    """All false and missed contacts, by when they begin, each with what it did to the estimate."""
+    """Return all false and missed contacts, by when they begin, each with what it did to the estimate."""
     found = sorted(_errors(run), key=lambda error: (error.first, error.point))
     return [_with_effect(run, error) for error in found]
 
@@ -113,7 +113,7 @@ def _errors(run: RobotRun) -> Iterator[ContactError]:
 
 
 def _with_effect(run: RobotRun, error: ContactError) -> ContactError:
-    """The error with what it did: the recorded estimate less the one with the true contact."""
+    """Return the error with its effect: the recorded estimate less the one with the true contact."""
     view = run.run.bus.view
     start, _ = run.run.bus.byte_range(f"{run.contacts}.active")  # a byte for each point
     start += [contact.name for contact in run.robot.contacts].index(error.point)

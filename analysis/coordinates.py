@@ -52,7 +52,7 @@ class Coordinates:
         return len(self.labels)
 
     def read(self, state: Region) -> Array:
-        """The elements now, a ring's by age; ``state`` has the positions of rings."""
+        """Return the elements now, a ring's by age; ``state`` has the positions of rings."""
         values: Array = self.region.sections["float64"][self._now(state)]
         return values
 
@@ -61,13 +61,13 @@ class Coordinates:
         self.region.sections["float64"][self._now(state)] = values
 
     def displaced(self, values: Array, k: int, distance: float) -> Array:
-        """The elements with coordinate ``k`` moved by ``distance``."""
+        """Return the elements with coordinate ``k`` moved by ``distance``."""
         distances = np.zeros(len(self))
         distances[k] = distance
         return self.moved(values, distances)
 
     def moved(self, values: Array, distances: Array) -> Array:
-        """The elements with all coordinates moved; an orientation turns about its rotation vector."""
+        """Return the elements with all coordinates moved; an orientation turns about its rotation vector."""
         if not self.quaternion:
             return values + distances
         found = values.copy()
@@ -80,7 +80,7 @@ class Coordinates:
         return found
 
     def difference(self, values: Array, nominal: Array) -> Array:
-        """The coordinates of ``values`` relative to ``nominal``, (n,)."""
+        """Return the coordinates of ``values`` relative to ``nominal``, (n,)."""
         if not self.quaternion:
             return values - nominal
         if (values == nominal).all():  # the product below rounds
@@ -120,7 +120,7 @@ def _product(a: Array, b: Array) -> Array:
 
 
 def state_coordinates(bound: BoundGraph) -> Iterator[Coordinates]:
-    """All float elements of the declared state, field by field in file order."""
+    """Yield all float elements of the declared state, field by field in file order."""
     region, robot = bound.memory.state, bound.graph.robot
     for each in recorded_states(bound):
         if each.dtype != "float64" or not each.size:
@@ -155,7 +155,7 @@ def state_coordinates(bound: BoundGraph) -> Iterator[Coordinates]:
 
 
 def bus_coordinates(bound: BoundGraph, fields: dict[str, RecordedField]) -> Iterator[Coordinates]:
-    """All float elements of the outputs, which a graph of several rates may remember."""
+    """Yield all float elements of the outputs, which a graph of several rates may remember."""
     for each in fields.values():
         if each.dtype == "float64" and not each.constant and each.size:
             yield _of_field(bound, each, WHOLE)
@@ -164,7 +164,7 @@ def bus_coordinates(bound: BoundGraph, fields: dict[str, RecordedField]) -> Iter
 def signal_coordinates(
     bound: BoundGraph, fields: dict[str, RecordedField], text: str
 ) -> Coordinates:
-    """The elements of the signal that ``text`` names, such as ``robot.joints.position[*_knee]``.
+    """Return the elements of the signal that ``text`` names, such as ``robot.joints.position[*_knee]``.
 
     Raises:
         AloftError: there is no such signal or element, or it is not a float.

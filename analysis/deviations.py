@@ -1,4 +1,4 @@
-"""Where a run deviates: from the truth, from its plan, from what motors can do, from what nobody disturbs.
+"""Deviations of a run from the truth, its plan, the limits of its motors and an undisturbed run.
 
 Each ``Measure`` is one quantity over time with the limit that successful jumps in the standard trial stay below.
 A deviation is a stretch of time in which it is above.
@@ -29,10 +29,10 @@ Kind = Literal[
 KINDS: tuple[Kind, ...] = (
     "fault", "world", "sensor", "actuator", "contact", "estimate", "limit", "plan", "body",
 )  # fmt: skip
-"""In the order in which one leads to the next: of deviations that begin together the first is the cause."""
+"""Kinds in the order of cause and effect: of deviations that begin together the first is the cause."""
 
 LATEST = 0.01
-"""How old a measurement may be [s]."""
+"""Greatest age of a measurement [s]."""
 MERGED = 0.05
 """See ``Measure.merged``."""
 
@@ -93,7 +93,7 @@ class Measure:
     merged: float = MERGED
 
     def deviations(self, run: RobotRun) -> Iterator[Deviation]:
-        """Every stretch beyond the limit."""
+        """Yield every stretch beyond the limit."""
         for first, last in stretches(self.values > self.limit, round(self.merged / run.period)):
             duration = (last - first + 1) * run.period
             if duration < self.shortest - 1e-9:
@@ -116,7 +116,7 @@ def stretches(beyond: np.ndarray, gap: int = 0) -> Iterator[tuple[int, int]]:
 
 
 def all_deviations(run: RobotRun) -> list[Deviation]:
-    """Every deviation of the run but those of contacts, by when they begin."""
+    """Return every deviation of the run but those of contacts, by when they begin."""
     parts = (
         _faults, _disturbances, _sensors, _actuators, _estimates, _limits, _plan, _hanging_feet, _body,
     )  # fmt: skip
@@ -125,8 +125,9 @@ def all_deviations(run: RobotRun) -> list[Deviation]:
 
 
 def outside(run: RobotRun, measured: Array, truth: Array, window: float = 0.0) -> Array:
-    """How far measured values (n, ...) are outside of all that the truth was in the last ``LATEST`` seconds,
-    with sign, averaged over ``window`` [s]."""
+    """Return the signed distance of measured values (n, ...) from the range of the truth in the last ``LATEST``
+    seconds, averaged over ``window`` [s].
+    """
     low = high = truth
     for k in range(1, round(LATEST / run.period) + 1):
         earlier = np.concatenate([np.repeat(truth[:1], k, axis=0), truth[:-k]])[: len(truth)]
@@ -135,7 +136,7 @@ def outside(run: RobotRun, measured: Array, truth: Array, window: float = 0.0) -
 
 
 def mean(values: Array, size: int) -> Array:
-    """The mean over ``size`` ticks about each tick, (n, ...); less at the ends."""
+    """Return the mean over ``size`` ticks about each tick, (n, ...); less at the ends."""
     if size < 2:
         return values
     n = len(values)
@@ -155,7 +156,7 @@ def length(vectors: Array) -> Array:
 
 
 def _faults(run: RobotRun) -> Iterator[Measure]:
-    """The faults that the graph declares."""
+    """Yield the faults that the graph declares."""
     for spec in run.run.graph.blocks:
         if issubclass(spec.block_type, Fault) and isinstance(spec.params, FaultParameters):
             active = run(f"{spec.path}.state", "active").astype(float)
@@ -164,7 +165,7 @@ def _faults(run: RobotRun) -> Iterator[Measure]:
 
 
 def _disturbances(run: RobotRun) -> Iterator[Measure]:
-    """What nobody told the controller of: pushes, ground, feet that slide, loads where no contact point is."""
+    """Yield the disturbances unknown to the controller: pushes, ground, sliding feet, loads off the contact points."""
     truth, robot = run.truth, run.robot
     if run.push:
         yield Measure("world", "push", length(run(run.push, "force")), 1.0, "N")
@@ -196,8 +197,9 @@ def _disturbances(run: RobotRun) -> Iterator[Measure]:
 
 
 def planned_ground(run: RobotRun) -> Array:
-    """The height [m] at which the plan has each foot when all of its points next carry load, or last did if it
-    has not been in the air since, (n, n_feet)."""
+    """Return the height [m] at which the plan has each foot when all of its points next carry load, or last did if it
+    has not been in the air since, (n, n_feet).
+    """
     feet, contact = run(run.reference, "foot_position")[:, :, 2], run(run.reference, "contact")
     planned = np.empty_like(feet)
     for foot in range(feet.shape[1]):
@@ -358,7 +360,7 @@ def _limits(run: RobotRun) -> Iterator[Measure]:
 
 
 def _plan(run: RobotRun) -> Iterator[Measure]:
-    """How far the robot is from its plan."""
+    """Yield the deviations of the robot from its plan."""
     if not run.reference:
         return
     truth, reference = run.truth, run.reference
@@ -392,7 +394,7 @@ def _hanging_feet(run: RobotRun) -> Iterator[Measure]:
 
 
 def _body(run: RobotRun) -> Iterator[Measure]:
-    """The robot loses its balance, touches what it must not, falls."""
+    """Yield loss of balance, forbidden touches and falls of the robot."""
     truth = run.truth
     com, velocity = run(truth, "com"), run(truth, "com_velocity")
     point, ground = run(truth, "contact_position"), run(truth, "ground_height")

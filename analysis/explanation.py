@@ -1,4 +1,4 @@
-"""Why a run failed: the chain of deviations that leads to its end, from the first one on.
+"""Explanation of a failed run: the chain of deviations that leads to its end, from the first one on.
 
 From the fall the chain goes back in time: a deviation belongs to it if it lasted until a later link of it began, or
 ended less than ``MEMORY`` before. Where the robot did not fall there is no such instant, and every deviation
@@ -30,7 +30,7 @@ FALLEN = 45.0
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why a run ended as it did.
+    """Explanation of a run's end.
 
     Attributes:
         success: whether it succeeded.
@@ -57,7 +57,7 @@ class Explanation:
         return min(together, key=lambda d: (KINDS.index(d.kind), d.begin))
 
     def to_json(self) -> dict[str, Any]:
-        """The same as plain data."""
+        """Return the same as plain data."""
         cause = self.cause
 
         def plain(deviation: Deviation) -> dict[str, Any]:
@@ -105,8 +105,9 @@ def explain(run: OpenedRun | Replayable, outcome: Mapping[str, Any] | None = Non
 
 
 def end_of(run: RobotRun, found: list[Deviation]) -> tuple[float, bool]:
-    """The time [s] at which it was decided, and whether the robot fell or was stopped then: its drives are damped, or
-    something but a contact point touches; else the end of the run."""
+    """Return the time [s] at which it was decided, and whether the robot fell or was stopped then: its drives are
+    damped, or something but a contact point touches; else the end of the run.
+    """
     last = float(run.time[-1])
     ends = [d.begin for d in found if d.name == FORBIDDEN or d.name.startswith(DAMPED)]
     fallen = any(d.name == TILT and d.size > FALLEN and d.end >= last for d in found)
@@ -114,7 +115,7 @@ def end_of(run: RobotRun, found: list[Deviation]) -> tuple[float, bool]:
 
 
 def chain_to(ended: float, found: list[Deviation]) -> list[Deviation]:
-    """The deviations that lead to that time, by when they begin."""
+    """Return the deviations that lead to that time, by when they begin."""
     chain: list[Deviation] = []
     first = ended
     for deviation in sorted(found, key=lambda d: d.end, reverse=True):

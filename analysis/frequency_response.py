@@ -34,9 +34,9 @@ from ..runtime.running.memory import BoundGraph
 from .coordinates import signal_coordinates
 
 NAME = "chirp"
-"""Of the fault that adds the chirp."""
+"""Name of the fault that adds the chirp."""
 LEVEL = 0.95
-"""Of the confidence regions."""
+"""Probability content of the confidence regions."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ class FrequencyResponse:
     samples: int
 
     def holds(self, predicted: NDArray[np.complex128]) -> NDArray[np.bool_]:
-        """Whether a response at these frequencies, (n,), lies within the circles."""
+        """Check at which frequencies, (n,), a predicted response lies within the circles."""
         return np.asarray(np.abs(predicted - self.value) <= self.radius, np.bool_)
 
     def as_data(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return all fields as plain data."""
         return {
             "source": self.source, "target": self.target, "opened": self.opened,
             "frequency_hz": self.frequency.tolist(), "real": self.value.real.tolist(),
@@ -154,7 +154,7 @@ def frequency_responses(
 
 
 def _rows(chirped: Graph, seed: int, window: _Window) -> Any:
-    """A function that gives an element of a signal in the ticks of the window."""
+    """Return a function that gives an element of a signal in the ticks of the window."""
     result = chirped.run(window.last / chirped.checked.base_rate, seed=seed)
     if result.ticks < window.last:
         raise AloftError(
@@ -198,7 +198,8 @@ class _Window:
         return cls(graph, start + length, start + (periods + 1) * length, length, lines)
 
     def coefficients(self, rows: Any, name: str, block: str) -> NDArray[np.complex128]:
-        """The Fourier coefficients of an element, (periods, frequencies), without the trend of its means over periods.
+        """Return the Fourier coefficients of an element, (periods, frequencies), without the trend of its means over
+        periods.
 
         A block of a slower rate has a sample for every time that it runs.
         """
@@ -222,7 +223,7 @@ def _response(
     numerator: NDArray[np.complex128], denominator: NDArray[np.complex128],
     chirp: NDArray[np.complex128],
 ) -> FrequencyResponse:  # fmt: skip
-    """The ratio of two means over (samples, frequencies), and how certain it is."""
+    """Return the ratio of two means over (samples, frequencies), and how certain it is."""
     from scipy.stats import f as fisher
 
     m = len(numerator)

@@ -1,4 +1,4 @@
-"""The instant of a run that is asked about: a time, or the first at which a condition holds."""
+"""The instant of a run at which it is analysed: a time, or the first at which a condition holds."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def go_to(run: SteppedRun, at: float | None, when: str) -> None:
 
 
 def _condition(run: SteppedRun, text: str) -> Callable[[], bool]:
-    """A function that says whether a condition holds. Raises ``AloftError`` if it cannot be read."""
+    """Return a function that evaluates a condition. Raises ``AloftError`` if it cannot be read."""
     match = CONDITION.match(text)
     bound = bound_graph(run)
     fields = {field.name: field for field in recorded_signals(bound)}
@@ -81,5 +81,5 @@ def _condition(run: SteppedRun, text: str) -> Callable[[], bool]:
 
 
 def bound_graph(run: SteppedRun) -> BoundGraph:
-    """The bound graph of a run that is stepped."""
+    """Return the bound graph of a run that is stepped."""
     return run._bound

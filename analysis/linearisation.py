@@ -52,7 +52,7 @@ KINK = 1e-2
 
 @dataclass(frozen=True)
 class Held:
-    """What a linear model leaves as it is: a block, and why it could not be differentiated."""
+    """Block that a linear model holds constant, with the reason why it could not be differentiated."""
 
     block: str
     reason: str
@@ -124,7 +124,7 @@ class Linearisation:
         return sorted_poles(self.a)
 
     def response(self, frequency: Array) -> Any:
-        """The frequency response, (frequencies, outputs, inputs), complex, at frequencies in rad/s.
+        """Return the frequency response, (frequencies, outputs, inputs), complex, at frequencies in rad/s.
 
         Of a graph of several rates it is the part of each output that has the input's own frequency, with
         one row and column for each signal.
@@ -152,7 +152,7 @@ class Linearisation:
         return found
 
     def as_data(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return all fields as plain data."""
         poles = self.poles
         return {
             "tick": self.tick, "period_s": self.period, "opened": self.opened,
@@ -167,13 +167,13 @@ class Linearisation:
 
 
 def sorted_poles(a: Array) -> Any:
-    """The eigenvalues of A, (n,), complex, the slowest first."""
+    """Return the eigenvalues of A, (n,), complex, the slowest first."""
     found = np.linalg.eigvals(a)
     return found[np.argsort(-np.abs(found), kind="stable")]
 
 
 def import_control() -> Any:
-    """The package python-control. Raises ``AloftError`` where it is not installed."""
+    """Return the package python-control. Raises ``AloftError`` where it is not installed."""
     try:
         import control
     except ImportError as error:
@@ -192,7 +192,7 @@ def linearise(
     when: str = "",
     opened: bool = False,
 ) -> Linearisation:
-    """The linear model from some signals of a graph to others.
+    """Return the linear model from some signals of a graph to others.
 
     Args:
         graph: a graph or its file, which is run up to the instant, or a run that has come to it. A run
@@ -273,7 +273,7 @@ def _touched(region: Region, name: str, different: Flags) -> bool:
 
 
 def _candidates(period: Period, signals: Mapping[str, RecordedField]) -> list[Coordinates]:
-    """All that may be state: the declared one, and the outputs that the next period reads."""
+    """Return all candidates for state: the declared one, and the outputs that the next period reads."""
     bound = period.bound
     declared = list(state_coordinates(bound))
     state = bound.memory.state
@@ -313,7 +313,7 @@ def _probe(group: Sequence[Coordinates], state: Region) -> None:
 
 
 def _held(period: Period) -> Iterable[Held]:
-    """The blocks between inputs and outputs that have more than floats."""
+    """Yield the blocks between inputs and outputs that have more than floats."""
     graph = period.bound.graph
     readers: dict[str, list[str]] = {spec.path: [] for spec in graph.blocks}
     for spec in graph.blocks:
@@ -416,7 +416,7 @@ class _Differences:
         self.kept = [candidates[k] for k in sorted(affects) if str(k) in seen_by_output]
 
     def _difference(self) -> Array:
-        """The end of the last run relative to that of the undisturbed one: states, then outputs."""
+        """Return the end of the last run relative to that of the undisturbed one: states, then outputs."""
         found = [
             each.difference(now, was)
             for each, now, was in zip(
@@ -428,7 +428,7 @@ class _Differences:
         return np.concatenate(found) if found else np.zeros(0)
 
     def _column(self, column: _Column) -> tuple[Array, float]:
-        """A derivative, and its relative error."""
+        """Return a derivative, and its relative error."""
         best, error = np.zeros(0), np.inf
         for factor in FACTORS:
             h = STEP * factor * column.scale
@@ -450,7 +450,7 @@ class _Differences:
         return self._difference() / step
 
     def _columns(self) -> Iterator[_Column]:
-        """The states, and then the inputs in each tick in which they are written."""
+        """Yield the states, and then the inputs in each tick in which they are written."""
         period = self.period
         for each, start in zip(self.kept, self.start, strict=True):
             for k, label in enumerate(each.labels):
@@ -479,7 +479,7 @@ class _Differences:
                     yield _Column(name, each.units[k], add, 1.0, tick=tick)
 
     def model(self, opened: bool, held: tuple[Held, ...]) -> Linearisation:
-        """The whole model, without the states that are not used."""
+        """Return the whole model, without the states that are not used."""
         period = self.period
         columns = list(self._columns())
         n = sum(map(len, self.kept))
@@ -530,7 +530,7 @@ class _Column:
 
 
 def _used(a: Array, b: Array, c: Array) -> list[int]:
-    """The states that inputs reach and that reach outputs."""
+    """Return the states that inputs reach and that reach outputs."""
     forward, backward = (b != 0.0).any(axis=1), (c != 0.0).any(axis=0)
     for _ in range(len(a)):
         ahead = forward | ((a != 0.0) & forward).any(axis=1)
@@ -542,7 +542,7 @@ def _used(a: Array, b: Array, c: Array) -> list[int]:
 
 
 def _groups(names: Sequence[str]) -> dict[str, list[int]]:
-    """The places of each signal's samples in a period."""
+    """Return the places of each signal's samples in a period."""
     found: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         found.setdefault(name.partition("@")[0], []).append(k)

@@ -68,7 +68,7 @@ class RootLocus:
         return np.where(tiny, np.nan, found)
 
     def as_data(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return all fields as plain data."""
         return {
             "parameter": self.parameter, "unit": self.unit, "values": self.values.tolist(),
             "poles": [[[float(p.real), float(p.imag)] for p in row] for row in self.poles],
@@ -87,7 +87,7 @@ def root_locus(
     at: float | None = None,
     when: str = "",
 ) -> RootLocus:
-    """The poles between some signals of a graph over one parameter.
+    """Return the poles between some signals of a graph over one parameter.
 
     Args:
         graph: the graph's file, or its text.
@@ -134,7 +134,7 @@ def root_locus(
 
 
 def _traced(poles: Any) -> Any:
-    """The same poles, in the order of those at the value before."""
+    """Return the same poles, in the order of those at the value before."""
     from scipy.optimize import linear_sum_assignment
 
     found = poles.copy()
@@ -154,7 +154,7 @@ def _limits(values: Array, poles: Any, period: float) -> list[float]:
 
 
 def locus_figure(found: RootLocus, title: str) -> Figure:
-    """The poles in the plane of s, from open circles at the first value to crosses at the last."""
+    """Return the poles in the plane of s, from open circles at the first value to crosses at the last."""
     from ..plotting import COLOURS, FAINT, new_figure
 
     figure = new_figure(6.0, 4.5, title)

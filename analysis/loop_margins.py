@@ -1,4 +1,4 @@
-"""How much a loop stands: gain, phase, delay and disk margins, each channel by itself and all at once.
+"""Stability margins of a loop: gain, phase, delay and disk margins, of each channel and of all at once.
 
 The loop transfer L of an opened wire, from what is read there to what the block writes, has the sign of the
 feedback in it: the loop is closed by u = L u, and its return difference is I - L. The margins of a channel
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 POINTS = 1000
 """Frequencies at which the response is computed, evenly in their logarithm."""
 DECADES = 4.0
-"""How far below the highest frequency, half the sampling rate, the lowest lies."""
+"""Decades from the lowest frequency to the highest, half the sampling rate."""
 ON_CIRCLE = 1e-6
 """A pole that is no farther outside of the unit circle than this is taken to lie on it: drift."""
 
@@ -83,7 +83,7 @@ class Margins:
     loops: Any
 
     def as_data(self) -> dict[str, Any]:
-        """Everything but the curves as plain data."""
+        """Return all fields but the curves as plain data."""
         return {
             "stable": self.stable,
             "growth_per_s": self.growth,
@@ -94,7 +94,7 @@ class Margins:
 
 
 def margins(model: Linearisation) -> Margins:
-    """The margins of the loop that was opened at a wire.
+    """Return the margins of the loop that was opened at a wire.
 
     Args:
         model: of a wire, opened, to itself.
@@ -127,13 +127,14 @@ def margins(model: Linearisation) -> Margins:
 
 
 def loop_responses(model: Linearisation, w: Array) -> Any:
-    """The transfer of each channel of an opened wire with the others closed, negative feedback, (frequencies, n), at
-    frequencies in rad/s."""
+    """Return the transfer of each channel of an opened wire with the others closed, negative feedback, (frequencies,
+    n), at frequencies in rad/s.
+    """
     return -_each_alone(model.response(w))
 
 
 def _each_alone(transfer: Any) -> Any:
-    """The transfer of each channel with the others closed, (frequencies, n)."""
+    """Return the transfer of each channel with the others closed, (frequencies, n)."""
     n = transfer.shape[1]
     found = np.empty(transfer.shape[:2], complex)
     for k in range(n):
@@ -147,7 +148,7 @@ def _each_alone(transfer: Any) -> Any:
 
 
 def _of_channel(w: Array, loop: Any) -> LoopMargins:
-    """The margins of one transfer with negative feedback."""
+    """Return the margins of one transfer with negative feedback."""
     control = import_control()
     response = control.FrequencyResponseData(loop, w, smooth=True)
     gains, phases, _, _, crossings, _ = control.stability_margins(response, returnall=True)
@@ -163,7 +164,7 @@ def _of_channel(w: Array, loop: Any) -> LoopMargins:
 
 
 def _of_all(w: Array, transfer: Any) -> LoopMargins:
-    """The margins for the same change in all channels, by the characteristic loci."""
+    """Return the margins for the same change in all channels, by the characteristic loci."""
     from scipy.optimize import linear_sum_assignment
 
     loci = np.linalg.eigvals(transfer)
@@ -213,7 +214,7 @@ def margins_figure(
     names: Sequence[str] = (),
     measured: Mapping[str, FrequencyResponse] | None = None,
 ) -> Figure:
-    """The Bode and Nyquist diagrams of all channels, or of some, each with the others closed.
+    """Return the Bode and Nyquist diagrams of all channels, or of some, each with the others closed.
 
     What was ``measured`` of a channel is drawn as points, with bars of 95 % where that is less than the value.
     """

@@ -76,7 +76,7 @@ class Period:
             self._recording = False
 
     def samples(self, signal: Coordinates) -> list[int]:
-        """The ticks of the period, from zero, in which the block of a signal runs."""
+        """Return the ticks of the period, from zero, in which the block of a signal runs."""
         first = self.start.tick
         return [
             k for k in range(self.ticks) if signal.block in self._table[(first + k) % self.ticks]
@@ -133,10 +133,10 @@ class Period:
 
 
 def _first_call(block: Block) -> Callable[[], Any]:
-    """The call by which a block writes its outputs."""
+    """Return the call by which a block writes its outputs."""
     call: Callable[[], Any] = block.emit if type(block).is_moore() else block.step  # type: ignore[attr-defined]  # it has the one or the other
     return call
 
 
 def _nothing() -> None:
-    """Of a block that does not run."""
+    """Replace the call of a block that does not run."""

@@ -1,4 +1,4 @@
-"""What a run of a robot holds: the signals by what they mean, found by the types of ports and by the wires."""
+"""Signals of a robot's run by their meaning, found by the types of ports and by the wires."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ class RobotRun:
 
     @property
     def period(self) -> float:
-        """Of a tick [s]."""
+        """Length of a tick [s]."""
         return 1.0 / self.run.graph.base_rate
 
     @cached_property
     def time(self) -> Array:
-        """Of every tick [s], (n,)."""
+        """Times of all ticks [s], (n,)."""
         return np.asarray(self.run.ticks * self.period, np.float64)
 
     @cached_property
@@ -80,7 +80,7 @@ class RobotRun:
         return self.run.rows(int(self.run.ticks[0]), int(self.run.ticks[-1]) + 1)[1]
 
     def __call__(self, port: str, field: str) -> NDArray[Any]:
-        """All values of a field of ``block.port``, (n, ...)."""
+        """Return all values of a field of ``block.port``, (n, ...)."""
         return self.run.bus.view(self.rows, f"{port}.{field}")
 
     @cached_property
@@ -90,7 +90,7 @@ class RobotRun:
         return [graph.block(path) for path in graph.order if "~" not in path]
 
     def port(self, signal: type[Signal]) -> str:
-        """The last output of that type in the order of execution, as ``block.port``; else empty."""
+        """Return the last output of that type in the order of execution, as ``block.port``; else empty."""
         found = [
             f"{spec.path}.{name}"
             for spec in self._blocks
@@ -100,7 +100,7 @@ class RobotRun:
         return found[-1] if found else ""
 
     def read_by(self, block: str, signal: type[Signal]) -> str:
-        """What is wired to the first input of that type of a block, as ``block.port``; else empty."""
+        """Return the source, ``block.port``, of a block's first input of that type; else an empty text."""
         if not block:
             return ""
         spec = self.run.graph.block(block)
@@ -110,7 +110,7 @@ class RobotRun:
 
     @cached_property
     def truth(self) -> str:
-        """What the simulator knows."""
+        """Source of the simulator's true state."""
         return self.port(RobotTruth)
 
     @cached_property
@@ -144,12 +144,12 @@ class RobotRun:
         return self.read_by(self.estimator, ContactState)
 
     def sensor(self, signal: type[ImuReading | JointState]) -> str:
-        """What the estimator reads as that kind of measurement, else what the robot says."""
+        """Return the estimator's source of that kind of measurement, else the robot's output."""
         return self.read_by(self.estimator, signal) or self.port(signal)
 
     @cached_property
     def command(self) -> str:
-        """What the controller commands, before any fault on the way to the robot; else empty."""
+        """Source of the controller's command, before any fault on the way to the robot; else empty."""
         source = self.read_by(self.robot_block, JointCommand)
         while source and issubclass(
             self.run.graph.block(source.rpartition(".")[0]).block_type, Fault
@@ -205,11 +205,11 @@ class RobotRun:
         return self(port, "phase") if port else np.full(len(self.time), -2)
 
     def phase_at(self, row: int) -> str:
-        """The name of the phase, or an empty text."""
+        """Return the name of the phase, or an empty text."""
         number = int(self.phase[row])
         return Phase(number).name.lower() if number in set(Phase) else ""
 
     @cached_property
     def touched(self) -> NDArray[np.bool_]:
-        """Whether each contact point carried load, (n, n_contacts)."""
+        """Contact points that carried load, (n, n_contacts)."""
         return self(self.truth, "contact_touched")

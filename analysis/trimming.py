@@ -38,7 +38,7 @@ TOLERANCE = 1e-6
 STEP = 1e-6
 """The step of the differences, relative to the larger of 1 and the value."""
 MOST_STEPS, PORTION_STEPS = 40, 15
-"""Of a search, and of one behind a portion of the way."""
+"""Greatest numbers of steps: of a search, and of one behind a portion of the way."""
 SINGULAR = 1e-6
 """Singular values below this share of the largest do not count."""
 PORTION, LEAST_PORTION = 0.125, 1.0 / 64.0
@@ -94,12 +94,12 @@ class Trim:
 
     @property
     def success(self) -> bool:
-        """Whether all conditions hold."""
+        """True if all conditions hold."""
         return all(each.holds for each in self.conditions)
 
     @property
     def reason(self) -> str:
-        """What cannot hold, and what is in the way; a short text if all holds."""
+        """Conditions that cannot hold, and the obstacle; a short text if all hold."""
         broken = sorted((c for c in self.conditions if not c.holds), key=lambda c: -abs(c.residual))
         if not broken:
             return "all conditions hold"
@@ -115,7 +115,7 @@ class Trim:
         return text
 
     def as_data(self) -> dict[str, Any]:
-        """Everything as plain data."""
+        """Return all fields as plain data."""
         return {
             "success": self.success, "reason": self.reason, "tick": self.tick,
             "values": dict(self.values), "units": dict(self.units),
@@ -192,7 +192,7 @@ class _Block:
         self.where.write(state, self.where.moved(self.base, now) if self.where.quaternion else now)
 
     def value(self, state: Any) -> Array:
-        """The chosen elements in memory; of an orientation relative to the instant."""
+        """Return the chosen elements in memory; of an orientation relative to the instant."""
         return self._coordinates(state)[self.chosen]
 
     def _coordinates(self, state: Any) -> Array:
@@ -258,7 +258,7 @@ class _Search:
         self._check_bounds()
 
     def _needed(self, outputs: Sequence[Coordinates]) -> set[str]:
-        """The blocks on which conditions depend, up to the opened wires."""
+        """Return the blocks on which conditions depend, up to the opened wires."""
         opened = {block.where.name.rpartition(".")[0] for block in self.opened}
         pending = [each.block for each in outputs if each.name.rpartition(".")[0] not in opened]
         pending += [block.where.block for block in (*self.free, *self.fixed)]
@@ -309,7 +309,7 @@ class _Search:
                 self.wanted.append(_Wanted(label, unit, len(outputs) - 1, k, sign, value_here))
 
     def _matching(self, name: str) -> list[tuple[Coordinates, list[int]]]:
-        """The elements of state of this name; an asterisk stands for any text without a dot.
+        """Return the elements of state of this name; an asterisk stands for any text without a dot.
 
         The entries of delays follow from what is delayed.
         """
@@ -361,7 +361,7 @@ class _Search:
         return parts[: len(self.free)], parts[len(self.free) :]
 
     def residuals(self, unknowns: Array) -> Array:
-        """What is left of every condition: states at rest, states that are held, signals."""
+        """Return the residual of every condition: states at rest, states that are held, signals."""
         self.evaluations += 1
         period, state = self.period, self.bound.memory.state
         states, signals = self._parts(unknowns)
@@ -408,7 +408,7 @@ class _Search:
         return all(each.holds for each in self._conditions(left))
 
     def _moved(self, start: Array, low: Array, high: Array) -> Array:
-        """A start for states that are set elsewhere than they are: the unknowns follow along the tangent.
+        """Return a start for states that are set elsewhere than they are: the unknowns follow along the tangent.
 
         Set at once, a lower base would press its feet deep into the ground. Rates are set at once. A portion of
         the way after which the conditions cannot be brought to hold is halved.
@@ -496,7 +496,7 @@ class _Search:
         ]  # fmt: skip
 
     def _settings(self, unknowns: Array) -> dict[str, list[float]]:
-        """The overrides by which constants write what was found."""
+        """Return the overrides by which constants write what was found."""
         found = {}
         for block, values in zip(self.opened, self._parts(unknowns)[1], strict=True):
             kind = self.bound.blocks[block.where.block]
@@ -509,7 +509,7 @@ class _Search:
 
 
 def _number(text: str, unit: str, whole: str) -> float:
-    """A number, perhaps with its unit. Raises ``AloftError``."""
+    """Return a number, perhaps with its unit. Raises ``AloftError``."""
     try:
         return parse_quantity(text.strip(), unit)
     except UnitError as error:
@@ -517,5 +517,5 @@ def _number(text: str, unit: str, whole: str) -> float:
 
 
 def _rate(unit: str) -> str:
-    """The unit of a rate."""
+    """Return the unit of a rate."""
     return f"{unit}/s" if unit else "1/s"

@@ -1,4 +1,5 @@
-"""Whether the methods for the whole-body program agree: on states of recorded jumps, and on random ones.
+"""Agreement of the methods for the whole-body program, on states of recorded jumps and on random
+ones.
 
 Every program is solved by the own method with pyramids and with round cones, by DAQP and by Clarabel,
 and their torques are compared with a minimum that is proved: its conditions of optimality hold in
@@ -38,14 +39,15 @@ Long = NDArray[np.longdouble]
 
 NEWTON_STEPS = 12
 FEASIBLE = 1e-8
-"""By how much a constraint may be violated [N, N m], and a multiplier be negative, times ``size``."""
+"""Largest violation of a constraint [N, N m] and most negative multiplier accepted, times ``size``.
+"""
 INSIDE, EDGE, APEX = 0, 1, 2
-"""Where in its cone a force is."""
+"""Position of a contact force in its friction cone: inside, on its edge, or at its apex."""
 
 
 class Proposal(NamedTuple):
-    """What may hold at the minimum: a solution x, the active inequalities, and where in its cone each
-    force is. Without ``places`` friction is among the inequalities."""
+    """A candidate for the minimum: a solution x, the active inequalities, and the position of each
+    force in its cone. Without ``places`` friction is among the inequalities."""
 
     x: Array
     active: Flags
@@ -53,7 +55,7 @@ class Proposal(NamedTuple):
 
 
 def proved_minimum(program: FullMatrices, proposal: Proposal, friction: float) -> Array | None:
-    """The minimiser, or ``None`` if the proposal is not right.
+    """Prove the proposal and return the minimiser, or ``None`` if the proposal is not right.
 
     Args:
         friction: of the round cones, if the proposal has any.
@@ -119,7 +121,8 @@ def proved_minimum(program: FullMatrices, proposal: Proposal, friction: float) -
 
 
 def _normals(x: Long, edges: list[int], friction: float, multipliers: Long) -> tuple[Long, Array]:
-    """The gradients of |f_t| - mu f_z of the forces at their cones' edges, and their curvature."""
+    """Return the gradients of |f_t| - mu f_z of the forces at their cones' edges, and their
+    curvature."""
     normals, bends = np.zeros((len(edges), len(x)), np.longdouble), np.zeros((len(x), len(x)))
     for row, i in enumerate(edges):
         size = np.hypot(x[i], x[i + 1])
@@ -147,7 +150,7 @@ STANCES = (None, (True, True, False, False), (False, False, False, True))
 
 
 class SolvedState(NamedTuple):
-    """What a controller had in a tick, and what may differ from its parameters.
+    """The controller's inputs in a tick, and the values that may differ from its parameters.
 
     ``peak`` (n_joints,) are the motors' peak torques [N m], ``friction``, ``force_min`` and ``force_max`` [N] the
     limits of the forces.
@@ -166,7 +169,7 @@ class SolvedState(NamedTuple):
 def recorded_states(
     overrides: dict[str, Any], duration: float | None = None, every: int = 1
 ) -> tuple[WholeBodyController, list[SolvedState]]:
-    """The controller of a jump that is over, and its states in ticks with a point in stance.
+    """Run a jump and return its controller, and its states in ticks with a point in stance.
 
     Raises:
         RunError: the jump failed.
@@ -189,7 +192,7 @@ def recorded_states(
 
 
 def present_state(block: WholeBodyController) -> SolvedState:
-    """The state that a controller has now."""
+    """Return the state that a controller has now."""
     w = block._weights
     return SolvedState(
         TaskRows(*(array.copy() for array in block._rows)),
@@ -221,8 +224,8 @@ def show_state(block: WholeBodyController, state: SolvedState) -> None:
 
 
 def random_states(states: list[SolvedState], count: int, seed: int) -> Iterator[SolvedState]:
-    """So many programs made from recorded ones: other points in stance, tasks that ask for up to ten
-    times as much with other weights, other speeds, friction and limits.
+    """Yield ``count`` programs made from recorded ones: other points in stance, tasks that ask for
+    up to ten times as much with other weights, other speeds, friction and limits.
 
     One in fifty has no solution: its forces must be larger than they may be. Otherwise there is always one,
     because tasks are no constraints.
@@ -258,18 +261,19 @@ OWN, DAQP, CONES, CLARABEL = (
     "Clarabel, round cones",
 )
 TORQUE_ERROR = 1e-6
-"""How far a torque may be from the proved one [N m]."""
+"""Largest accepted torque error against the proved minimum [N m]."""
 LARGE = 10.0
 """Torques larger than this [N m] may have that error as a share of themselves in units of it."""
 CLARABEL_TOLERANCE = 1e-12
-"""So that its slacks and multipliers tell what is active."""
+"""Tolerance of Clarabel's gaps: tight enough for its slacks and multipliers to tell the active set.
+"""
 NO_PLACES = np.zeros(0, np.int64)
 STATES = 5_000
 """The states of recorded jumps that are wanted at least."""
 
 
 def agreement(count: int = 50_000, seed: int = 1, states: int = STATES) -> list[Row]:
-    """The rows.
+    """Compare the methods and return a row for each of their errors and counts.
 
     Args:
         count: of random programs.
@@ -295,8 +299,8 @@ def agreement(count: int = 50_000, seed: int = 1, states: int = STATES) -> list[
 
 
 def _stances(states: Iterable[SolvedState]) -> Iterable[SolvedState]:
-    """The states with the recorded points in stance; every third on one foot and every fifth on one
-    point as well."""
+    """Yield the states with the recorded points in stance; every third on one foot and every fifth
+    on one point as well."""
     for number, state in enumerate(states):
         yield state
         for every, stance in zip((3, 5), STANCES[1:], strict=True):
@@ -306,10 +310,11 @@ def _stances(states: Iterable[SolvedState]) -> Iterable[SolvedState]:
 
 @dataclass
 class Agreement:
-    """What came out of a set of programs.
+    """The results of a set of programs.
 
     ``errors`` [N m] by method; ``by_own`` counts the minima that only the own method has proposed,
-    ``unsolved`` programs with a proved minimum for which a method had none, ``impossible`` those for which every method says that there is none, ``unproved`` those left."""
+    ``unsolved`` programs with a proved minimum for which a method had none, ``impossible`` those for which every method says that there is none, ``unproved`` those left.
+    """
 
     programs: int = 0
     limited: int = 0
@@ -320,7 +325,7 @@ class Agreement:
     by_own: dict[str, int] = field(default_factory=dict)
 
     def rows(self, what: str) -> list[Row]:
-        """The rows of these programs."""
+        """Return the rows of these programs."""
         rows = [
             Row(
                 f"{what}",
@@ -457,7 +462,8 @@ class Methods:
 
     @staticmethod
     def _from_clarabel(answer: object, equations: int, count: int) -> Proposal:
-        """What Clarabel's slacks and multipliers say: of each pair that is larger which is not zero."""
+        """Read a proposal from Clarabel's slacks and multipliers: the larger of each pair is the
+        one that is not zero."""
         x, s, z = (np.asarray(getattr(answer, name)) for name in ("x", "s", "z"))
         places = np.zeros(count, np.int64)
         for point in range(count):
@@ -477,7 +483,7 @@ class Methods:
 
     @staticmethod
     def _from_cones(program: FullMatrices, x: Array, friction: float, count: int) -> Array | None:
-        """The minimum that the own method proposes."""
+        """Return the minimum that the own method proposes."""
         kept = rows_without_pyramids(count, len(program.inequality.bound))
         g, h = program.inequality.matrix[kept], program.inequality.bound[kept]
         forces = x[len(x) - 3 * count :].reshape(-1, 3)

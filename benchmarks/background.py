@@ -1,4 +1,4 @@
-"""What a block in the background costs the control thread, and how many ticks are late beside it.
+"""Cost of a block in the background to the control thread, and the late ticks beside it.
 
 The graph is the whole jump's in real time, without the score that would end it; so the control thread
 has its real work. Runs with and without a block that computes two thirds of the time take turns.
@@ -26,7 +26,7 @@ PERIOD = 0.06
 
 
 class Values(Signal):
-    """As many numbers as a plan's knots may take."""
+    """A signal of as many numbers as a plan's knots may take."""
 
     value = Field(200, text="numbers")
 
@@ -52,7 +52,7 @@ class Busy(Block):
 
 
 def with_busy_block(graph: CheckedGraph) -> CheckedGraph:
-    """The graph, and beside it a block in the background that nothing reads."""
+    """Add a block in the background that nothing reads."""
     runs = round(PERIOD * graph.base_rate)
     kind = background_block_type(Busy, Background(1, late="hold"))
     busy = BlockSpec("busy", kind, Busy.Params(), {}, {}, runs)
@@ -60,7 +60,7 @@ def with_busy_block(graph: CheckedGraph) -> CheckedGraph:
 
 
 def background(seconds: float = 10.0, rounds: int = 3) -> list[Row]:
-    """The rows.
+    """Measure and return the rows.
 
     Args:
         seconds: how long each run in real time is.

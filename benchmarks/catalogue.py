@@ -78,7 +78,7 @@ LONG = (
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
     "mutated_robots",
 )  # fmt: skip
-"""Those that take minutes or hours and run only where they are named."""
+"""Names of the benchmarks that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
     "seconds": ("recorder", "background", "export"),
     "count": ("agreement", "jumps", "export", "online_plans", "mutated_robots"),
@@ -142,7 +142,7 @@ def run_benchmarks(
 
 
 def _load() -> list[float] | None:
-    """The load averages over 1, 5 and 15 minutes, where the system tells."""
+    """Return the load averages over 1, 5 and 15 minutes, where the system tells."""
     return [round(x, 2) for x in os.getloadavg()] if hasattr(os, "getloadavg") else None
 
 

@@ -18,7 +18,7 @@ from .courses import SENSOR, failures, run_seed
 from .rows import Row
 
 SEEDS = range(34000, 34020)
-"""Of robots and targets; nothing is tuned on them."""
+"""Seeds of the robots and targets; nothing is tuned on them."""
 PLACE_GOAL, TURN_GOAL = 0.03, 5.0
 """m, deg"""
 MISSED_GOAL = 0.05
@@ -57,26 +57,26 @@ def _changes(target: Command, at: float) -> Command:
 
 
 def place_changes(rng: np.random.Generator) -> list[Command]:
-    """The place moves by up to 10 cm before lift-off."""
+    """Draw moves of the place by up to 10 cm before lift-off."""
     first = _target(rng)
     return [first, _changes(_beside(rng, first, 0.1, 0.0), LIFT_OFF - rng.uniform(*BEFORE))]
 
 
 def turn_changes(rng: np.random.Generator) -> list[Command]:
-    """The heading changes by up to 30 degrees before lift-off."""
+    """Draw changes of the heading by up to 30 degrees before lift-off."""
     first = _target(rng)
     return [first, _changes(_beside(rng, first, 0.0, 30.0), LIFT_OFF - rng.uniform(*BEFORE))]
 
 
 def height_changes(rng: np.random.Generator) -> list[Command]:
-    """The ground turns out to be up to 3 cm higher or lower, before lift-off."""
+    """Draw a ground that turns out to be up to 3 cm higher or lower, before lift-off."""
     first = {"ahead": round(rng.uniform(0.16, 0.26), 4)}
     up = round(rng.uniform(-0.03, 0.03), 4)
     return [first, _changes({**first, "up": up}, LIFT_OFF - rng.uniform(*BEFORE))]
 
 
 def flight_changes(rng: np.random.Generator) -> list[Command]:
-    """The place moves by up to 6 cm and the heading by up to 20 degrees in flight."""
+    """Draw changes in flight: of the place by up to 6 cm, and of the heading by up to 20 degrees."""
     first = _target(rng)
     return [first, _changes(_beside(rng, first, 0.06, 20.0), LIFT_OFF + rng.uniform(*FLYING))]
 
@@ -124,7 +124,7 @@ def changed_targets(seeds: Sequence[int] = SEEDS, kinds: Sequence[str] = tuple(K
 
 
 def landed(metrics: Mapping[str, Any]) -> bool:
-    """Whether a jump stands and is within the goals of its place and heading."""
+    """Tell whether a jump stands and is within the goals of its place and heading."""
     return (
         metrics.get("jumps") == 1
         and not str(metrics["reason"]).startswith("fell")
@@ -134,7 +134,8 @@ def landed(metrics: Mapping[str, Any]) -> bool:
 
 
 def run_changed(kind: str, seed: int, more: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The metrics of a jump whose target changes; ``more`` overrides what the graph says."""
+    """Run a jump whose target changes and return its metrics; ``more`` overrides what the graph
+    says."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
     commands = KINDS[kind](rng)
     sets: dict[str, Any] = {"commands.commands": commands, "score.jumps": 1, "duration": 6.0}
@@ -144,7 +145,7 @@ def run_changed(kind: str, seed: int, more: Mapping[str, Any] | None = None) -> 
 
 
 def two_levels(ahead: float, up: float) -> dict[str, Any]:
-    """A scene in which the ground is higher from the middle of the way on."""
+    """Return a scene in which the ground is higher from the middle of the way on."""
     edge, floor = 0.5 * ahead, min(0.0, up) - DEPTH
     boxes = [
         {"x": (-0.5, round(edge - 0.001, 4)), "y": (-0.5, 0.5), "top": 0.0, "bottom": floor},

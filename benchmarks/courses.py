@@ -18,9 +18,9 @@ from ..studies.summary import wilson_interval
 from .rows import Row
 
 SEEDS = range(31700, 31720)
-"""Of courses and robots; nothing is tuned on them."""
+"""Seeds of the courses and robots; nothing is tuned on them."""
 PUSHED_SEEDS = range(31900, 31920)
-"""Of courses with a push, the same."""
+"""Seeds of the courses with a push; nothing is tuned on them."""
 PUSH = 0.4
 """N s on the torso's centre of mass, 0.03 s after a lift-off"""
 SENSOR = "controllers/motion_capture.yaml"
@@ -38,7 +38,7 @@ LONGEST = 40.0
 
 
 def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:
-    """The commands of a seed; the same on every machine."""
+    """Draw the commands of a seed; they are the same on every machine."""
     rng = np.random.default_rng(seed)
     commands = []
     for _ in range(jumps):
@@ -107,7 +107,7 @@ def pushed_courses(seeds: Sequence[int] = PUSHED_SEEDS) -> list[Row]:
 
 
 def run_pushed(seed: int) -> dict[str, Any]:
-    """The metrics of a course with a push."""
+    """Run a course with a push and return its metrics."""
     rng = np.random.default_rng([seed, 1])
     flight, angle = int(rng.integers(1, JUMPS + 1)), float(rng.uniform(0.0, 2.0 * math.pi))
     push = {"push.force": PUSH / 0.01, "push.flight": flight, "push.angle": round(angle, 4)}
@@ -115,12 +115,12 @@ def run_pushed(seed: int) -> dict[str, Any]:
 
 
 def failures(found: Sequence[Mapping[str, Any]]) -> str:
-    """The seeds that are no success, and why."""
+    """List the seeds that are no success, with the reasons."""
     return "; ".join(f"seed {one['seed']}: {one['reason']}" for one in found if not one["success"])
 
 
 def fell(metrics: Mapping[str, Any]) -> bool:
-    """Whether a course ended with a fall."""
+    """Tell whether a course ended with a fall."""
     return str(metrics["reason"]).startswith("fell")
 
 
@@ -128,8 +128,8 @@ def run_course(
     seed: int, more: Mapping[str, Any] | None = None, behind: Sequence[str] = (SENSOR,),
     graph: str = "steer.yaml",
 ) -> dict[str, Any]:  # fmt: skip
-    """The metrics of a course, with its ``seed``; ``more`` overrides what the graph says, and the files
-    ``behind`` are included behind it."""
+    """Run a course and return its metrics, with its ``seed``; ``more`` overrides what the graph
+    says, and the files ``behind`` are included behind it."""
     return run_seed(
         seed, graph, behind, {"commands.commands": course(seed), "duration": LONGEST, **(more or {})},
     )  # fmt: skip
@@ -138,7 +138,8 @@ def run_course(
 def run_seed(
     seed: int, graph: str, behind: Sequence[str], sets: Mapping[str, Any], *, sensor: bool = True
 ) -> dict[str, Any]:
-    """The metrics of a run of a graph that steers, with its ``seed``, in the robust trial; ``sensor``: it has one of the place."""
+    """Run a graph that steers in the robust trial and return its metrics, with its ``seed``;
+    ``sensor``: it has one of the place."""
     graphs = shipped_folder()
     seeds = {"robot.seed": seed, "capture.seed": seed} if sensor else {"robot.seed": seed}
     found = load_cell(

@@ -42,14 +42,14 @@ GOAL = 300.0
 core, and with 0.5 ms on the wire within the period."""
 BARE = "bare write and read"
 RECORDED = 64
-"""How many answers there are; they come again and again."""
+"""Number of recorded answers; they come again and again."""
 NOISE = 0.02
-"""Of the gyroscope [rad/s]: an IMU whose numbers never change counts as frozen."""
+"""Noise of the gyroscope [rad/s]: an IMU whose numbers never change counts as frozen."""
 
 
 @dataclass
 class Talk:
-    """What a driver's cycles in the phase DRIVING send and receive."""
+    """Bytes that a driver sends and receives in its cycles in the phase DRIVING."""
 
     request: bytes
     """The instruction of the last cycle."""
@@ -80,7 +80,7 @@ class _RecordingBoard(VirtualBoardPort):
 
 
 def recorded() -> tuple[Driver, Talk]:
-    """A driver of BRUCE whose drives are on and follow a command, and what it says and hears."""
+    """Return a driver of BRUCE whose drives are on and follow a command, and its recorded talk."""
     robot = find_robot("bruce")
     hardware = Hardware.for_twin(robot)
     twin = standing_twin(robot, SimulatorParameters(gyro_noise=NOISE), hardware)
@@ -119,7 +119,7 @@ def far_end(talk: Talk) -> Iterator[tuple[str, str]]:
 
 
 def answer() -> None:
-    """The other process: answers until its standard input ends."""
+    """Answer until the standard input ends, in the other process."""
     said = json.loads(sys.stdin.readline())
     answers = [bytes.fromhex(each) for each in said["answers"]]
     packets = [bytes.fromhex(each) for each in said["packets"]]
@@ -141,8 +141,8 @@ def answer() -> None:
 
 
 def driver(rounds: int = 60, repetitions: int = 50) -> list[Row]:
-    """A cycle of the driver, and its exchange alone, beside a bare write and read; and the processor
-    time of a cycle."""
+    """Time a cycle of the driver, and its exchange alone, beside a bare write and read; and the
+    processor time of a cycle."""
     made, talk = recorded()
     loop = made.loop
     with far_end(talk) as (bus_path, board_path):
@@ -191,7 +191,8 @@ def driver(rounds: int = 60, repetitions: int = 50) -> list[Row]:
 
 
 def _bare(bus: int, board: int, talk: Talk) -> Callable[[], None]:
-    """Writes an instruction and reads the answers and the packet, and nothing else."""
+    """Return a call that writes an instruction, reads the answers and the packet, and does nothing
+    else."""
     request, size, packet = talk.request, len(talk.answers[0]), len(talk.packets[0])
 
     def exchange() -> None:

@@ -22,7 +22,8 @@ SETTINGS = ("push.speed_change=0 m/s",)
 
 
 def every_robot() -> list[Row]:
-    """A row for every file: its joints, or none where it is refused, and what became of it.
+    """Read every file and return a row for each: its joints, or none where it is refused, and the
+    outcome.
 
     A robot with feet that floats is put on the ground as a file without a YAML is read, and stands in the
     robust trial for 3.5 s or until the score has judged it. The time is the processor's for reading the file. The YAML that
@@ -55,7 +56,8 @@ def _row(path: Path, name: str) -> Row:
 
 
 def _import(path: Path) -> str:
-    """What is wrong with the YAML that importing a file writes; empty where it is read and shown."""
+    """Import a file and return the error of the YAML that this writes; empty where it is read and
+    shown."""
     with tempfile.TemporaryDirectory(prefix="aloft-import-") as folder:
         target = Path(folder) / "robot.yaml"
         target.write_text(new_yaml(path, target)[0], encoding="utf-8")
@@ -67,7 +69,7 @@ def _import(path: Path) -> str:
 
 
 def _standing(found: ReadRobot) -> str:
-    """How a robot stands, or why it does not."""
+    """Make a robot stand and return the verdict with its reason."""
     robot = found.description
     if robot.base_joint != "floating":
         return f"read: {robot.base_joint} base"

@@ -81,7 +81,7 @@ def export(
     seconds: float = 10.0,
     tsid: str = "",
 ) -> list[Row]:
-    """The rows.
+    """Measure and return the rows.
 
     Args:
         rounds: how often the jump is run again.
@@ -176,7 +176,7 @@ def _rows_in_c(
 
 
 def _in_c(description: Path, own: _Library, count: int, seconds: float) -> dict[str, Any]:
-    """What the program in C prints."""
+    """Run the program in C and return the figures that it prints."""
     folder, name = description.parent, own.library.about["name"]
     write_names(own.library.about, folder)
     (folder / "inputs").write_bytes(own.rows.tobytes())

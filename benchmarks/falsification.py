@@ -1,4 +1,5 @@
-"""What a run of `aloft falsify` costs: whole, and from where it first differs from the run that all draws share."""
+"""Cost of a run of `aloft falsify`: whole, and from the tick where it first differs from the run
+that all draws share."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ RUNS, MINUTES, CORES = 5000, 15.0, 2
 
 
 def falsification(rounds: int = 20) -> list[Row]:
-    """The rows: processor time of draws by chance of the worst push, each made in both ways in turn.
+    """Measure the processor time of random draws of the worst push, each made in both ways in turn.
 
     Raises:
         AloftError: a run has other bytes than the whole one.

@@ -1,4 +1,4 @@
-"""How far BRUCE's jumps reach in every direction, and how far its motors could take it."""
+"""Reach of BRUCE's jumps in every direction, beside the reach that its motors allow."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def frontier(
 
 
 def row_of(found: dict[str, Any]) -> Row:
-    """A direction's row: what is reached, its ratio to the theory, and what ends it."""
+    """Return a direction's row: the reach, its ratio to the theory, and the limit that ends it."""
     note = f"planned {found['planned']:g}, theory {found['theory']:g}"
     note += f" ({found['binds']})" if found["binds"] else ""
     if found["runs"]:

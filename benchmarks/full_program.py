@@ -78,7 +78,7 @@ class FullProgram:
         )
 
     def assemble(self, active: Indices) -> FullMatrices:
-        """The program for the points ``active`` in stance."""
+        """Assemble the program for the points ``active`` in stance."""
         program, rows, model = self.matrices[len(active)], self.data.tasks, self.data.terms
         w, motors, n = self.data.weights, self.data.motors, self._n
         joints = n - 6
@@ -112,7 +112,7 @@ class FullProgram:
         return program
 
     def torque(self, x: Array, active: Indices) -> Array:
-        """The joint torques of x = [a; f]."""
+        """Compute the joint torques of x = [a; f]."""
         n = self._n
         return joint_torque(self.data.terms, x[:n], x[n:].reshape(-1, 3), active)
 
@@ -128,7 +128,7 @@ def joint_torque(
 
 
 def rows_without_pyramids(count: int, rows: int) -> Flags:
-    """Which of the inequalities are no sides of pyramids: bounds of the forces and of the torques."""
+    """Mark the inequalities that are no sides of pyramids: bounds of the forces and of the torques."""
     kept = np.ones(rows, np.bool_)
     for point in range(count):
         kept[PYRAMID_ROWS * point : PYRAMID_ROWS * point + 4] = False

@@ -74,13 +74,14 @@ Case = Callable[[int], object]
 
 
 def executor(name: str) -> Executor:
-    """The chain, ready to start: with times and the check for finite values, as every run has."""
+    """Return the chain, ready to start: with times and the check for finite values, as every run
+    has."""
     graph = load_text(chain(COUNT, BLOCKS[name], SOURCE), Path("chain.yaml"))
     return Executor(graph, log=False, run_hash=False)
 
 
 def calls_in_c(name: str, library: Path) -> tuple[Case, NDArray[np.float64]]:
-    """The chain in a library of ``C_SOURCE``, and its signals."""
+    """Return the chain in a library of ``C_SOURCE``, and its signals."""
     functions = ctypes.CDLL(str(library))
     functions.build()
     run, step = functions.run, getattr(functions, name)
@@ -90,7 +91,7 @@ def calls_in_c(name: str, library: Path) -> tuple[Case, NDArray[np.float64]]:
 
 
 def general_blocks(rounds: int = 40) -> list[Row]:
-    """The rows.
+    """Measure and return the rows.
 
     Raises:
         AssertionError: a chain computes other bits than the calls in C.

@@ -16,7 +16,7 @@ from .courses import failures, fell, run_seed
 from .rows import Row
 
 SEEDS = range(34100, 34120)
-"""Of robots and speeds; nothing is tuned on them."""
+"""Seeds of the robots and speeds; nothing is tuned on them."""
 HOPS = 30
 HOP_TIME = 0.512
 """s"""
@@ -28,7 +28,7 @@ LASTS = (3, 6)
 
 
 def speeds(seed: int, fastest: float = FASTEST) -> list[dict[str, float]]:
-    """The commands of a seed."""
+    """Draw the commands of a seed."""
     rng = np.random.default_rng(seed)
     found, hops = [], 0
     while hops < HOPS:
@@ -60,6 +60,7 @@ def hopping_on(seeds: Sequence[int] = SEEDS) -> list[Row]:
 def run_hops(
     seed: int, told: Sequence[Mapping[str, float]], more: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """The metrics of a row of hops at these speeds; ``more`` overrides what the graph says."""
+    """Run a row of hops at these speeds and return its metrics; ``more`` overrides what the graph
+    says."""
     sets = {"speed.twists": list(told), **(more or {})}
     return run_seed(seed, "hop_on.yaml", (), sets, sensor=False)

@@ -1,4 +1,4 @@
-"""How long a large graph takes to load, and whether that time grows in proportion to its blocks."""
+"""Load time of a large graph, and its growth with the number of blocks."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ def chain(
     block: str = "use: blocks.Gain, with: {gain: 1.01}",
     source: str = "use: blocks.SineWave, with: {amplitude: 1.0}",
 ) -> str:
-    """A graph file of ``count`` blocks, one behind another: ``g1``, ``g2``, ...; ``g0`` is the source."""
+    """Return a graph file of ``count`` blocks, one behind another: ``g1``, ``g2``, ...; ``g0`` is
+    the source."""
     lines = ["rate: 100 Hz", "blocks:", f"  g0: {{{source}}}"]
     lines += [f"  g{k}: {{{block}, in: {{u: g{k - 1}.y}}}}" for k in range(1, count + 1)]
     return "\n".join(lines) + "\n"
 
 
 def loading(rounds: int = 5) -> list[Row]:
-    """The rows: processor time in which two chains load, the least of ``rounds``."""
+    """Measure the processor time in which two chains load, the least of ``rounds``."""
     few, many = chain(FEW), chain(MANY)
     load_text(chain(1), "chain.yaml")  # imports the blocks
     times: dict[str, list[float]] = {"few": [], "many": [], "yaml": []}

@@ -1,4 +1,5 @@
-"""What people and converters make wrong in the file of a robot: seeded changes of its bytes or its elements.
+"""Mistakes that people and converters make in the file of a robot: seeded changes of its bytes or
+its elements.
 
 An element lost, doubled or renamed, a number that is none, a unit that is another, a file that is cut. ``URDF`` and
 ``MJCF`` hold the same kinds of mistakes, as far as both formats can have them.
@@ -16,7 +17,7 @@ Change = Callable[[random.Random, bytes], bytes | None]
 
 
 def tree(change: Callable[[random.Random, ET.Element], bool]) -> Change:
-    """A change of the elements; false where there is nothing to change."""
+    """Wrap a change of the elements; it returns false where there is nothing to change."""
 
     def changed(draw: random.Random, data: bytes) -> bytes | None:
         root = ET.fromstring(data)
@@ -31,7 +32,7 @@ def pick(draw: random.Random, root: ET.Element, path: str) -> ET.Element | None:
 
 
 def lose(*paths: str) -> Change:
-    """An element is lost."""
+    """Return a change that loses an element."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         owners = [
@@ -47,7 +48,7 @@ def lose(*paths: str) -> Change:
 
 
 def double(path: str) -> Change:
-    """An element is there twice."""
+    """Return a change that doubles an element."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         each = pick(draw, root, path)
@@ -59,7 +60,7 @@ def double(path: str) -> Change:
 
 
 def set_to(path: str, attribute: str, new: Callable[[random.Random, str], str]) -> Change:
-    """An attribute has another value."""
+    """Return a change that sets an attribute to another value."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         with_it = [each for each in root.findall(path) if attribute in each.attrib]
@@ -97,7 +98,7 @@ def misspelt(draw: random.Random, text: str) -> str:
 
 
 def misspell_tag(*paths: str) -> Change:
-    """The name of an element is misspelt."""
+    """Return a change that misspells the name of an element."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         each = draw.choice([e for path in paths for e in root.findall(path)])
@@ -109,7 +110,7 @@ def misspell_tag(*paths: str) -> Change:
 
 
 def misspell_attribute(*paths: str) -> Change:
-    """The name of an attribute is misspelt."""
+    """Return a change that misspells the name of an attribute."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         each = draw.choice([e for path in paths for e in root.findall(path) if e.attrib])
@@ -226,7 +227,7 @@ URDF: dict[str, Change] = {
         "link/visual/geometry/mesh", "filename", lambda _, text: f"{text}.old"
     ),
 }
-"""What is made wrong, by what it is called."""
+"""Changes of a URDF file, each by the name of the mistake."""
 
 
 def _swap_range(draw: random.Random, root: ET.Element) -> bool:
@@ -240,7 +241,7 @@ def _swap_range(draw: random.Random, root: ET.Element) -> bool:
 
 
 def _double_beside(tag: str) -> Change:
-    """An element of a kind is there twice, one beside the other."""
+    """Return a change that doubles an element of a kind, one beside the other."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         pairs = [(owner, each) for owner in root.iter() for each in owner.findall(tag)]
@@ -316,4 +317,4 @@ MJCF: dict[str, Change] = {
     "a negative effort": set_to("actuator/*", "forcerange", lambda _, text: "1 -1"),
     "a loop is closed": tree(_close_loop),
 }  # fmt: skip
-"""Those of an MJCF file as MuJoCo writes it, by what they are called."""
+"""Changes of an MJCF file as MuJoCo writes it, each by the name of the mistake."""

@@ -1,4 +1,5 @@
-"""What people make wrong in a description in YAML: seeded changes of its bytes or its values, of the kinds of ``mistakes``."""
+"""Mistakes that people make in a description in YAML: seeded changes of its bytes or its values, of
+the kinds of ``mistakes``."""
 
 from __future__ import annotations
 
@@ -12,14 +13,14 @@ from .mistakes import WORDS, Change, cut, insert, lose_byte, misspelt
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-"""Those in C take a tenth of the time."""
+"""The fastest YAML writer: the one in C takes a tenth of the time."""
 Data = dict[str, Any]
 Holder = tuple[Any, Any]
 """A mapping or list, and the key or index of one of its values."""
 
 
 def _data(change: Callable[[random.Random, Data], bool]) -> Change:
-    """A change of the values; false where there is nothing to change."""
+    """Wrap a change of the values; it returns false where there is nothing to change."""
 
     def changed(draw: random.Random, text: bytes) -> bytes | None:
         data = yaml.load(text, LOADER)
@@ -29,7 +30,7 @@ def _data(change: Callable[[random.Random, Data], bool]) -> Change:
 
 
 def as_yaml(data: Data) -> bytes:
-    """The text of a description's plain data."""
+    """Write a description's plain data as text."""
     text: str = yaml.dump(
         data, Dumper=DUMPER, sort_keys=False, default_flow_style=None, allow_unicode=True
     )
@@ -37,7 +38,7 @@ def as_yaml(data: Data) -> bytes:
 
 
 def _at(data: Any, path: tuple[Any, ...]) -> Iterator[Holder]:
-    """What holds the values at a path, in which ``*`` is every key or index."""
+    """Yield the holders of the values at a path, in which ``*`` is every key or index."""
     keys: list[Any] = []
     if isinstance(data, dict):
         keys = [*data] if path[0] == "*" else [path[0]] if path[0] in data else []
@@ -97,7 +98,7 @@ def _lose(*path: Any) -> Change:
 
 
 def _double(key: str) -> Change:
-    """An entry of a list is there twice."""
+    """Return a change that doubles an entry of a list."""
 
     def change(draw: random.Random, data: Data) -> bool:
         if not data.get(key):
@@ -185,4 +186,4 @@ YAML: dict[str, Change] = {
         "looks", "*", "meshes", "*", "file", new=lambda _, text: f"{text}.old"
     ),
 }
-"""What is made wrong, by what it is called."""
+"""Changes of a description in YAML, each by the name of the mistake."""

@@ -53,7 +53,7 @@ class Format:
 
 
 def formats() -> dict[str, Format]:
-    """The formats by name; none without the package of robots."""
+    """Return the formats by name; none without the package of robots."""
     paths = [path for name in FILES if (path := find_file(PACKAGE + name, Path())) is not None]
     if not paths:
         return {}
@@ -68,7 +68,7 @@ def formats() -> dict[str, Format]:
 
 
 def _as_mjcf(robot: RobotDescription) -> bytes:
-    """The robot as MuJoCo writes it, with its torques as force ranges."""
+    """Write the robot as MuJoCo does, with its torques as force ranges."""
     spec = mujoco_spec(robot)
     motors = robot.motors.peak_torque @ abs(robot.joint_to_motor)
     for actuator, most in zip(spec.actuators, motors.tolist(), strict=False):
@@ -83,7 +83,8 @@ def _as_yaml(robot: RobotDescription) -> bytes:
 
 
 def mutated_robots(count: int = 500, seed: int = 9000) -> list[Row]:
-    """A row for each kind of mistake in each format: how often it was tried, and what became of it.
+    """Measure a row for each kind of mistake in each format: the number of its cases, and their
+    outcomes.
 
     Args:
         count: the cases of all kinds together, in each format.
@@ -112,7 +113,8 @@ def mutated_robots(count: int = 500, seed: int = 9000) -> list[Row]:
 def _tried(
     name: str, tried: Format, count: int, seed: int, examples: dict[str, str]
 ) -> dict[str, Counter[str]]:
-    """What became of the cases of a format, by kind of mistake; the first of each is written to ``examples``."""
+    """Count the outcomes of the cases of a format, by kind of mistake; the first of each is written
+    to ``examples``."""
     found: dict[str, Counter[str]] = {kind: Counter() for kind in tried.mistakes}
     kinds, files = list(tried.mistakes), list(tried.files)
     with tempfile.TemporaryDirectory(prefix="aloft-mutated-") as folder:
@@ -142,12 +144,13 @@ def _counted(counter: Counter[str]) -> str:
 
 
 def _said(path: Path) -> frozenset[str]:
-    """What is said of a file that is read."""
+    """Read a file and return the remarks on it."""
     return frozenset(_said_of(read(path)))
 
 
 def _said_of(found: ReadRobot) -> set[str]:
-    """Notes of the import, remarks of the check-up, and meshes that are not there."""
+    """Collect the notes of the import, the remarks of the check-up, and the meshes that are
+    missing."""
     try:
         remarks = [
             f"{each['part']}: {each['found']}" for each in check_up(found.description)["remarks"]
@@ -158,7 +161,7 @@ def _said_of(found: ReadRobot) -> set[str]:
 
 
 def _outcome(path: Path, data: bytes, usual: frozenset[str]) -> tuple[str, str]:
-    """What becomes of a file, and what is said of it."""
+    """Return the outcome of reading a file, and the remark that decided it."""
     _write(path, data)
     try:
         found = read(path)

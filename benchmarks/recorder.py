@@ -44,7 +44,7 @@ PACKED_TICKS, PACKED_BATCH = 1500, 256
 
 
 def recorder(seconds: float = 60.0, rounds: int = 30) -> list[Row]:
-    """The rows.
+    """Measure and return the rows.
 
     Args:
         seconds: how long the run in real time is.
@@ -60,7 +60,7 @@ def recorder(seconds: float = 60.0, rounds: int = 30) -> list[Row]:
 
 
 def endless_jump() -> CheckedGraph:
-    """The graph of the jump without the block that ends it."""
+    """Return the graph of the jump without the block that ends it."""
     graph = load(GRAPH).checked
     blocks = tuple(spec for spec in graph.blocks if spec.path != "score")
     order = tuple(path for path in graph.order if path != "score")
@@ -68,7 +68,7 @@ def endless_jump() -> CheckedGraph:
 
 
 def cost(graph: CheckedGraph, folder: Path, rounds: int) -> list[Row]:
-    """What one call of the recorder takes, with and without a keyframe, and a bare copy."""
+    """Measure one call of the recorder, with and without a keyframe, and a bare copy."""
     bound = BoundGraph(graph)
     sink = Recorder(folder / "cost.rrd", keyframe_period=0.0, when_full="drop")
     with_keyframes = Recorder(
@@ -113,7 +113,7 @@ def _median(
     rest: Callable[[], object] = lambda: None,
     burst: int = BURST,
 ) -> float:
-    """The median over rounds of the microseconds a call takes, ``rest`` after each round."""
+    """Return the median over rounds of the microseconds a call takes, ``rest`` after each round."""
     found = []
     for _ in range(rounds):
         began = time.perf_counter_ns()
@@ -155,7 +155,7 @@ def packing(graph: CheckedGraph) -> list[Row]:
 def _packed(
     write: Callable[[NDArray[np.uint8]], bytes], batches: Sequence[NDArray[np.uint8]]
 ) -> tuple[float, float]:
-    """The megabytes of all batches, and the median of the microseconds a tick."""
+    """Write all batches and return their megabytes, and the median of the microseconds a tick."""
     costs, size = [], 0
     for _ in range(3):
         began = time.process_time()
@@ -165,7 +165,7 @@ def _packed(
 
 
 def _columns(rows: NDArray[np.uint8]) -> Any:
-    """The rows as a table with a column for each number."""
+    """Return the rows as a table with a column for each number."""
     import pyarrow as pa
 
     numbers = np.ascontiguousarray(rows).view(np.float64)
@@ -229,7 +229,7 @@ class _MemoryWatch:
 
 
 def paced(graph: CheckedGraph, folder: Path, duration: float) -> list[Row]:
-    """A run in real time: rows that were dropped, bytes a minute, memory."""
+    """Measure a run in real time: rows that were dropped, bytes a minute, memory."""
     sink = Recorder(folder / "paced.rrd")
     watch = _MemoryWatch(sink)
     executor = Executor(graph, clock=ClockSpec("paced"), sinks=[sink, watch], log=False)

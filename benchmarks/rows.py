@@ -36,12 +36,12 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the goal is reached."""
+        """True if the goal is reached, ``None`` without a goal."""
         measured = self.ratio if self.peer else self.value
         return None if self.goal is None or measured is None else measured <= self.goal
 
     def to_json(self) -> dict[str, Any]:
-        """The row as plain data."""
+        """Return the row as plain data."""
         return {**asdict(self), "met": self.met}
 
 
@@ -76,7 +76,7 @@ def compare(
     floor: float | None = None,
     note: str = "",
 ) -> Row:
-    """The row of a case: median time, and the median ratio to the peer of the same round."""
+    """Return the row of a case: median time, and the median ratio to the peer of the same round."""
     ratios = times[name] / times[peer]
     p10, p50, p90 = (float(value) for value in np.percentile(ratios, (10, 50, 90)))
     value = float(np.median(times[name]))
@@ -105,7 +105,7 @@ class OtherProcess:
 
 @contextmanager
 def other_process(code: str) -> Iterator[OtherProcess]:
-    """A process that runs Python code, and is killed in the end."""
+    """Start a process that runs Python code, and kill it in the end."""
     command = [sys.executable, "-c", code]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -40,7 +40,7 @@ class Filter(Block):
     x = State(Vector, text="the last output")
 
     def setup(self) -> None:
-        """Views and scratch."""
+        """Make views and scratch memory."""
         self._u, self._y, self._x = self.u.value, self.y.value, self.x.value
         self._half_x = np.zeros(WIDTH)
 
@@ -65,7 +65,7 @@ class PlainFilter(Filter):
 
 
 def chain_graph(block_type: type[Block]) -> CheckedGraph:
-    """The chain as a graph."""
+    """Return the chain as a graph."""
     specs = []
     for i in range(COUNT):
         wires = {"u": Wire(f"b{i - 1}.y", f"b{i}.u")} if i else {}
@@ -74,7 +74,7 @@ def chain_graph(block_type: type[Block]) -> CheckedGraph:
 
 
 def hand_loop() -> tuple[Callable[[int], None], list[NDArray[np.float64]]]:
-    """The chain as a loop over 20 closures with preallocated arrays, and their outputs."""
+    """Return the chain as a loop over 20 closures with preallocated arrays, and their outputs."""
 
     def closure(
         u: NDArray[np.float64],
@@ -114,7 +114,7 @@ Chain = tuple[Case, Callable[[], list[NDArray[np.float64]]]]
 
 
 def drake_chain() -> Chain:
-    """A diagram of 20 LeafSystems, one ``AdvanceTo`` a tick, as with hardware in the loop."""
+    """Return a diagram of 20 LeafSystems, one ``AdvanceTo`` a tick, as with hardware in the loop."""
     from pydrake.systems.analysis import Simulator
     from pydrake.systems.framework import DiagramBuilder, LeafSystem
     from pydrake.systems.primitives import ConstantVectorSource
@@ -164,7 +164,8 @@ def drake_chain() -> Chain:
 
 
 def bdsim_chain() -> Chain:
-    """A block diagram of 20 SampledBlocks; every call is a whole ``run``, the only way it has."""
+    """Return a block diagram of 20 SampledBlocks; every call is a whole ``run``, the only way it
+    has."""
     import bdsim
 
     class Filter(bdsim.block.SampledBlock):  # type: ignore[misc, name-defined, unused-ignore]  # bdsim may be missing
@@ -216,7 +217,7 @@ PEERS: dict[str, Callable[[], Chain]] = {
 def peer_chains(
     expected: Sequence[NDArray[np.float64]], ticks: int
 ) -> tuple[dict[str, Case], dict[str, str]]:
-    """The installed peers' cases by name, and why the others have none.
+    """Return the installed peers' cases by name, and the reasons why the others have none.
 
     Raises:
         AssertionError: a peer's chain differs from ``expected`` after ``ticks``: no fair peer.
@@ -252,7 +253,7 @@ def _ticker(block_type: type[Block], *, checks: bool) -> Ticker:
 
 
 def scheduler(rounds: int = 60) -> list[Row]:
-    """The rows; ``rounds`` of 200 ticks for every case.
+    """Measure ``rounds`` of 200 ticks for every case.
 
     Raises:
         AssertionError: some case's outputs differ in any bit from the hand-written loop's.
@@ -314,7 +315,7 @@ def _assert_same(cases: dict[str, Case], expected: list[Any], tickers: tuple[Tic
 
 
 def _allocations(ticker: Ticker) -> Row:
-    """The number of arrays that NumPy allocates in a tick, with all features on."""
+    """Count the arrays that NumPy allocates in a tick, with all features on."""
     ticks = 2000
     with count_array_allocations() as counted:
         ticker.advance(ticks)

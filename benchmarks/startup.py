@@ -1,4 +1,4 @@
-"""How soon the command line answers: a check, the first tick of a jump, and the very first run."""
+"""Start-up time of the command line: a check, the first tick of a jump, and the very first run."""
 
 from __future__ import annotations
 
@@ -79,7 +79,8 @@ CHECK_GOAL, WARM_GOAL, COLD_GOAL = 0.5, 1.5, 20.0
 
 
 def startup(repeats: int = 5, first: bool = True) -> list[Row]:
-    """The rows: each the least of ``repeats`` processes, but for the ``first`` run, which is one.
+    """Measure the start-up times: each the least of ``repeats`` processes, but for the ``first``
+    run, which is one.
 
     The first run finds an empty cache: it compiles all kernels, on all processors, and checks the plan
     and makes its table besides.

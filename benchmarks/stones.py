@@ -17,11 +17,11 @@ from .courses import JUMPS, LONGEST, failures, fell, run_seed
 from .rows import Row
 
 SEEDS = range(31800, 31820)
-"""Of stones and robots; nothing is tuned on them."""
+"""Seeds of the stones and robots; nothing is tuned on them."""
 MISSED_GOAL = 0.1
 """The largest good share of courses that do not come to the last stone."""
 LEVEL, STEPPED = 0.0, 0.05
-"""How much higher or lower than the one before a stone may be [m]."""
+"""Largest difference in height between a stone and the one before [m]."""
 KINDS = (
     ("stones, 5 cm up or down", STEPPED, True),
     ("level stones", LEVEL, True),
@@ -49,14 +49,14 @@ def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
 
 
 STAIRS_SEEDS = range(32200, 32220)
-"""Of robots on the staircase; nothing is tuned on them."""
+"""Seeds of the robots on the staircase; nothing is tuned on them."""
 STEPS = 6
 STAIRCASE = [
     {"x": round(0.2 * step, 3), "top": round(0.04 * step, 3)} for step in range(1, STEPS + 1)
 ]
 """m"""
 GO2_STAIRS_SEEDS = range(33600, 33620)
-"""Of Go2 on its staircase (``graphs/robots/go2_stairs.yaml``), the same."""
+"""Seeds of Go2 on its staircase (``graphs/robots/go2_stairs.yaml``); nothing is tuned on them."""
 GO2_STEPS = 7
 STEP = (0.198, 0.4)
 """m; 2 mm less than their distance, as stones do not touch."""
@@ -69,7 +69,7 @@ def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
 
 
 def go2_staircase(seeds: Sequence[int] = GO2_STAIRS_SEEDS) -> list[Row]:
-    """The same of Go2 on seven steps of 8 cm that hold all of its feet, each 50 cm deep."""
+    """Measure the same of Go2 on seven steps of 8 cm that hold all of its feet, each 50 cm deep."""
     found = [run_seed(seed, "robots/go2_stairs.yaml", (), {"duration": LONGEST}) for seed in seeds]
     return _rows_of_stairs("Go2's staircase", found, GO2_STEPS, "8 cm")
 
@@ -90,20 +90,21 @@ def _rows_of_stairs(
 
 
 def run_staircase(seed: int) -> dict[str, Any]:
-    """The metrics of a run up the staircase, with its ``seed``."""
+    """Run up the staircase and return the metrics, with the ``seed``."""
     sets = {"commands.stones": STAIRCASE, "commands.size": STEP, "duration": LONGEST}
     return run_seed(seed, "steer_stones.yaml", (), sets)
 
 
 def passed(metrics: dict[str, Any], jumps: int = JUMPS) -> bool:
-    """Whether it stood on every stone, and only toes and heels ever touched them."""
+    """Tell whether the robot stood on every stone, and only its toes and heels ever touched them."""
     return bool(
         metrics.get("jumps") == jumps and not fell(metrics) and metrics["forbidden_contacts"] == 0
     )
 
 
 def run_stones(seed: int, height: float, sensor: bool) -> dict[str, Any]:
-    """The metrics of a course of stones, with its ``seed``. Without the sensor all of its measurements are lost."""
+    """Run a course of stones and return its metrics, with its ``seed``. Without the sensor all of
+    its measurements are lost."""
     sets = {
         "commands.random": {"count": JUMPS, "seed": seed, "height": height}, "duration": LONGEST,
         "capture.dropout": 0.0 if sensor else 1.0,

@@ -27,9 +27,10 @@ _DRIVERS = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Checked:
-    """How many ticks, bytes of signals and bytes of state were compared, and where they first
-    differ; ``statuses`` counts what the steps returned beside zero. ``step_s`` is the median duration of
-    a step [s], with the call from Python; none where an emulator ran it."""
+    """Numbers of ticks, bytes of signals and bytes of state that were compared, and the first difference; ``statuses``
+    counts the non-zero return values of the steps. ``step_s`` is the median duration of a step [s], with the call from
+    Python; none where an emulator ran it.
+    """
 
     ticks: int
     signal_bytes: int
@@ -102,7 +103,7 @@ def _expect_fitting(about: Mapping[str, Any], run: RecordedRun) -> None:
 def input_rows(
     about: Mapping[str, Any], layout: Layout, rows: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """The struct of the inputs in every tick, (ticks, bytes), from the bus of each, (ticks, bus bytes)."""
+    """Return the struct of the inputs in every tick, (ticks, bytes), from the bus of each, (ticks, bus bytes)."""
     data = np.zeros((len(rows), about["input_bytes"]), np.uint8)
     targets = views(data, about["inputs"])
     for each in about["inputs"]:
@@ -113,7 +114,7 @@ def input_rows(
 def _run(
     description: Path, about: Mapping[str, Any], steps: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], float | None]:
-    """The memory of an instance after each step, (ticks, bytes), and the median duration of one."""
+    """Return the memory of an instance after each step, (ticks, bytes), and the median duration of one."""
     size = about["memory_bytes"]
     if about["target"] == "x86_64":
         library = Library(description)
@@ -139,7 +140,7 @@ def _run(
 
 
 def _program(description: Path, about: Mapping[str, Any], folder: Path) -> list[str]:
-    """The command that runs all steps on another processor."""
+    """Return the command that runs all steps on another processor."""
     target, name = TARGETS[about["target"]], about["name"]
     linker = target.linker()
     if not linker or not shutil.which(target.runner[0]):
@@ -185,7 +186,7 @@ def _first_difference(
     place: int,
     ticks: NDArray[np.int64],
 ) -> tuple[int, str] | None:
-    """The first tick in which a slot has other bytes than were recorded, and a text about it."""
+    """Return the first tick in which a slot has other bytes than were recorded, and a text about it."""
     first, end = layout.byte_range(name)
     own, kept = memories[:, place : place + end - first], rows[:, first:end]
     wrong = np.flatnonzero((own != kept).any(axis=1))

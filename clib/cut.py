@@ -43,7 +43,7 @@ class Terminal:
     frame: str | None = None
 
     def plain(self) -> dict[str, Any]:
-        """The terminal as plain data."""
+        """Return the terminal as plain data."""
         return asdict(self)
 
 
@@ -129,7 +129,7 @@ def cut(
 
 
 Read = dict[str, dict[str, "dict[str, None] | None"]]
-"""By block and port outside the fields that are read; ``None`` for all of them."""
+"""Fields that are read, by block and port outside; ``None`` for all of them."""
 
 
 def _read_from_outside(inside: Sequence[FlatBlock], specs: Mapping[str, BlockSpec]) -> Read:
@@ -150,8 +150,9 @@ def _read_from_outside(inside: Sequence[FlatBlock], specs: Mapping[str, BlockSpe
 
 
 def _input_names(flat: FlatGraph, part: str, read: Read, external: Iterable[str]) -> dict[str, str]:
-    """The name of each input of the FMU by its source: that of the sub-graph's input, if it has one
-    for it, else that of the source."""
+    """Return the name of each input of the FMU by its source: that of the sub-graph's input, if it has one for it, else
+    that of the source.
+    """
     names = {
         f"{block}.{port}": _structured(block if block in external else f"{block}.{port}")
         for block, ports in read.items()
@@ -218,18 +219,18 @@ def _terminals(
 
 
 def _has_elements(terminal: Terminal) -> bool:
-    """Whether there is anything in it; a robot without feet, say, has no switches."""
+    """Check whether a terminal has elements; a robot without feet, say, has no switches."""
     return prod(terminal.shape) > 0
 
 
 def _quantity(spec: BlockSpec, port: str, name: str) -> Quantity:
-    """The unit and frame of a field as the graph has settled them."""
+    """Return the unit and frame of a field as the graph has settled them."""
     field: Field = spec.block_type.outputs[port].signal.fields[name]
     return spec.quantities.get(f"{port}.{name}") or Quantity(field.unit, field.frame)
 
 
 def _unit_text(quantity: Quantity) -> str | None:
-    """The text of a unit, if it can be read back."""
+    """Return the text of a unit, if it can be read back."""
     if quantity.unit is None:
         return None
     for text in _USUAL:
@@ -245,7 +246,7 @@ def _unit_text(quantity: Quantity) -> str | None:
 def _outputs(
     flat: FlatGraph, part: str, graph: CheckedGraph, asked: Sequence[str], inside: Sequence[str]
 ) -> dict[str, str]:
-    """The outputs ``block.port`` by the names that they have in the FMU."""
+    """Return the outputs ``block.port`` by the names that they have in the FMU."""
     ports = [f"{s.path}.{port}" for s in graph.blocks for port in s.block_type.outputs]
     if asked:
         for name in asked:
@@ -271,7 +272,7 @@ def _outputs(
 def _read_by(
     robots: Iterable[str], specs: Mapping[str, BlockSpec], inside: Sequence[str]
 ) -> list[str]:
-    """The outputs inside that robots read, of blocks that act on no true state."""
+    """Return the outputs inside that robots read, of blocks that act on no true state."""
     wires = [wire for path in robots for wire in specs[path].wires.values()]
     return list(
         dict.fromkeys(
@@ -312,7 +313,7 @@ def _whole(name: str, wire: FlatWire, inside: Iterable[str]) -> str:
 def _depends(
     block: str, specs: Mapping[str, BlockSpec], inside: Iterable[str]
 ) -> Mapping[str, None]:
-    """The blocks on whose outputs of the same tick those of ``block`` depend."""
+    """Return the blocks on whose outputs of the same tick those of ``block`` depend."""
     own = dict.fromkeys(inside)
     found: dict[str, None] = {}
     pending = [block]
@@ -332,7 +333,7 @@ def _block_of(source: str) -> str:
 
 
 def _structured(name: str) -> str:
-    """A name as FMI's structured naming has it."""
+    """Return a name as FMI's structured naming has it."""
     return name.replace("/", ".")
 
 
@@ -347,7 +348,7 @@ def _check_names(terminals: Iterable[Terminal]) -> None:
 
 
 def start_of(terminal: Terminal) -> Iterator[float]:
-    """The start values of an input, flat."""
+    """Yield the start values of an input, flat."""
     size = int(np.prod(terminal.shape))
     values = np.ravel(np.asarray(terminal.start))
     yield from (np.broadcast_to(values, (size,)) if len(values) == 1 else values).tolist()

@@ -24,7 +24,7 @@ HEADER = 64
 
 
 def bounds(array: NDArray[Any]) -> tuple[int, int]:
-    """The addresses of the first byte of an array and of the byte after its last."""
+    """Return the addresses of the first byte of an array and of the byte after its last."""
     first, end = np.lib.array_utils.byte_bounds(array)
     return int(first), int(end)
 
@@ -46,7 +46,7 @@ class Piece:
 
 @dataclass
 class Image:
-    """Where the arrays of a graph are in an instance and in the constants of a library."""
+    """Places of a graph's arrays in an instance and in the constants of a library."""
 
     pieces: list[Piece] = field(default_factory=list)
     size: int = HEADER
@@ -88,7 +88,7 @@ class Image:
         return image
 
     def _in_order(self, arrays: Iterable[NDArray[Any]]) -> list[Piece]:
-        """The pieces in the order in which arrays name them, so that addresses do not matter."""
+        """Return the pieces in the order in which arrays name them, so that addresses do not matter."""
         found: list[Piece] = []
         for array in arrays:
             if array.size and (piece := self._piece(bounds(array)[0])) not in found:
@@ -100,7 +100,7 @@ class Image:
         return self.pieces[k]
 
     def place(self, array: NDArray[Any]) -> tuple[bool, int]:
-        """Whether an array is constant, and the byte at which its element 0 lies."""
+        """Return whether an array is constant, and the byte at which its element 0 lies."""
         if not array.size:
             return False, 0
         address = array.ctypes.data
@@ -108,7 +108,7 @@ class Image:
         return piece.constant, piece.offset + address - piece.first
 
     def bytes_of(self, *, constant: bool) -> bytearray:
-        """The present content of the constants, or of an instance."""
+        """Return the present content of the constants, or of an instance."""
         data = bytearray(self.constants if constant else self.size)
         for piece in self.pieces:
             if piece.constant == constant:

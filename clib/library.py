@@ -81,7 +81,7 @@ class Library:
         return address, memory, given, found
 
     def last_block(self) -> str:
-        """The path of the block that the last status is about; empty where it is about none."""
+        """Return the path of the block that the last status is about; empty where it is about none."""
         number = self._function("last_block")(self._self)
         return str(self.about["blocks"][number]) if number >= 0 else ""
 
@@ -94,7 +94,7 @@ class Library:
         self._expect(self._restore(self._self, self._at_state), "restore")
 
     def save(self) -> bytes:
-        """The state as bytes."""
+        """Return the state as bytes."""
         self.keep()
         return self._state.tobytes()
 
@@ -122,7 +122,7 @@ class Library:
             raise AloftError(f"{parameter} cannot be {value!r}")
 
     def get(self, parameter: str) -> float:
-        """The present value of a live parameter.
+        """Return the present value of a live parameter.
 
         Raises:
             AloftError: there is none of that name.
@@ -141,7 +141,7 @@ class Library:
 
 
 def description_in(folder: Path) -> Path:
-    """The description ``NAME.json`` in a folder that ``aloft export c`` has written.
+    """Return the description ``NAME.json`` in a folder that ``aloft export c`` has written.
 
     Raises:
         AloftError: there is none, or there are several files of that kind.
@@ -158,7 +158,7 @@ def description_in(folder: Path) -> Path:
 
 
 def read_description(description: Path) -> Mapping[str, Any]:
-    """What the description of a library says, if the library can run here.
+    """Return the description of a library, if the library can run here.
 
     Raises:
         AloftError: it is no description, it is of another processor, or the shared library is missing
@@ -191,7 +191,7 @@ def read_description(description: Path) -> Mapping[str, Any]:
 def views(
     data: NDArray[np.uint8], terminals: Sequence[Mapping[str, Any]]
 ) -> dict[str, NDArray[Any]]:
-    """The terminals in the bytes of a struct of C, or of several, (..., bytes)."""
+    """Return the terminals in the bytes of a struct of C, or of several, (..., bytes)."""
     found = {}
     for each in terminals:
         dtype, first = np.dtype(each["dtype"]), each["offset"]

@@ -27,7 +27,7 @@ from .part import Part, terminal_groups
 
 
 class Status(IntEnum):
-    """What the functions of a library return. Below zero nothing goes on before a reset."""
+    """Return values of a library's functions. Below zero nothing goes on before a reset."""
 
     OK = 0
     EVENT = 1
@@ -135,11 +135,11 @@ class Module:
         return found
 
     def _place(self, array: NDArray[Any]) -> int:
-        """The byte of an instance at which an array that is written begins."""
+        """Return the byte of an instance at which an array that is written begins."""
         return self.image.place(array)[1]
 
     def _struct(self, terminals: Any) -> tuple[dict[str, tuple[int, int, int]], int]:
-        """Of each terminal its bytes in the struct of C: first byte, byte on the bus, size."""
+        """Return the places of each terminal in the struct of C: first byte, byte on the bus, size."""
         bus, place = self.part.bound.memory.bus, 0
         fields: dict[str, tuple[int, int, int]] = {}
         for group in terminal_groups(terminals).values():
@@ -155,7 +155,7 @@ class Module:
         return fields, max(8, -(-place // 8) * 8)
 
     def text(self) -> str:
-        """The whole module."""
+        """Return the whole module."""
         size, name = self.image.size, self.name
         parts = [
             self._kernels,
@@ -290,7 +290,7 @@ class Module:
         self._end(code)
 
     def _end(self, code: _Code) -> None:
-        """Where calls that divide by zero go on."""
+        """Write the labels at which calls that divide by zero go on."""
         if code.failures:
             code.label("divided")
             pairs = ", ".join(f"[ {block}, %{label} ]" for block, label in code.failures)
@@ -352,7 +352,7 @@ class Module:
         code.jump(after)
 
     def _operands(self, code: _Code, argument: Any) -> Iterator[str]:
-        """An argument as the operands of a call."""
+        """Yield an argument as the operands of a call."""
         kind = type_of(argument)
         if isinstance(kind, ArrayType):
             constant, place = self.image.place(argument)
@@ -366,7 +366,7 @@ class Module:
             yield f"{leaves(kind)[0]} {number(argument).parts[0]}"
 
     def _check_finite(self, code: _Code) -> None:
-        """No number of the bus may be NaN or infinite."""
+        """Write the check that no number on the bus is NaN or infinite."""
         layout = self.part.bound.memory.bus.layout
         place = code.at(self.bus_place + layout.offsets["float64"])
         count = layout.lengths["float64"]
@@ -395,7 +395,7 @@ class Module:
     # Parameters and texts
 
     def _elements(self) -> Iterator[tuple[int, str, int, Any]]:
-        """Of each parameter its number, LLVM's type of it in memory, its place, and itself."""
+        """Yield the number of each parameter, LLVM's type of it in memory, its place, and itself."""
         for k, each in enumerate(self.part.parameters):
             array = self.part.bound.blocks[each.block].parameter_arrays[each.parameter]
             leaf = {"f": "double", "i": "i64", "b": "i8"}[array.dtype.kind]
@@ -452,7 +452,7 @@ class Module:
         return f"define i32 @{self.name}_{key}(ptr %self) #0 {{\nentry:\n{code.text()}\n}}"
 
     def _names(self) -> str:
-        """The names of the blocks, and the function that gives them."""
+        """Return the names of the blocks, and the function that gives them."""
         code = _Code()
         cases = " ".join(f"i32 {k}, label %name{k}" for k in range(len(self.part.blocks)))
         code(f"switch i32 %block, label %unknown [ {cases} ]")
@@ -490,7 +490,7 @@ end:
   %result = icmp ne i64 %any, 0
   ret i1 %result
 }}"""
-"""Whether one of some numbers is NaN or infinite: such have the largest exponent."""
+"""Function that finds a NaN or an infinity among numbers: such have the largest exponent."""
 
 
 class _Code:
@@ -529,7 +529,7 @@ class _Code:
         self.label(yes)
 
     def at(self, place: int, base: str = "%self") -> str:
-        """The address of a byte behind a pointer."""
+        """Return the address of a byte behind a pointer."""
         key = place, base
         if key not in self._places:
             result = f"%{self.name('p')}"
@@ -551,7 +551,7 @@ class _Code:
 
 
 def _arrays(call: KernelCall) -> Iterator[tuple[NDArray[Any], int]]:
-    """The arrays of a call, and the number of the operand that is the address of each."""
+    """Yield the arrays of a call, and the number of the operand that is the address of each."""
     first = 0
 
     def walk(argument: Any) -> Iterator[tuple[NDArray[Any], int]]:
@@ -570,7 +570,7 @@ def _arrays(call: KernelCall) -> Iterator[tuple[NDArray[Any], int]]:
 
 
 def _bytes(name: str, data: bytes | bytearray) -> str:
-    """A constant that no other file sees."""
+    """Return a constant that no other file sees."""
     if not any(data):
         return f"@{name} = internal constant [{len(data)} x i8] zeroinitializer, align 64"
     words = np.frombuffer(bytes(data), "<i8")

@@ -68,7 +68,7 @@ class Part:
 def take_part(
     path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()
 ) -> Part:
-    """The part of a graph that a library shall compute.
+    """Return the part of a graph that a library shall compute.
 
     Args:
         path: the graph file.
@@ -136,7 +136,7 @@ def _nothing(self: Block) -> None:
 
 
 def needs_python(block: Block) -> Iterator[str]:
-    """Why a block cannot be a part of a library."""
+    """Yield the reasons why a block cannot be a part of a library."""
     kind = type(block)
     steps = ("emit", "update") if kind.is_moore() else ("step",)
     for step in steps:
@@ -152,13 +152,13 @@ def needs_python(block: Block) -> Iterator[str]:
 
 
 def _is_empty(kind: type[Block], step: str) -> bool:
-    """Whether a step is a function that does nothing, such as the update of a source."""
+    """Check whether a step is a function that does nothing, such as the update of a source."""
     code = getattr(getattr(kind, step), "__code__", None)
     return code is not None and code.co_code == _nothing.__code__.co_code
 
 
 def _parameters(block: Block) -> Iterator[NumberParameter | str]:
-    """The live parameters of a block, number by number; as a text those that stay as they are."""
+    """Yield the live parameters of a block, number by number; as a text those that stay as they are."""
     prepared = type(block).prepare is not Block.prepare
     for name, info in type(block.params).model_fields.items():
         if not is_live(info):
@@ -184,7 +184,7 @@ def _parameters(block: Block) -> Iterator[NumberParameter | str]:
 
 
 def terminal_groups(terminals: Sequence[Terminal]) -> dict[str, list[tuple[str, Terminal]]]:
-    """The fields of each port, by its name: the name of the field, and the terminal."""
+    """Return the fields of each port, by its name: the name of the field, and the terminal."""
     groups: dict[str, list[tuple[str, Terminal]]] = {}
     for each in terminals:
         field = each.source.rpartition(".")[2]

@@ -121,7 +121,7 @@ class RemoteLibrary:
         )
 
     def last_block(self) -> str:
-        """The block that the last status is about."""
+        """Return the block that the last status is about."""
         number = int(self._head["block"][0])
         return str(self.about["blocks"][number]) if number >= 0 else ""
 

@@ -32,7 +32,7 @@ class Target:
     packages: str
 
     def linker(self) -> str:
-        """The command that links; empty where there is none."""
+        """Return the command that links; empty where there is none."""
         return next((each for each in self.linkers if shutil.which(each)), "")
 
 
@@ -53,12 +53,12 @@ TARGETS: dict[str, Target] = {
 
 
 def compile_module(text: str, target: Target) -> bytes:
-    """The object file of a module for a kind of processor."""
+    """Return the object file of a module for a kind of processor."""
     return cross_compiled(text, target.triple, OLDEST[target.triple], target.features)
 
 
 def assembler(text: str, target: Target) -> str:
-    """The same code as a text for an assembler."""
+    """Return the same code as a text for an assembler."""
     return assembler_text(text, target.triple, OLDEST[target.triple], target.features)
 
 

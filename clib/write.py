@@ -28,7 +28,7 @@ _KEYWORDS = frozenset(_WORDS.split())
 
 @dataclass(frozen=True)
 class Prepared:
-    """What a library will be made of: its name, the part, the code, and what ``NAME.json`` says."""
+    """Ingredients of a library: its name, the part, the code, and the content of ``NAME.json``."""
 
     name: str
     part: Part
@@ -36,13 +36,13 @@ class Prepared:
     about: dict[str, Any]
 
     def header(self) -> str:
-        """The text of ``NAME.h``."""
+        """Return the text of ``NAME.h``."""
         return _header(self.name, self.part, self.about)
 
 
 @dataclass(frozen=True)
 class Written:
-    """What was written: the description ``NAME.json``, all files, and what it says."""
+    """Written library: the description ``NAME.json``, all files, and the description's content."""
 
     description: Path
     files: tuple[Path, ...]
@@ -102,8 +102,7 @@ def prepare(
     outputs: Sequence[str] = (),
     target: str = "x86_64",
 ) -> Prepared:
-    """A part of a graph as code, with what is to be said of it; the parameters are those of
-    ``write_library``.
+    """Return a part of a graph as code, with its description; the parameters are those of ``write_library``.
 
     Raises:
         LoadError: the graph may not run.
@@ -127,7 +126,7 @@ def prepare(
 def _describe(
     name: str, target: str, part: Part, module: Module, texts: dict[str, str]
 ) -> dict[str, Any]:
-    """What ``NAME.json`` says."""
+    """Return the content of ``NAME.json``."""
     memory = part.bound.memory
     return {
         "name": name,
@@ -162,7 +161,7 @@ def _terminals(
 
 
 def _slots(layout: Layout, place: int, part: Part) -> dict[str, Any]:
-    """Of each signal or state of the blocks inside: its first byte in an instance, type and shape."""
+    """Return the first byte in an instance, type and shape of each signal or state of the blocks inside."""
     return {
         name: [place + layout.byte_range(name)[0], slot.section, list(slot.shape)]
         for name, slot in layout.slots.items()
@@ -171,7 +170,7 @@ def _slots(layout: Layout, place: int, part: Part) -> dict[str, Any]:
 
 
 def c_name(text: str) -> str:
-    """A name of the graph as an identifier of C."""
+    """Return a name of the graph as an identifier of C."""
     made = "".join(each if each.isascii() and each.isalnum() else "_" for each in text).strip("_")
     return f"{made}_" if made in _KEYWORDS else f"_{made}" if made[:1].isdigit() else made
 
@@ -310,7 +309,7 @@ int main(void)
 
 
 def _main(name: str) -> str:
-    """The library as a process, in real time or in lockstep."""
+    """Return the C text of the library as a process, in real time or in lockstep."""
     upper = name.upper()
     lines = [
         f"#define lib_{each} {name}_{each}"

@@ -32,7 +32,7 @@ class Remembered(Signal):
 
 
 class FmuParameters(Parameters):
-    """Which FMU to run, and how."""
+    """FMU to run, and its settings."""
 
     file: str = parameter(text="the FMU, relative to the graph's folder")
     start: dict[str, float | int | bool | str | list[float]] = parameter(
@@ -73,7 +73,7 @@ class UnitBlock(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A mass on a spring, made for this process."""
+        """Return a mass on a spring, made for this process."""
         from .example import example_fmu
 
         return {"file": str(example_fmu())}
@@ -82,7 +82,7 @@ class UnitBlock(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The numbers that hold the FMU's state; an instance has to say how large that is."""
+        """Return the numbers that hold the FMU's state; an instance has to say how large that is."""
         assert isinstance(params, FmuParameters)
         if not cls.described.kept:
             return {"fmu_state": 1}
@@ -158,7 +158,7 @@ class UnitBlock(Block):
         )
 
     def warnings(self) -> Sequence[str]:
-        """Say if snapshots lack the FMU, and what it has warned of."""
+        """Return warnings: snapshots that lack the FMU, and the FMU's own."""
         said = []
         if not self.described.kept:
             said.append(
@@ -213,7 +213,7 @@ class CoSimulation(UnitBlock):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with the ports of the FMU."""
+        """Return the class with the ports of the FMU."""
         assert isinstance(params, FmuParameters)
         found = describe(params.file, folder, params.outputs)
         direct = found.feedthrough if params.feedthrough is None else params.feedthrough
@@ -269,7 +269,7 @@ _CLASSES: list[tuple[tuple[Description, bool], type[Block]]] = []
 
 
 def _class_for(found: Description, direct: bool) -> type[Block]:
-    """The class of an FMU; the same one for the same description, so that graphs compare equal."""
+    """Return the class of an FMU; the same one for the same description, so that graphs compare equal."""
     for key, known in _CLASSES:
         if key == (found, direct):
             return known

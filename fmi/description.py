@@ -1,4 +1,4 @@
-"""What the model description of an FMU says, as the ports of a block."""
+"""Model description of an FMU, as the ports of a block."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Variable:
 
     @property
     def size(self) -> int:
-        """How many numbers it holds."""
+        """Number of elements."""
         return prod(self.shape)
 
     @property
@@ -71,11 +71,11 @@ class Description:
     feedthrough: bool
     kept: bool
     problems: tuple[str, ...] = ()
-    """What is not as the standard demands, by FMPy's validator; often it does no harm."""
+    """Violations of the standard, found by FMPy's validator; often harmless."""
 
 
 def describe(file: str, folder: Path, outputs: Iterable[str] = ()) -> Description:
-    """The description of an FMU.
+    """Return the description of an FMU.
 
     Args:
         file: the FMU, as the graph names it.
@@ -167,7 +167,7 @@ def _problems(read: Any) -> tuple[str, ...]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The end of a sentence that proposes what resembles ``name``, or lists what there is."""
+    """Return the end of a sentence that proposes what resembles ``name``, or lists what there is."""
     from difflib import get_close_matches
 
     known = list(names)
@@ -178,7 +178,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
 
 
 def _feedthrough(read: Any) -> bool:
-    """Whether the description leaves open that an output depends on an input at once."""
+    """Check whether the description allows an output to depend on an input at once."""
     for unknown in read.outputs:
         if unknown.dependencies is None:
             return True
@@ -188,8 +188,9 @@ def _feedthrough(read: Any) -> bool:
 
 
 def _placed(found: list[Any], units: Mapping[str, Unit | None]) -> tuple[Variable, ...]:
-    """The variables with their ports and fields: ``a.b.c`` is the field ``c`` of the port ``a_b``,
-    and a name without a dot is the field ``value`` of a port."""
+    """Return the variables with their ports and fields: ``a.b.c`` is the field ``c`` of the port ``a_b``, and a name
+    without a dot is the field ``value`` of a port.
+    """
     placed = []
     for each in _in_rows([_variable(each, units) for each in found]):
         head, _, last = each.name.rpartition(".")
@@ -253,7 +254,7 @@ def _in_rows(variables: list[Variable]) -> list[Variable]:
 
 
 def _start(text: Any, kind: str, size: int) -> tuple[float, ...]:
-    """The start values as numbers; zeros where there are none."""
+    """Return the start values as numbers; zeros where there are none."""
     values = str(text).split() if text is not None else []
     if kind == "Boolean":
         numbers = [float(value in ("true", "True", "1")) for value in values]
@@ -265,7 +266,7 @@ def _start(text: Any, kind: str, size: int) -> tuple[float, ...]:
 
 
 def _unit(name: str, base: Any) -> Unit | None:
-    """A unit of FMI; ``None`` where it has an offset, such as degrees Celsius, or cannot be read."""
+    """Return a unit of FMI; ``None`` where it has an offset, such as degrees Celsius, or cannot be read."""
     if base is None:
         try:
             return parse_unit(name.replace(".", " "))
@@ -278,13 +279,13 @@ def _unit(name: str, base: Any) -> Unit | None:
 
 
 def _name(text: str) -> str:
-    """The text as a name in Python."""
+    """Return the text as a name in Python."""
     name = re.sub(r"\W+", "_", text).strip("_") or "v"
     return name if name.isidentifier() else f"v{name}"
 
 
 def signals(variables: Iterable[Variable]) -> dict[str, type[Signal]]:
-    """The signals of the ports that these variables make, by port."""
+    """Return the signals of the ports that these variables make, by port."""
     ports: dict[str, dict[str, Any]] = {}
     for each in variables:
         field = Field(each.shape, dtype=_DTYPES[each.kind], text=each.text)

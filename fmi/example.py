@@ -61,7 +61,7 @@ class Spring(Fmi3Slave):
 
 @lru_cache(maxsize=1)
 def example_fmu() -> Path:
-    """A mass on a spring as an FMU of FMI 3.0; its folder is removed when the process ends.
+    """Return a mass on a spring as an FMU of FMI 3.0; its folder is removed when the process ends.
 
     Raises:
         BlockError: PythonFMU3, which makes it, is not installed.

@@ -58,7 +58,7 @@ _NATIVE = {
 _NATIVE_2 = {**_NATIVE, "Enumeration": "i4", "Boolean": "i4"}
 _STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 LINES = 12
-"""How many of the FMU's last log lines are kept."""
+"""Number of the FMU's last log lines that are kept."""
 
 
 class FmuInstance:
@@ -80,7 +80,7 @@ class FmuInstance:
         self._folder = tempfile.TemporaryDirectory(prefix="aloft-fmu-", ignore_cleanup_errors=True)
         self._open = False
         self.failed = False
-        """Whether a call has failed, after which an FMU may only be left alone."""
+        """True after a failed call; then the FMU may only be left alone."""
         self._places = list(sys.path)
         with _Blame(self, "loaded"):
             self._fmu = self._load()
@@ -148,11 +148,11 @@ class FmuInstance:
         getattr(self._fmu, f"set{named}")([reference], [convert(each) for each in values])
 
     def writer(self, variables: Iterable[Variable], ports: Mapping[str, Signal]) -> Transfer:
-        """What sets variables from the signals of ports."""
+        """Return the transfer that sets variables from the signals of ports."""
         return Transfer(self, variables, ports, setting=True)
 
     def reader(self, variables: Iterable[Variable], ports: Mapping[str, Signal]) -> Transfer:
-        """What gets variables into the signals of ports."""
+        """Return the transfer that gets variables into the signals of ports."""
         return Transfer(self, variables, ports, setting=False)
 
     def call(self, name: str, *arguments: Any) -> None:
@@ -167,7 +167,7 @@ class FmuInstance:
         return bool(answer is not None and answer[1])
 
     def state(self) -> bytes:
-        """What the FMU remembers."""
+        """Return the FMU's state."""
         fmu = self._fmu
         with _Blame(self, "asked for its state"):
             state = fmu.getFMUState()
@@ -280,7 +280,7 @@ class _Blame:
 
 
 def _callbacks_2(hear: Callable[[int, bytes], None]) -> Any:
-    """The callbacks of FMI 2.0, with FMPy's proxy that fills in the arguments of log lines."""
+    """Return the callbacks of FMI 2.0, with FMPy's proxy that fills in the arguments of log lines."""
     from fmpy import calloc, free
     from fmpy.fmi2 import (
         fmi2CallbackAllocateMemoryTYPE,

@@ -1,4 +1,4 @@
-"""What lies outside of an exported sub-graph, as a block."""
+"""Surroundings of an exported sub-graph, as a block."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Outside(Block):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with these outputs."""
+        """Return the class with these outputs."""
         assert isinstance(params, OutsideParameters)
         body: dict[str, Any] = {"__doc__": cls.__doc__, "__module__": cls.__module__}
         for port, fields in params.ports.items():
@@ -74,7 +74,7 @@ class Outside(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A force."""
+        """Return a force."""
         return {"ports": {"y": {"value": {"shape": [2], "unit": "N", "start": [1.0, 2.0]}}}}
 
     def setup(self) -> None:

@@ -1,4 +1,4 @@
-"""What has been found of one robot, with standard deviations, and the values that a graph takes of it."""
+"""Calibration of one robot: identified values with standard deviations, and the values that a graph takes of it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .sensor_identification import IdentifiedSensors, identify_sensors
 COMPENSATED = 0.8
 """The share of the friction that is compensated: with more a joint may creep."""
 USUAL_DELAY = 0.002
-"""From sensing to torque where a run does not tell it [s]."""
+"""Delay from sensing to torque where a run does not determine it [s]."""
 BALANCE = 0.003
 """The error of a balance, as a share of the mass."""
 
@@ -100,7 +100,9 @@ def calibration_of(
     robot: RobotDescription, sensors: IdentifiedSensors, motors: IdentifiedMotors,
     pack: IdentifiedPack | None, delay: Estimate | None,
 ) -> Calibration:  # fmt: skip
-    """What was found, as one model. Joints that are held do not move and tell nothing: theirs is the description's."""
+    """Combine the identified values into one model. Held joints do not move and reveal nothing: theirs are the
+    description's.
+    """
 
     def named(values: dict[str, Estimate], known: Array | None = None) -> dict[str, Value]:
         found = {name: _value(each) for name, each in values.items()}
@@ -132,8 +134,9 @@ def _value(found: Estimate) -> Value:
 
 
 def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
-    """The values as a graph's ``set``, for a controller with ``controllers/late_sensors.yaml``; ``source``
-    is where they come from."""
+    """Return the values as a graph's ``set``, for a controller with ``controllers/late_sensors.yaml``; ``source`` is
+    where they come from.
+    """
 
     def bounded(value: Value, least: float, most: float = 1e9) -> float:
         return min(most, max(least, value.value))
@@ -195,7 +198,7 @@ def fragment(robot: RobotDescription, found: Calibration, source: str) -> str:
 def _beyond(
     parameter: str, unit: str, share: float, robot: RobotDescription, found: dict[str, Value], known: Array,
 ) -> list[str]:  # fmt: skip
-    """A share of what is found beyond the description's; for compensation, which must not push, never less."""
+    """Return a share of what is found beyond the description's; for compensation, which must not push, never less."""
     least = 0.0 if share < 1.0 else -math.inf
     values = {
         joint.name: share * max(least, found[joint.name].value - float(nominal))

@@ -51,7 +51,7 @@ class ContactGeometry(NamedTuple):
 
 
 class ContactMotion(NamedTuple):
-    """What ``contact_motion`` writes: see the attributes of ``ContactKinematics``."""
+    """Results of ``contact_motion``: see the attributes of ``ContactKinematics``."""
 
     points: Rows3
     rates: Rows3
@@ -78,7 +78,7 @@ def contact_motion(
     velocity: Array1D,
     out: ContactMotion,
 ) -> None:
-    """The contact points as seen from the base, which is held in place but turns.
+    """Compute the motion of the contact points relative to the base, which is held in place but turns.
 
     Args:
         orientation: the base's quaternion, which gives the vertical.
@@ -115,7 +115,7 @@ def contact_motion(
 def pattern_direction(
     pattern: Array2D, points: Rows3, down: Vector3, aside: Vector3, forward: Vector3
 ) -> None:
-    """The direction ahead (3,), from where the points are: see ``_pattern``.
+    """Compute the direction ahead (3,) from the places of the points: see ``_pattern``.
 
     Args:
         down: the direction of gravity [body], (3,).
@@ -135,7 +135,7 @@ def pattern_direction(
 
 @kernel
 def relative_com_velocity(bodies: RigidBodies, out: Vector3) -> None:
-    """The velocity (3,) of the centre of mass relative to the base's origin [m/s, body]."""
+    """Compute the velocity (3,) of the centre of mass relative to the base's origin [m/s, body]."""
     tree, motion, place, velocity = bodies.tree, bodies.motion, bodies.scratch[1], bodies.scratch[2]
     total = 0.0
     out[0] = out[1] = out[2] = 0.0
@@ -152,8 +152,9 @@ def relative_com_velocity(bodies: RigidBodies, out: Vector3) -> None:
 def differentiate_contacts(
     bodies: RigidBodies, contacts: ContactGeometry, centres: Array2D, jacobians: Array3D
 ) -> None:
-    """The centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
-    (n_contacts, 3, n_joints), with the bodies where ``contact_motion`` has left them."""
+    """Compute the centres of the contacts' rubber (n_contacts, 3) [m, body], and their Jacobians by the joints
+    (n_contacts, 3, n_joints), with the bodies where ``contact_motion`` has left them.
+    """
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
         centre, jacobian = centres[i], jacobians[i]
@@ -265,8 +266,8 @@ class ContactKinematics:
 
 
 def _pattern(robot: RobotDescription) -> Array:
-    """How far every contact point is ahead and to the left of their middle in the standing pose
-    [m], (2, n_contacts).
+    """Return the distances of the contact points ahead and to the left of their middle in the standing pose [m], (2,
+    n_contacts).
 
     Where the points p_i stand so, turned by a heading, the sum over x_i p_i + y_i (p_i x up)
     points ahead, as far as the pattern is symmetric.

@@ -50,7 +50,7 @@ OTHER_FORMATS = {
 }
 """Formats of robots that are not read, and what to do instead."""
 DISTRIBUTIONS = {"example-robot-data": "example-robot-data"}
-"""What to install for a package of files, where it is not called as the package."""
+"""Distribution to install for a package of files, where their names differ."""
 _KIND = ("a robot's description", "name, base, links, joints")
 
 
@@ -76,7 +76,7 @@ class PlacedYaml:
 
     @classmethod
     def read(cls, path: Path) -> PlacedYaml:
-        """The file's content.
+        """Return the file's content.
 
         Raises:
             RobotError: it cannot be read, is no text in UTF-8, no YAML or no mapping.
@@ -97,11 +97,11 @@ class PlacedYaml:
         return node.where.line, node.where.column
 
     def holds(self, path: tuple[str | int, ...]) -> bool:
-        """Whether the file has something at that path."""
+        """Check whether the file has an entry at that path."""
         return len(locate(self.tree, path)[0]) == len(path)
 
     def placed(self, fault: RobotFault) -> RobotFault:
-        """The same fault with its line and column."""
+        """Return the same fault with its line and column."""
         if fault.line:
             return fault
         line, column = self.place(fault.path)
@@ -111,7 +111,7 @@ class PlacedYaml:
 
 
 def _yaml_fault(problem: Problem) -> RobotFault:
-    """A problem of the YAML as a fault of the robot."""
+    """Return a problem of the YAML as a fault of the robot."""
     where, message = problem.where, problem.message
     if problem.code is Code.YAML:
         message = f"this is no YAML: {message}"
@@ -121,7 +121,7 @@ def _yaml_fault(problem: Problem) -> RobotFault:
 
 
 def path_of(name: str, folder: Path | None = None) -> Path:
-    """The file that describes the robot called ``name``, ours or relative to ``folder``.
+    """Return the file that describes the robot called ``name``, ours or relative to ``folder``.
 
     Raises:
         LookupError: there is none; the message names the robots that there are.
@@ -139,7 +139,7 @@ def path_of(name: str, folder: Path | None = None) -> Path:
 
 
 def find(name: str, folder: Path | None = None) -> RobotDescription:
-    """The robot called ``name``; see ``description.find_robot``."""
+    """Return the robot called ``name``; see ``description.find_robot``."""
     path = path_of(name, folder)
     return (_read_shipped(path) if path.is_relative_to(SHIPPED) else read(path)).description
 
@@ -150,7 +150,7 @@ def _read_shipped(path: Path) -> ReadRobot:
 
 
 def read(path: Path) -> ReadRobot:
-    """The robot that a YAML, URDF or MJCF file describes.
+    """Return the robot that a YAML, URDF or MJCF file describes.
 
     A YAML of the same name beside a URDF or MJCF file adds what that lacks; a YAML with a key
     ``file`` adds to the file that it names. A URDF or MJCF file without a YAML gets what
@@ -181,7 +181,7 @@ def read(path: Path) -> ReadRobot:
 
 
 def _named_file(path: Path, text: PlacedYaml) -> Path:
-    """The URDF or MJCF file that a YAML names. Raises ``RobotError`` where it is not there."""
+    """Return the URDF or MJCF file that a YAML names. Raises ``RobotError`` where it is not there."""
     name = text.data["file"]
     if isinstance(name, str) and name.endswith(MODEL_FILES):
         found = find_file(name, path.parent)
@@ -232,7 +232,7 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
 
 
 def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
-    """The robot with meshes that are found from anywhere; a description in ``folder`` names them."""
+    """Return the robot with meshes that are found from anywhere; a description in ``folder`` names them."""
     if not robot.looks:
         return robot
     from .importing.looks import located
@@ -252,7 +252,7 @@ def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
 
 
 def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:
-    """The fault with its place: in the YAML where that says it, else in the URDF or MJCF file."""
+    """Return the fault with its place: in the YAML where that sets the value, else in the URDF or MJCF file."""
     from .importing.description_data import placed_in_model, written_path
 
     path = written_path(fault, imported.data)
@@ -280,7 +280,7 @@ def _complete(data: object) -> None:
 
 @lru_cache(maxsize=1)
 def robot_names() -> tuple[str, ...]:
-    """The names a graph may give after ``robot:``, sorted, after BRUCE.
+    """Return the names a graph may give after ``robot:``, sorted, after BRUCE.
 
     All files of BRUCE are in this package; those of most others come with ``example-robot-data``.
     """
@@ -318,7 +318,7 @@ __all__ = [
 
 
 def find_robot(name: str, folder: str | Path | None = None) -> RobotDescription:
-    """The description called ``name``: a shipped robot, or a file relative to ``folder`` or of an installed
+    """Return the description called ``name``: a shipped robot, or a file relative to ``folder`` or of an installed
     package, as ``package://NAME/PATH``.
 
     The file is a description in YAML, or a URDF or MJCF file with a short YAML of the same name
@@ -332,7 +332,7 @@ def find_robot(name: str, folder: str | Path | None = None) -> RobotDescription:
 
 
 def read_description(path: Path) -> RobotDescription:
-    """The robot that a file describes, of the kinds that ``find_robot`` takes.
+    """Return the robot that a file describes, of the kinds that ``find_robot`` takes.
 
     Raises:
         RobotError: the file cannot be read, or describes no robot; it carries every fault.

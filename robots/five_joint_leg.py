@@ -58,7 +58,7 @@ class Leg(NamedTuple):
 
 
 def read_leg(robot: RobotDescription, foot: int) -> Leg:
-    """The leg that ends in foot number ``foot``.
+    """Return the leg that ends in foot number ``foot``.
 
     Raises:
         ValueError: the chain from base to foot is not a leg of the kind described above.
@@ -84,14 +84,14 @@ def read_leg(robot: RobotDescription, foot: int) -> Leg:
 
 
 def find_leg(robot: RobotDescription, foot: int) -> Leg | None:
-    """The leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
+    """Return the leg that ends in foot number ``foot``, or ``None`` where it is of another kind."""
     if _mismatch(robot, foot, chain_to(robot, robot.feet[foot].link)):
         return None
     return read_leg(robot, foot)
 
 
 def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str:
-    """The reason why a chain of joints is no leg of this kind; empty if it is one."""
+    """Return the reason why a chain of joints is no leg of this kind; empty if it is one."""
     joints = [robot.joints[i] for i in chain]
     if len(joints) != len(_AXES):
         return f"expected 5 joints from {robot.base}, found {len(joints)}"
@@ -116,7 +116,7 @@ def _mismatch(robot: RobotDescription, foot: int, chain: tuple[int, ...]) -> str
 
 @kernel
 def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> None:
-    """The sole centre (3,) and the foot's rotation (3, 3) to the base, from the joint angles."""
+    """Compute the sole centre (3,) and the foot's rotation (3, 3) to the base from the joint angles."""
     hip, plane = leg.hip, leg.plane
     a, b, c, k, n = _canonical(leg.signs, angles)
     _thigh_rotation(a, b, c, rotation)
@@ -134,7 +134,7 @@ def forward(leg: Leg, angles: Array1D, position: Vector3, rotation: Matrix3) -> 
 
 @kernel
 def jacobian(plane: Array2D, signs: Array1D, angles: Array1D, out: Array2D) -> None:
-    """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
+    """Compute the sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, 5)."""
     a, b, c, k, n = _canonical(signs, angles)
     (sin_a, cos_a), (sin_b, cos_b) = sincos(a), sincos(b)
     sin_c, cos_c = sincos(c)
@@ -184,7 +184,7 @@ def inverse(
     level: float,
     out: Array1D,
 ) -> tuple[bool, float]:
-    """The joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
+    """Return the joint angles (5,) that bring the sole centre to ``sole`` and its line along ``line``.
 
     The leg plane contains the hip, the sole and the line; in it the knee follows from the law of
     cosines and the ankle from the line's slope. For a target out of reach errors are allowed in
@@ -282,8 +282,8 @@ def inverse(
 
 @kernel
 def yaw_share(flat: float, level: float) -> float:
-    """How much of the hip's exact yaw counts where ``flat`` is the cosine of its pitch: all of it
-    from ``level`` on, nothing in gimbal lock, and between them 3 s^2 - 2 s^3 with s = flat / level.
+    """Return the share of the hip's exact yaw that counts where ``flat`` is the cosine of its pitch: all of it from
+    ``level`` on, nothing in gimbal lock, and between them 3 s^2 - 2 s^3 with s = flat / level.
     """
     part = min(abs(flat) / max(level, LEVEL), 1.0)
     return part * part * (3.0 - 2.0 * part)
@@ -324,7 +324,7 @@ def _two_links(
     upper: float,
     softness: float,
 ) -> tuple[float, float, float, bool]:
-    """The knee's and the first link's angle that bring the end of two links to (x, z).
+    """Return the knee's and the first link's angle that bring the end of two links to (x, z).
 
     Of the two solutions it is the one on the side of the middle of the robot's limits. Also returns
     how far the distance follows the target's (1, or less near full stretch), and whether the target
@@ -365,7 +365,7 @@ _JUMP = 0.1
 
 @kernel
 def pitched_line(rotation: Matrix3, pitch: float, out: Vector3) -> None:
-    """The x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
+    """Compute the x axis of ``rotation`` (3, 3), turned by ``pitch`` [rad] about its y axis."""
     sine, cosine = sincos(pitch)
     out[:] = cosine * rotation[:, 0] - sine * rotation[:, 2]
 
@@ -434,7 +434,7 @@ def slide(
 
 @kernel
 def within_limits(leg: Leg, angles: Array1D) -> bool:
-    """Whether no joint above the ankle is at a limit."""
+    """Check that no joint above the ankle is at a limit."""
     inside = True
     for i in range(4):
         inside = inside and leg.limits[i, 0] < angles[i] < leg.limits[i, 1]
@@ -476,7 +476,7 @@ def slow_stretch(
 
 @kernel
 def line_rate(line: Array1D, last: Array1D, period: float, known: bool, out: Array1D) -> None:
-    """The time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
+    """Compute the time derivative (3,) of the direction of ``line`` [1/s]; updates ``last``."""
     x, y, z = line[0], line[1], line[2]
     largest = max(abs(x), abs(y), abs(z))
     if largest < 1e-300:

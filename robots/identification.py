@@ -1,4 +1,4 @@
-"""What a recorded run says about a robot: its mass, its torso, its friction, and its delay.
+"""Identification of a robot from a recorded run: its mass, its torso, its friction, and its delay.
 
 Mass, the torso's centre of mass and joint friction follow by least squares on inverse dynamics. The delay is
 that from a tick's instant to the torques computed in it, from commanded and measured torques.
@@ -62,8 +62,9 @@ class MeasuredRun:
     closed: NDArray[np.bool_]
 
     def sensor_biases(self) -> tuple[Array, Array]:
-        """The biases of accelerometer [m/s^2] and gyroscope [rad/s], from where the robot stands
-        still at first; zero where it never does."""
+        """Return the biases of accelerometer [m/s^2] and gyroscope [rad/s], from where the robot stands still at first;
+        zero where it never does.
+        """
         speeds = np.abs(self.velocity).mean(axis=1)
         moving = np.flatnonzero(speeds > STILL)
         still = slice(1, max(1, int(moving[0]) if len(moving) else len(speeds)))
@@ -73,8 +74,9 @@ class MeasuredRun:
         return force, self.angular_velocity[still].mean(axis=0)
 
     def usable(self) -> NDArray[np.int64]:
-        """The ticks, each with the one before it, in which the contacts have been the same for a while
-        and stay so for a while."""
+        """Return the ticks, each with the one before it, in which the contacts have been the same for a while and stay
+        so for a while.
+        """
         n = len(self.closed)
         changed = np.zeros(n, dtype=np.bool_)
         changed[1:] = (self.closed[1:] != self.closed[:-1]).any(axis=1)
@@ -107,7 +109,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class IdentifiedBody:
-    """What was found.
+    """Identified mass, torso and friction.
 
     Attributes:
         mass: of the robot [kg].
@@ -126,7 +128,7 @@ class IdentifiedBody:
 
 
 class IdentificationError(ValueError):
-    """The run does not tell what was asked; the text says what it lacks."""
+    """The run does not determine the wanted values; the text names what it lacks."""
 
 
 def identify_rigid_body(
@@ -225,8 +227,9 @@ class _Assembly:
     def blocks(
         self, motion: MeasuredRun, ticks: NDArray[np.int64]
     ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """The equations (n_blocks, n_velocities, n_unknowns), their right sides (n_blocks,
-        n_velocities), and the first tick of each block."""
+        """Return the equations (n_blocks, n_velocities, n_unknowns), their right sides (n_blocks, n_velocities), and
+        the first tick of each block.
+        """
         groups = [
             run[start : start + BLOCK]
             for run in np.split(ticks, np.flatnonzero(np.diff(ticks) != 1) + 1)
@@ -277,7 +280,7 @@ class _Assembly:
         self, motion: MeasuredRun, ticks: NDArray[np.int64], weighted: Array, scale: Array,
         kept: NDArray[np.bool_], encoder_std: float, tilt_std: float,
     ) -> Array:  # fmt: skip
-        """The covariance that unknown offsets of the encoders and an unknown tilt add."""
+        """Return the covariance that unknown offsets of the encoders and an unknown tilt add."""
         inverse = np.linalg.pinv(weighted.reshape(-1, weighted.shape[2]))
         found: Array = np.zeros((weighted.shape[2],) * 2)
         nominal, side, _ = self.blocks(motion, ticks)
@@ -303,7 +306,7 @@ def _solve(rows: Array, right: Array) -> Array:
 
 
 def _clustered(rows: Array, error: Array, where: NDArray[np.int64]) -> Array:
-    """The covariance of a least-squares solution whose residuals are correlated within clusters."""
+    """Return the covariance of a least-squares solution whose residuals are correlated within clusters."""
     flat = rows.reshape(-1, rows.shape[2])
     inverse = np.linalg.pinv(flat.T @ flat)
     cluster = (where - where[0]) // (BLOCK * CLUSTER)
@@ -328,7 +331,7 @@ _PARTS = 10
 
 @dataclass(frozen=True)
 class IdentifiedDelay:
-    """What was found.
+    """Identified delay.
 
     Attributes:
         delay: from a tick's instant until its command acts [s].
@@ -387,8 +390,9 @@ def identify_delay(
 
 
 def _fit(changes: Array, measured: Array, used: NDArray[np.int64], j: int) -> tuple[float, float]:
-    """How well measured changes correlate with those of the commands j + 1 and j + 2 ticks earlier,
-    and the share of the latter."""
+    """Return the correlation of measured changes with those of the commands j + 1 and j + 2 ticks earlier, and the
+    share of the latter.
+    """
     seen = (measured[used] - measured[used - 1]).ravel()
     first = changes[used - 1 - j].ravel()
     step = changes[used - 2 - j].ravel() - first

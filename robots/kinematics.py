@@ -40,13 +40,13 @@ class LinkPoses:
     rotation: Array
 
     def of(self, link: str) -> tuple[Array, Array]:
-        """The position (n, 3) and rotation (n, 3, 3) of one link. Raises ``ValueError``."""
+        """Return the position (n, 3) and rotation (n, 3, 3) of one link. Raises ``ValueError``."""
         index = self.names.index(link)
         return self.position[:, index], self.rotation[:, index]
 
 
 def body_tree(robot: RobotDescription) -> BodyTree:
-    """The links and joints of the robot, in the description's order of joints."""
+    """Return the links and joints of the robot, in the description's order of joints."""
     links = {link.name: link for link in robot.links}
     bodies = [links[robot.base], *(links[joint.child] for joint in robot.joints)]
     index = {link.name: k for k, link in enumerate(bodies)}
@@ -63,7 +63,7 @@ def body_tree(robot: RobotDescription) -> BodyTree:
 
 
 def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:
-    """The joints with their index, each behind the one that carries its parent link.
+    """Return the joints with their index, each behind the one that carries its parent link.
 
     Raises:
         ValueError: some joints are not connected to the base.
@@ -85,7 +85,7 @@ def from_base_outwards(robot: RobotDescription) -> list[tuple[int, Joint]]:
 def link_poses(
     robot: RobotDescription, base_position: Array, base_orientation: Array, joint_position: Array
 ) -> LinkPoses:
-    """The pose of every link.
+    """Return the pose of every link.
 
     Args:
         robot: the description; all its frames are parallel to the base's at the zero pose.
@@ -119,7 +119,7 @@ def link_poses(
 def link_poses_in_base(
     robot: RobotDescription, position: Array
 ) -> Mapping[str, tuple[Array, Array]]:
-    """The rotation (3, 3) from link to base and the origin [m, base frame] (3,) of every link.
+    """Return the rotation (3, 3) from link to base and the origin [m, base frame] (3,) of every link.
 
     Args:
         robot: its joints must be listed after those that carry them.
@@ -132,7 +132,7 @@ def link_poses_in_base(
 
 
 def contact_centres(robot: RobotDescription) -> Array:
-    """The centre of the round rubber of every contact point [m, link frame], (n_contacts, 3).
+    """Return the centre of the round rubber of every contact point [m, link frame], (n_contacts, 3).
 
     A contact's ``position`` is the lowest point of its rubber at the zero pose, where all link
     frames are parallel to the base's: the centre is ``radius`` above it in the link's own frame.
@@ -144,8 +144,9 @@ def contact_centres(robot: RobotDescription) -> Array:
 
 
 def standing_heights(robot: RobotDescription) -> Array:
-    """The heights of the contact points above the base's origin [m] in the upright standing pose,
-    (n_contacts,). All are equal where every foot can stand on level ground."""
+    """Return the heights of the contact points above the base's origin [m] in the upright standing pose, (n_contacts,).
+    All are equal where every foot can stand on level ground.
+    """
     poses = link_poses_in_base(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
     owners, centres = robot.foot_of_contact(), contact_centres(robot)
@@ -160,12 +161,12 @@ def standing_heights(robot: RobotDescription) -> Array:
 
 
 def fall_height(robot: RobotDescription) -> float:
-    """The height of the base above the ground below which the robot counts as fallen [m]."""
+    """Return the height of the base above the ground below which the robot counts as fallen [m]."""
     return float(round(FALL_SHARE * -float(standing_heights(robot).min()), 3))
 
 
 def standing_contacts(robot: RobotDescription) -> Array:
-    """Where the contact points are in the standing pose, from the middle between the feet, (n_contacts, 3)."""
+    """Return the contact points in the standing pose, from the middle between the feet, (n_contacts, 3)."""
     poses = link_poses_in_base(robot, robot.standing_position)
     links = {foot.name: foot.link for foot in robot.feet}
     points = np.array(
@@ -181,7 +182,7 @@ def standing_contacts(robot: RobotDescription) -> Array:
 
 
 def standing_com(robot: RobotDescription) -> Array:
-    """The centre of mass in the standing pose [m, base frame], (3,)."""
+    """Return the centre of mass in the standing pose [m, base frame], (3,)."""
     poses = link_poses_in_base(robot, robot.standing_position)
     total = np.zeros(3)
     for link in robot.links:
@@ -191,7 +192,7 @@ def standing_com(robot: RobotDescription) -> Array:
 
 
 def joints_above(robot: RobotDescription, link: str) -> list[bool]:
-    """Which joints lie between the base and a link, in the description's order."""
+    """Return which joints lie between the base and a link, in the description's order."""
     above = [False] * len(robot.joints)
     while link != robot.base:
         index = next(k for k, joint in enumerate(robot.joints) if joint.child == link)
@@ -212,7 +213,7 @@ class BallFoot:
 
 
 def ball_feet(robot: RobotDescription) -> tuple[BallFoot, ...]:
-    """The robot's feet with exactly one contact point, in the order of its contact points."""
+    """Return the robot's feet with exactly one contact point, in the order of its contact points."""
     centres = contact_centres(robot)
     owners = robot.foot_of_contact()
     return tuple(
@@ -223,7 +224,7 @@ def ball_feet(robot: RobotDescription) -> tuple[BallFoot, ...]:
 
 
 def standing_feet(robot: RobotDescription) -> Array:
-    """The sole centres (n_feet, 3) [m] from the centre of mass, of a robot in its standing pose."""
+    """Return the sole centres (n_feet, 3) [m] from the centre of mass, of a robot in its standing pose."""
     level = np.array([[0.0, 0.0, 0.0, 1.0]])
     poses = link_poses(robot, np.zeros((1, 3)), level, robot.standing_position[None])
     com, feet = np.zeros(3), np.zeros((len(robot.feet), 3))
@@ -237,7 +238,7 @@ def standing_feet(robot: RobotDescription) -> Array:
 
 
 def standing_directions(robot: RobotDescription) -> tuple[Array, Flags1D]:
-    """The direction of every foot as the robot stands, (n_feet, 2), and which of them are points, (n_feet,).
+    """Return the direction of every foot as the robot stands, (n_feet, 2), and which of them are points, (n_feet,).
 
     A foot with a line or a sole points ahead, (1, 0). A point has no direction; its place from the middle of
     all feet [m] stands for it.
@@ -254,5 +255,5 @@ def standing_directions(robot: RobotDescription) -> tuple[Array, Flags1D]:
 
 
 def foot_sides(feet: Array) -> tuple[float, ...]:
-    """For every foot 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
+    """Return the side of every foot: 1 on the left of the base, -1 on the right, 0 in the middle (1 mm)."""
     return tuple(math.copysign(1.0, y) if abs(y) > 1e-3 else 0.0 for y in feet[:, 1].tolist())

@@ -64,7 +64,7 @@ class Limb:
 
 
 def chain_to(robot: RobotDescription, link: str) -> tuple[int, ...]:
-    """The indices of the joints that carry ``link``, from the base outwards.
+    """Return the indices of the joints that carry ``link``, from the base outwards.
 
     Raises:
         ValueError: no joint carries one of the links on the way.
@@ -80,8 +80,8 @@ def chain_to(robot: RobotDescription, link: str) -> tuple[int, ...]:
 
 
 def leg_joints(robot: RobotDescription) -> Indices2D:
-    """The joints of each foot's leg from the base outwards, (n_feet, joints of the longest leg); -1
-    where a leg has fewer.
+    """Return the joints of each foot's leg from the base outwards, (n_feet, joints of the longest leg); -1 where a leg
+    has fewer.
 
     Raises:
         ValueError: no joint carries one of the links on the way.
@@ -94,7 +94,7 @@ def leg_joints(robot: RobotDescription) -> Indices2D:
 
 
 def foot_shape(robot: RobotDescription, foot: int) -> tuple[FootKind, Array]:
-    """The kind of a foot and the direction of its line, (3,), in its link's frame.
+    """Return the kind of a foot and the direction of its line, (3,), in its link's frame.
 
     The line of a foot with several contact points goes through the two that are farthest apart,
     towards the one that is ahead (or to the left, for a line that lies across). That of a point
@@ -121,7 +121,7 @@ def foot_shape(robot: RobotDescription, foot: int) -> tuple[FootKind, Array]:
 
 
 def read_limb(robot: RobotDescription, foot: int, margin: float = 0.0) -> Limb:
-    """The limb that ends in foot number ``foot``.
+    """Return the limb that ends in foot number ``foot``.
 
     ``margin`` is kept from both limits of every joint. A joint that the description holds has its
     held angle for both limits.
@@ -204,7 +204,7 @@ def place_limb(
 
 @kernel
 def limb_jacobian(links: Array2D, anchors: Array2D, pose: Array2D, out: Array2D) -> None:
-    """The sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, n).
+    """Compute the sole's linear (rows 0-2) and angular (rows 3-5) velocity per joint velocity, (6, n).
 
     Args:
         links: of the ``Limb``.
@@ -265,7 +265,7 @@ def aim(position: Vector3, rotation: Matrix3, target: Rows3) -> None:
 
 @kernel
 def foot_error(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, error: Array1D) -> float:
-    """The weighted error of a foot's pose, and its square [m^2].
+    """Return the weighted error of a foot's pose, and its square [m^2].
 
     Args:
         tip: of the ``Limb``.
@@ -354,7 +354,7 @@ def weigh_rows(tip: Array1D, pose: Rows3, target: Rows3, weights: Array1D, rows:
 def turning(
     tip: Array1D, last: Rows3, target: Rows3, period: float, limit: float, out: Array1D
 ) -> None:
-    """The angular velocity (3,) [rad/s] of a target, from its orientation one period before.
+    """Compute the angular velocity (3,) [rad/s] of a target, from its orientation one period before.
 
     It is that of a line's direction for a line foot and zero for a point foot. A target that has
     turned by more than ``limit`` [rad] is a new target and has no angular velocity.
@@ -384,6 +384,6 @@ def turning(
 
 @kernel
 def _along(pose: Rows3, tip: Array1D) -> tuple[float, float, float]:
-    """The direction of a foot's line in the base's frame."""
+    """Return the direction of a foot's line in the base's frame."""
     line = tip[3:6]
     return pose[1] @ line, pose[2] @ line, pose[3] @ line

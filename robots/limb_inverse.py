@@ -52,7 +52,7 @@ _STILL = 1e-18
 
 
 def limb_scratch(joints: int) -> Array:
-    """The scratch array that the kernels of this file need for a limb with that many joints."""
+    """Return the scratch array that the kernels of this file need for a limb with that many joints."""
     return np.zeros((2 * joints + 16, max(joints, 6)))
 
 
@@ -263,6 +263,6 @@ def limb_velocity(
 
 @kernel
 def _stuck(limits: Array2D, joint: int, angle: float, direction: float) -> bool:
-    """Whether a joint stands at a limit and ``direction`` points beyond it."""
+    """Check whether a joint stands at a limit and ``direction`` points beyond it."""
     lower, upper = limits[joint, 0], limits[joint, 1]
     return (angle <= lower and direction <= 0.0) or (angle >= upper and direction >= 0.0)

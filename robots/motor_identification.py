@@ -1,4 +1,4 @@
-"""What a robot that sways over standing feet tells of its motors, joints and links, and of its pack.
+"""Identification of motors, joints, links and pack from a run in which the robot sways over standing feet.
 
 The equations of motion are linear in what is unknown: masses, first moments and inertias of all links, a factor
 on the rotors, friction and damping of the joints, the torque constants of the motors, and what iron and
@@ -42,11 +42,11 @@ from .sensor_identification import (
 from .transmission import SLIDING_SPEED
 
 EVERY = 8
-"""Of the filtered ticks every eighth is used."""
+"""Stride of the filtered ticks that are used."""
 SOFT_SPEED = 0.08
 """The joint speed at which most of the Coulomb friction acts [rad/s]."""
 CORRELATED = 0.6
-"""What the model lacks repeats for about so long [s]."""
+"""Time over which the model's errors are correlated [s]."""
 PERIODS = np.arange(20.0, 181.0, 2.0)
 """The periods in a turn of the output that are looked for in what motors give beside their torque."""
 RIPPLE = 0.01
@@ -74,7 +74,7 @@ class Spreads:
 
 @dataclass(frozen=True)
 class IdentifiedMotors:
-    """What was found.
+    """Identified motors, joints and links.
 
     Attributes:
         torque_constant: factor on the nominal one, by motor.
@@ -200,7 +200,7 @@ def _differences(n: int) -> Array:
 def _motor_angles(
     robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors
 ) -> Array:
-    """The angles of the motors [rad], tick by tick while the robot stands."""
+    """Return the angles of the motors [rad], tick by tick while the robot stands."""
     return _seated(motion, sensors, standing_span(robot, motion)) @ robot.joint_to_motor.T
 
 
@@ -213,7 +213,7 @@ def waves_of(turned: Array, periods: float, period: float) -> Array:
 
 
 def most_alike(error: Array, waves: Mapping[float, Array]) -> float:
-    """Of the periods the one whose waves are most like the errors of the motors' torques."""
+    """Return the period whose waves are most like the errors of the motors' torques."""
     twice = np.tile(error, 2)
     scores = {
         often: float((((twice * wave).sum(axis=0)) ** 2 / (wave**2).sum(axis=0)).sum())
@@ -223,8 +223,9 @@ def most_alike(error: Array, waves: Mapping[float, Array]) -> float:
 
 
 def _link_spread(robot: RobotDescription, spreads: Spreads) -> tuple[Array, Array]:
-    """The links' nominal parameters in Pinocchio's order (10 each), and how these change with independent
-    numbers of variance one."""
+    """Return the links' nominal parameters in Pinocchio's order (10 each), and how these change with independent
+    numbers of variance one.
+    """
     import pinocchio as pin
 
     rng = np.random.default_rng(0)
@@ -259,8 +260,9 @@ def _equations(
     robot: RobotDescription, motion: MeasuredRun, sensors: IdentifiedSensors, nominal: Array,
     spread: Array,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """The projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities), and the projections
-    (ticks, n_velocities, n_velocities)."""
+    """Return the projected equations: (ticks, n_velocities, n_unknowns), (ticks, n_velocities), and the projections
+    (ticks, n_velocities, n_velocities).
+    """
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
@@ -309,14 +311,15 @@ def _equations(
 
 
 def _seated(motion: MeasuredRun, sensors: IdentifiedSensors, span: slice) -> Array:
-    """The joints' angles without the play of their gears."""
+    """Return the joints' angles without the play of their gears."""
     width = np.array([each.value for each in sensors.play.values()])
     return motion.position[span] - 0.5 * width * play_positions(motion.torque[span], motion.period)
 
 
 def free_projection(jacobians: Array) -> Array:
-    """What takes the contact forces out of the equations of motion, (n, n_velocities, n_velocities): the projections
-    onto what Jacobians of contact points (n, rows, n_velocities) map to zero."""
+    """Return the projections that take the contact forces out of the equations of motion, (n, n_velocities,
+    n_velocities): onto what Jacobians of contact points (n, rows, n_velocities) map to zero.
+    """
     _, sizes, directions = np.linalg.svd(jacobians, full_matrices=False)
     used = directions * (sizes > 1e-6 * sizes[:, :1])[..., None]
     return np.asarray(np.eye(jacobians.shape[2]) - used.transpose(0, 2, 1) @ used)
@@ -326,7 +329,7 @@ def filtered_motion(
     motion: MeasuredRun, sensors: IdentifiedSensors, span: slice,
     cutoff: float = CUTOFF,
 ) -> tuple[Array, ...]:  # fmt: skip
-    """The filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
+    """Return the filtered motion at the time of the tick: joint angles, velocities and accelerations, the base's
     angular velocity and acceleration, the specific force of its origin, and the joints' torques.
 
     The robot ends as it began, so its mean angular velocity is the gyroscope's bias; it stands still at first.
@@ -357,8 +360,8 @@ def filtered_motion(
 def identify_pack(
     robot: RobotDescription, motion: MeasuredRun, voltage: Array, recovery_time: float = 10.0
 ) -> IdentifiedPack | None:
-    """Fit the pack to the voltage that the drives report; None where they report none, or the description says
-    nothing of what feeds the motors.
+    """Fit the pack to the voltage that the drives report; None where they report none, or the description gives no
+    supply of the motors.
 
     Args:
         voltage: at the drives (n,) [V].

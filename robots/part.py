@@ -1,5 +1,6 @@
-"""What all parts of a robot's description have in common: they are immutable, refuse unknown keys, and keep their content
-when they do not use what came later."""
+"""Common base of all parts of a robot's description: they are immutable, refuse unknown keys, and keep their content
+when they do not use what came later.
+"""
 
 from __future__ import annotations
 

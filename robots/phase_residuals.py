@@ -1,4 +1,4 @@
-"""What a calibrated model lacks in each phase of a run: the equations of motion, joint by joint.
+"""Residuals of a calibrated model in each phase of a run: the equations of motion, joint by joint.
 
 The model is what a controller is told: the description's links scaled to the robot's mass, and torque
 constants, losses, friction and rotors as they were found. Contact forces are unknown, so the equations are
@@ -24,7 +24,7 @@ from .sensor_identification import EDGE, IdentifiedSensors, contact_jacobians
 from .transmission import SLIDING_SPEED
 
 CUTOFF = 25.0
-"""Of the filter [Hz]: a thrust lasts for some 0.2 s."""
+"""Cutoff of the filter [Hz]: a thrust lasts for some 0.2 s."""
 BOUNCE = 0.012
 """A point whose switch was closed within this time is taken for loaded [s]."""
 MARGIN = 0.03
@@ -69,7 +69,7 @@ def phase_residuals(
 def _errors(
     robot: RobotDescription, motion: MeasuredRun, stands: NDArray[np.bool_], found: Calibration
 ) -> Array:  # fmt: skip
-    """What is left of the projected equations, (n, n_velocities)."""
+    """Return the residuals of the equations of motion, (n, n_velocities)."""
     import pinocchio as pin
 
     built = build_pinocchio_model(robot)
@@ -109,7 +109,7 @@ def _errors(
 
 
 def _sensors(found: Calibration) -> IdentifiedSensors:
-    """What was found of the sensors."""
+    """Return the identified sensors of a calibration."""
 
     def one(value: Value) -> Estimate:
         return Estimate(value.value, value.std)
@@ -122,7 +122,7 @@ def _sensors(found: Calibration) -> IdentifiedSensors:
 
 
 def _given(robot: RobotDescription, found: Calibration, speeds: Array, torque: Array) -> Array:
-    """The torques that motors give the joints of those that they report, (n, n_joints)."""
+    """Return the torques that motors give the joints of those that they report, (n, n_joints)."""
     constant = np.array([each.value for each in found.torque_constant.values()])
     peak = np.asarray(robot.motors.peak_torque)
     reported = torque @ robot.torque_to_motor.T

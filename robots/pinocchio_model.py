@@ -33,7 +33,7 @@ class PinocchioModel:
 
 
 def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -> PinocchioModel:
-    """The model of the robot on its base, with the rotors of the actuator profile in use.
+    """Return the model of the robot on its base, with the rotors of the actuator profile in use.
 
     The velocity of a floating base is that of its origin in the base's own frame, first linear,
     then angular (6). A planar base has the positions x, z and the turn about y that takes z to x,

@@ -1,4 +1,4 @@
-"""Whether a robot's size and mass go together: lengths in millimetres, or masses in grams, do not.
+"""Check that a robot's size and mass go together: lengths in millimetres, or masses in grams, do not.
 
 The measure is the density of a ball around the standing robot, which is mostly air between limbs. With lengths a thousand
 times too large it falls to a billionth.
@@ -48,7 +48,7 @@ def _extremes(robot: RobotDescription, name: str) -> list[tuple[Array, float]]:
 
 
 def wrong_size(robot: RobotDescription) -> tuple[str, ...]:
-    """What is wrong with size and mass together, in one sentence; none where nothing seems to be."""
+    """Return what is wrong with size and mass together, in one sentence; none where nothing seems to be."""
     reach, density = ball_density(robot)
     if LEAST <= density <= MOST:
         return ()

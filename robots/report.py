@@ -29,7 +29,7 @@ SHAPES = {0: "point", 1: "line", 2: "flat"}
 
 
 def report(read: ReadRobot) -> dict[str, Any]:
-    """Everything that ``aloft robot show`` prints."""
+    """Return the content of ``aloft robot show``."""
     robot = read.description
     carrier = {joint.child: joint for joint in robot.joints}
     depth = {robot.base: 0}
@@ -91,7 +91,7 @@ def report(read: ReadRobot) -> dict[str, Any]:
 
 
 def missing(read: ReadRobot) -> list[str]:
-    """What a description lacks or assumes, each with what to write."""
+    """Return what a description lacks or assumes, each with what to write."""
     robot = read.description
     found = list(read.notes)
     if robot.base_joint != "fixed" and not robot.feet and not robot.thrusters:
@@ -202,7 +202,7 @@ def _draw(axes: Axes, robot: RobotDescription, poses: Poses, axis: int, sign: fl
 
 
 def _limb_colours(robot: RobotDescription) -> dict[str, str]:
-    """The base is grey, and every limb, with all that it carries, has a colour of its own."""
+    """Return the colours of the links: grey for the base, one for every limb with all that it carries."""
     colours, limbs = {robot.base: FAINT}, 0
     for joint in robot.joints:
         if joint.parent == robot.base:
@@ -214,6 +214,6 @@ def _limb_colours(robot: RobotDescription) -> dict[str, str]:
 
 
 def _outline(corners: Array, radius: float) -> Array:
-    """The outline (n, 2) of a shape with these corners (m, 2) that reaches beyond them by ``radius``."""
+    """Return the outline (n, 2) of a shape with these corners (m, 2) that reaches beyond them by ``radius``."""
     ahead = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=1)
     return np.asarray(corners[(corners @ ahead.T).argmax(axis=0)] + radius * ahead)

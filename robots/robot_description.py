@@ -72,8 +72,9 @@ class TurnedPart(Part):
 
 
 class Appearance(Part):
-    """What a link is drawn as, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts,
-    and capsules for the rest of what an imported file shows."""
+    """Appearance of a link, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts, and capsules
+    for the rest of what an imported file shows.
+    """
 
     later = ("boxes", "turned")
 
@@ -98,7 +99,7 @@ SLIDE_UNITS: Mapping[str, str] = {
     "rad": "m", "rad/s": "m/s", "rad/s^2": "m/s^2", "N m": "N", "N m s": "N s", "N m/rad": "N/m",
     "N m s/rad": "N s/m", "kg m^2": "kg",
 }  # fmt: skip
-"""What a quantity of a joint that turns, or of its motor, is measured in where the joint slides."""
+"""Units of a sliding joint's quantities, or its motor's, by those of one that turns."""
 
 
 class Joint(Part):
@@ -119,7 +120,7 @@ class Joint(Part):
     limits: tuple[float, float] | None = None
 
     def unit(self, hinge: str) -> str:
-        """The unit of a quantity of this joint that a hinge has in the unit ``hinge``."""
+        """Return the unit of a quantity of this joint that a hinge has in the unit ``hinge``."""
         return SLIDE_UNITS.get(hinge, hinge) if self.kind == "slide" else hinge
 
 
@@ -226,7 +227,7 @@ class Motors:
 
 
 class PowerSupply(Part):
-    """What feeds the motors: a pack, or a supply on a bench.
+    """Supply of the motors: a pack, or a supply on a bench.
 
     ``rated_voltage`` [V] is that at which the motors reach the speeds of their profile. A pack that is nearly full has
     ``open_voltage`` [V] without load, behind ``resistance`` [ohm]; ``recovery_resistance`` [ohm] builds up under load.
@@ -346,14 +347,14 @@ class RobotDescription(Part):
     points: Mapping[str, tuple[str, Vector3]] = {}
     """Named points [m, link frame] where something may push: name -> (link, position)."""
     thrusters: Mapping[str, Thruster] = {}
-    """What drives the robot without joints, such as the rotors of a quadrotor, by name."""
+    """Actuators that drive the robot without joints, such as the rotors of a quadrotor, by name."""
     supply: PowerSupply | None = None
-    """What feeds the motors; ``None``: nobody has said it."""
+    """Supply of the motors; ``None`` where it is unknown."""
     looks: Mapping[str, Appearance] = {}
-    """What links are drawn as, by name; others are drawn as their collision shapes."""
+    """Appearance of links, by name; others are drawn as their collision shapes."""
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are equal; pydantic compares cached arrays, too."""
+        """Check whether all fields are equal; pydantic compares cached arrays, too."""
         if not isinstance(other, RobotDescription):
             return NotImplemented
         return all(getattr(self, n) == getattr(other, n) for n in type(self).model_fields)
@@ -385,7 +386,7 @@ class RobotDescription(Part):
         return BASE_VELOCITIES[self.base_joint]
 
     def with_profile(self, name: str) -> Self:
-        """The same robot with another actuator profile in use.
+        """Return the same robot with another actuator profile in use.
 
         Raises:
             LookupError: it has no such profile; the message names those that it has.
@@ -396,7 +397,7 @@ class RobotDescription(Part):
         return self if name == self.motors.profile else self.changed(profile=name)
 
     def freed(self, names: Sequence[str]) -> Self:
-        """The same robot with those held joints, by name or pattern, free to move; it stands with them as it
+        """Return the same robot with those held joints, by name or pattern, free to move; it stands with them as it
         held them. Joints that are free already stay so.
 
         Raises:
@@ -415,7 +416,7 @@ class RobotDescription(Part):
         )
 
     def changed(self, **fields: Any) -> Self:
-        """A copy with other values in some fields, which are not validated again."""
+        """Return a copy with other values in some fields, which are not validated again."""
         copy = self.model_copy(update=fields)
         for name in list(vars(copy)):  # pydantic copies cached properties too
             if name not in type(self).model_fields:
@@ -423,7 +424,9 @@ class RobotDescription(Part):
         return copy
 
     def content(self) -> dict[str, Any]:
-        """All that is computed with, also by a simulator, as plain data from which the robot can be read again."""
+        """Return all that is computed with, also by a simulator, as plain data from which the robot can be read
+        again.
+        """
         return self.model_dump(mode="json", context={"simulated": True})
 
     @cached_property
@@ -459,7 +462,7 @@ class RobotDescription(Part):
         return self.rotor_matrix_of(1.0)
 
     def rotor_matrix_of(self, factor: Array | float) -> Array:
-        """The same with a factor on the inertia of each rotor, (n_motors,)."""
+        """Return the same with a factor on the inertia of each rotor, (n_motors,)."""
         matrix = self.joint_to_motor
         return product(matrix.T * (self.motors.rotor_inertia * factor), matrix)
 
@@ -475,7 +478,7 @@ class RobotDescription(Part):
         return np.ascontiguousarray(inverse(self.joint_to_motor).T)
 
     def motor_unit(self, motor: int, hinge: str) -> str:
-        """As ``Joint.unit``, for a motor; one that moves slides only has their units."""
+        """Return the unit of a motor's quantity, as ``Joint.unit``; one that moves slides only has their units."""
         gears = self.joint_to_motor[motor].tolist()
         units = {j.unit(hinge) for j, gear in zip(self.joints, gears, strict=True) if gear}
         return units.pop() if len(units) == 1 else hinge
@@ -504,10 +507,10 @@ class RobotDescription(Part):
         return self.total_mass * GRAVITY
 
     def link(self, name: str) -> Link:
-        """The link called ``name``."""
+        """Return the link called ``name``."""
         return next(link for link in self.links if link.name == name)
 
     def foot_of_contact(self) -> tuple[int, ...]:
-        """For every contact point the index of its foot."""
+        """Return the index of each contact point's foot."""
         names = [foot.name for foot in self.feet]
         return tuple(names.index(contact.foot) for contact in self.contacts)

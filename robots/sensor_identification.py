@@ -1,4 +1,4 @@
-"""What a robot that sways over standing feet tells of its IMU and its encoders.
+"""Identification of IMU and encoders from a run in which the robot sways over standing feet.
 
 The feet stand still, so the joints' velocities say how the base moves, and the IMU's readings follow::
 
@@ -33,7 +33,7 @@ from .robot_description import RobotDescription
 from .transmission import PLAY_TIME, PLAY_TORQUE
 
 CUTOFF = 6.0
-"""Of the filter that all signals pass [Hz]."""
+"""Cutoff of the filter that all signals pass [Hz]."""
 PADDING = 12
 """Ticks by which columns go on at both ends while they are filtered."""
 EDGE = 0.3
@@ -44,7 +44,7 @@ CORRELATED = 3.0 / (2.0 * CUTOFF)
 """Errors are independent after this time [s]: three times that of filtered noise, as feet rock and rotors
 cross their play for some 0.1 s. Robots that were drawn lie within the standard deviations that follow."""
 ITERATIONS = 8
-"""Of a fit, as the weights follow from what is left."""
+"""Iterations of a fit, as the weights follow from the residuals."""
 TYPICAL = 1.4826
 """The standard deviation of normal numbers over the median of their sizes."""
 OUTLYING = 1.5
@@ -54,23 +54,25 @@ NOISE_CUTOFF = 20.0
 SAMPLED = 0.02
 """The time between samples of the angles that are fitted [s]."""
 HIDDEN_TORQUE = 0.1
-"""Torque that currents do not tell, such as ripple [N m]: with no more than this a rotor may be anywhere in its play."""
+"""Torque that currents do not show, such as ripple [N m]: with no more than this a rotor may be anywhere in its
+play.
+"""
 USUAL_PLAY, RESOLVED = 0.01, 2e-4
-"""The play by which the error of an unseated rotor is weighted, and what an encoder tells at best [rad]."""
+"""Play by which the error of an unseated rotor is weighted, and an encoder's best resolution [rad]."""
 USUAL_COMPLIANCE = 2e-3
 """The compliance of gears is of this size beforehand [rad/(N m)]."""
 LEAST_COMPLIANCE = 3e-4
-"""No compliance is claimed to be known better [rad/(N m)]: play that is not seated looks like one."""
+"""Least standard deviation of a compliance [rad/(N m)]: play that is not seated looks like one."""
 LEAST_AGE, LEAST_PLAY = 1.5e-4, 1.5e-3
-"""No age [s] and no play [rad] is claimed to be known better."""
+"""Least standard deviations of an age [s] and of a play [rad]."""
 
 STOOD = 3.0
-"""The shortest stance that tells enough [s]."""
+"""Shortest stance that suffices [s]."""
 
 
 @dataclass(frozen=True)
 class IdentifiedSensors:
-    """What was found.
+    """Identified sensors.
 
     Attributes:
         imu_position: from the base's origin [m, base].
@@ -123,7 +125,7 @@ def _filtered(numerator: Array, denominator: Array, columns: Array) -> Array:
 
 
 def slope(values: Array, period: float) -> Array:
-    """The time derivatives of columns."""
+    """Return the time derivatives of columns."""
     return np.asarray(np.gradient(values, period, axis=0))
 
 
@@ -134,7 +136,7 @@ def shifted(values: Array, ticks: float) -> Array:
 
 
 def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
-    """The longest time in which every foot has a closed switch, up to bounces of some ticks.
+    """Return the longest time in which every foot has a closed switch, up to bounces of some ticks.
 
     Where that is too short the switches are too heavy for their loads, as a sway lifts no foot, and a closed
     switch of any foot counts.
@@ -153,7 +155,7 @@ def standing_span(robot: RobotDescription, motion: MeasuredRun) -> slice:
 
 
 def _longest(loaded: NDArray[np.bool_], period: float) -> tuple[int, int]:
-    """The first tick of the longest stance and the one after its last."""
+    """Return the first tick of the longest stance and the one after its last."""
     window = max(3, round(0.2 / period))
     share = np.convolve(loaded, np.ones(window) / window, mode="same")
     firm = np.concatenate([[False], share > 0.3, [False]])
@@ -201,7 +203,7 @@ def _sum(first: Estimate, second: Estimate, more: float = 0.0) -> Estimate:
 
 
 def play_positions(torque: Array, period: float) -> Array:
-    """Where in its play each rotor is, from -1 to 1, by the torques."""
+    """Return the place of each rotor in its play, from -1 to 1, by the torques."""
     ends = np.tanh(torque / PLAY_TORQUE)
     out, share = np.empty_like(ends), -math.expm1(-period / PLAY_TIME)
     here = ends[0]
@@ -214,7 +216,7 @@ def play_positions(torque: Array, period: float) -> Array:
 def _encoders(
     robot: RobotDescription, motion: MeasuredRun, span: slice
 ) -> tuple[dict[str, Estimate], Estimate, float]:
-    """The play of every joint and the age of the velocities beside the angles, and what is left [rad/s].
+    """Return the play of every joint and the age of the velocities beside the angles, and what is left [rad/s].
 
     The angles less the integrated velocities are fitted. Noise of the velocities makes a random walk of them; where
     a torque is so small that what is not measured of it may move the rotor across its play, they are
@@ -271,8 +273,9 @@ def _encoders(
 
 
 def base_motion(robot: RobotDescription, position: Array, *velocities: Array) -> tuple[Array, ...]:
-    """The base over standing feet: for each of the joints' ``velocities`` (n, n_joints) its own, linear and angular in
-    its own frame, (n, 6); last the middle of the contact points in that frame, (n, 3)."""
+    """Return the base over standing feet: for each of the joints' ``velocities`` (n, n_joints) its own, linear and
+    angular in its own frame, (n, 6); last the middle of the contact points in that frame, (n, 3).
+    """
     jacobians, places = contact_jacobians(robot, position)
     of_base, of_joints = jacobians[..., :6], jacobians[..., 6:]
     across = of_base.transpose(0, 2, 1)
@@ -323,7 +326,7 @@ def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, 
 
 
 def _up(centres: Array) -> Array:
-    """The vertical by the plane through the centres (n, balls, 3), (n, 3)."""
+    """Return the vertical by the plane through the centres (n, balls, 3), (n, 3)."""
     if centres.shape[1] < 3:
         return np.tile([0.0, 0.0, 1.0], (len(centres), 1))
     apart = centres - centres.mean(axis=1, keepdims=True)
@@ -395,8 +398,9 @@ def _accelerometer(
 
 
 def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
-    """The vertical in the base's frame by integration from level; how it changes with the tilt at first
-    (n, 3, 2), and with biases of the gyroscope (n, 3, 3)."""
+    """Return the vertical in the base's frame by integration from level; how it changes with the tilt at first (n, 3,
+    2), and with biases of the gyroscope (n, 3, 3).
+    """
     n = len(turning)
     middle = np.concatenate([0.5 * (turning[1:] + turning[:-1]), turning[-1:]]) * period
     steps = np.eye(3) + _rotation_beyond(middle)
@@ -410,7 +414,7 @@ def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
 
 
 def _rotation_beyond(vectors: Array) -> Array:
-    """The matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
+    """Return the matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     safe = np.maximum(angle, 1e-9)
     across = _cross(vectors)
@@ -456,7 +460,7 @@ def _three(values: Array, std: Array) -> tuple[Estimate, ...]:
 
 
 def _cross(vectors: Array) -> Array:
-    """The matrices of cross products with vectors (..., 3)."""
+    """Return the matrices of cross products with vectors (..., 3)."""
     out = np.zeros((*vectors.shape, 3))
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x

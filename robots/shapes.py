@@ -29,7 +29,7 @@ class Capsule(Part):
         return (self.start, self.end)
 
     def moved(self, place: Callable[[Vector3], Vector3]) -> Capsule:
-        """The capsule in another frame, in which ``place`` gives where a point is."""
+        """Return the capsule in another frame, in which ``place`` gives where a point is."""
         return Capsule(start=place(self.start), end=place(self.end), radius=self.radius)
 
 
@@ -44,12 +44,12 @@ class Hull(Part):
         return 0.0
 
     def moved(self, place: Callable[[Vector3], Vector3]) -> Hull:
-        """The hull in another frame, in which ``place`` gives where a point is."""
+        """Return the hull in another frame, in which ``place`` gives where a point is."""
         return Hull(corners=tuple(place(corner) for corner in self.corners))
 
 
 def _kind_of_shape(shape: Any) -> str:
-    """Which kind of shape data, or a shape, is: the keys of a hull are none of a capsule's."""
+    """Return the kind of shape data, or of a shape: the keys of a hull are none of a capsule's."""
     is_hull = "corners" in shape if isinstance(shape, Mapping) else isinstance(shape, Hull)
     return "hull" if is_hull else "capsule"
 
@@ -68,20 +68,22 @@ Edge = tuple[Vector3, Vector3]
 
 
 def is_body(hull: Hull) -> bool:
-    """Whether the corners are finite and lie in no plane."""
+    """Check whether the corners are finite and lie in no plane."""
     corners = np.array(hull.corners)
     return bool(np.isfinite(corners).all()) and spread(corners) >= THINNEST
 
 
 def spread(corners: Array) -> float:
-    """How far corners (n, 3) reach across the plane that fits them best [m]."""
+    """Return the reach of corners (n, 3) across the plane that fits them best [m]."""
     middle = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(middle.T @ middle)
     return float(np.ptp(middle @ directions[:, 0]))
 
 
 def corners_of(shapes: Sequence[Shape]) -> tuple[Array, Array]:
-    """The corners (n, 3) [m, link frame] of all shapes of a link, and how far these reach beyond each (n,) [m]."""
+    """Return the corners (n, 3) [m, link frame] of all shapes of a link, and how far these reach beyond each (n,)
+    [m].
+    """
     corners = [corner for shape in shapes for corner in shape.corners]
     radii = [shape.radius for shape in shapes for _ in shape.corners]
     return np.array(corners).reshape(-1, 3), np.array(radii)
@@ -99,8 +101,9 @@ def convex(corners: tuple[Vector3, ...]) -> Any:
 
 
 def surface(hull: Hull) -> tuple[Array, Indices]:
-    """The corners (n, 3) [m, link frame] that the hull has, and the triangles (m, 3) between them, counter-clockwise as
-    seen from outside."""
+    """Return the corners (n, 3) [m, link frame] that the hull has, and the triangles (m, 3) between them,
+    counter-clockwise as seen from outside.
+    """
     whole = convex(hull.corners)
     places = np.array(whole.points())
     found = [whole.polygons(k) for k in range(whole.num_polygons)]
@@ -112,7 +115,7 @@ def surface(hull: Hull) -> tuple[Array, Indices]:
 
 
 def edges(shape: Shape) -> tuple[Edge, ...]:
-    """The edges of a hull, among them those across a face of more than three corners; of a capsule its axis."""
+    """Return the edges of a hull, among them those across a face of more than three corners; of a capsule its axis."""
     return ((shape.start, shape.end),) if isinstance(shape, Capsule) else _edges(shape.corners)
 
 

@@ -21,7 +21,7 @@ from .part import Vector3
 from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart
 
 MOST_TRIANGLES = 24_000
-"""Of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""
+"""Greatest number of triangles of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""
 AROUND = 24
 """The flat pieces around a turned part."""
 
@@ -46,7 +46,7 @@ class RobotSurfaces:
 
 
 def missing_meshes(robot: RobotDescription) -> list[str]:
-    """A sentence for each link of which a mesh is not there; no mesh is read."""
+    """Return a sentence for each link of which a mesh is not there; no mesh is read."""
     return [
         _absent(link, mesh)
         for link, look in robot.looks.items()
@@ -56,8 +56,9 @@ def missing_meshes(robot: RobotDescription) -> list[str]:
 
 
 def robot_surfaces(robot: RobotDescription) -> RobotSurfaces:
-    """The surfaces of all links, each mesh made coarser where that is needed to have at most
-    ``MOST_TRIANGLES`` in all. Files that serve several links are read once."""
+    """Return the surfaces of all links, each mesh made coarser where that is needed to have at most ``MOST_TRIANGLES``
+    in all. Files that serve several links are read once.
+    """
     result = RobotSurfaces()
     count = sum(len(look.meshes) for look in robot.looks.values())
     most = MOST_TRIANGLES // max(1, count)
@@ -75,7 +76,7 @@ def robot_surfaces(robot: RobotDescription) -> RobotSurfaces:
 
 
 def joined(surfaces: list[Surface]) -> Surface:
-    """All as one, without colours."""
+    """Return all as one, without colours."""
     starts = np.cumsum([0, *(len(each.corners) for each in surfaces)])
     return Surface(
         np.concatenate([each.corners for each in surfaces]),
@@ -86,7 +87,7 @@ def joined(surfaces: list[Surface]) -> Surface:
 def _meshes(
     link: str, look: Appearance, most: int, known: dict[Path, Surface]
 ) -> Iterator[Surface]:
-    """The meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence to tell."""
+    """Yield the meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence for the user."""
     for mesh in look.meshes:
         path = _path(mesh)
         if path is None:
@@ -111,7 +112,7 @@ def _absent(link: str, mesh: Mesh) -> str:
 
 
 def _placed(part: Mesh | Box, corners: Array) -> Array:
-    """The corners (n, 3) of a part in the link's frame."""
+    """Return the corners (n, 3) of a part in the link's frame."""
     turn = matrices_of_quaternions(np.array(part.orientation))
     placed: Array = corners @ turn.T + np.array(part.position)
     return placed
@@ -122,7 +123,7 @@ def _color(text: str | None) -> int | None:
 
 
 def box_surface(box: Box) -> Surface:
-    """The surface of a box whose edges are rounded by ``box.round``.
+    """Return the surface of a box whose edges are rounded by ``box.round``.
 
     A point p of the sharp box's faces goes to q + r (p - q) / |p - q|, with q the point of the inner box, smaller
     by r on all sides, that is nearest to it.
@@ -161,7 +162,7 @@ def box_surface(box: Box) -> Surface:
 
 
 def turned_surface(part: TurnedPart) -> Surface:
-    """The surface that the part's profile of radius and place along its axis sweeps, closed at both ends.
+    """Return the surface that the part's profile of radius and place along its axis sweeps, closed at both ends.
 
     Each piece of the profile has corners of its own, so that its ends are seen as edges.
     """
@@ -193,7 +194,7 @@ def turned_surface(part: TurnedPart) -> Surface:
 
 
 def quaternion_from_z(direction: Array | Vector3) -> Array:
-    """The shortest rotation x, y, z, w from +z to ``direction``, which need not be a unit vector."""
+    """Return the shortest rotation x, y, z, w from +z to ``direction``, which need not be a unit vector."""
     length = float(np.linalg.norm(direction))
     if length < 1e-12:
         return np.array([0.0, 0.0, 0.0, 1.0])
@@ -205,7 +206,7 @@ def quaternion_from_z(direction: Array | Vector3) -> Array:
 
 
 def normals(surface: Surface) -> Array:
-    """The unit normal at each corner, (n, 3): the mean of those of its triangles by their areas."""
+    """Return the unit normal at each corner, (n, 3): the mean of those of its triangles by their areas."""
     a, b, c = (surface.corners[surface.triangles[:, k]] for k in range(3))
     each = np.cross(b - a, c - a)
     found = np.zeros_like(surface.corners)

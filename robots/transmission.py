@@ -85,12 +85,12 @@ class MotorGains:
 
     @property
     def exact(self) -> bool:
-        """Whether the drives give the joints exactly the wanted gains."""
+        """True if the drives give the joints exactly the wanted gains."""
         return not self.losses
 
 
 def motor_gains(robot: RobotDescription, wanted: Array, unit: str) -> MotorGains:
-    """The gains of the drives for the wanted gains of the joints.
+    """Return the gains of the drives for the wanted gains of the joints.
 
     Where no set of motor gains gives them, these are the non-negative ones with the least sum of
     squared errors of the joints' matrix, in which the error of the pair of joints (i, j) is taken
@@ -117,8 +117,9 @@ def motor_gains(robot: RobotDescription, wanted: Array, unit: str) -> MotorGains
 
 
 def _non_negative_least_squares(columns: Array, target: Array) -> Array:
-    """The ``x >= 0`` with the least ``|columns x - target|``, one element after the other in turn;
-    the problem is convex and its columns are independent, so this ends at the minimum."""
+    """Return the ``x >= 0`` with the least ``|columns x - target|``, one element after the other in turn; the problem
+    is convex and its columns are independent, so this ends at the minimum.
+    """
     products, slope = product(columns.T, columns), product(columns.T, target)
     found = np.zeros(len(slope))
     for _ in range(_SWEEPS):

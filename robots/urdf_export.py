@@ -24,7 +24,7 @@ FREE = 1e3
 
 
 def urdf_of(robot: RobotDescription, meshes: str = "meshes") -> str:
-    """The URDF's text. All numbers are written with every digit they have.
+    """Return the URDF's text. All numbers are written with every digit they have.
 
     Args:
         robot: the robot.
@@ -50,7 +50,7 @@ def urdf_of(robot: RobotDescription, meshes: str = "meshes") -> str:
 
 
 def _fastest(robot: RobotDescription) -> Array:
-    """The largest speed of each joint alone [rad/s, m/s], which its first motor limits."""
+    """Return the largest speed of each joint alone [rad/s, m/s], which its first motor limits."""
     gears = np.abs(robot.joint_to_motor)
     allowed = robot.motors.no_load_speed[:, None] / np.where(gears > 0.0, gears, np.nan)
     return np.asarray(np.nanmin(allowed, axis=0)) if len(robot.joints) else np.zeros(0)
@@ -61,7 +61,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _add_world(root: Element, robot: RobotDescription) -> None:
-    """What holds a base that does not float: a world, and joints as the base has motions."""
+    """Add what holds a base that does not float: a world, and joints as the base has motions."""
     if robot.base_joint == "floating":
         return
     SubElement(root, "link", name="world")
@@ -91,7 +91,7 @@ def _connect(root: Element, name: str, kind: str, parent: str, child: str) -> El
 
 
 def hull_meshes(robot: RobotDescription) -> dict[str, bytes]:
-    """The convex hulls as binary STL, by the name of the file: a URDF has no shape for them."""
+    """Return the convex hulls as binary STL, by the name of the file: a URDF has no shape for them."""
     found = {}
     for link in robot.links:
         for k, shape in enumerate(link.shapes):

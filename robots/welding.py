@@ -21,7 +21,7 @@ from .kinematics import from_base_outwards
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """What hangs on a held joint: a rigid body that is part of a link of the welded robot, and what moves on it.
+    """Load on a held joint: a rigid body that is part of a link of the welded robot, and what moves on it.
 
     Attributes:
         joint: the held joint's index in the whole robot.
@@ -72,12 +72,12 @@ class WeldedRobot:
         return whole
 
     def reduce(self, values: Array) -> Array:
-        """The values of the welded robot's joints from those of all joints (..., n)."""
+        """Return the values of the welded robot's joints from those of all joints (..., n)."""
         return np.asarray(values[..., list(self.moving)])
 
 
 def welded(robot: RobotDescription) -> WeldedRobot:
-    """The robot with its ``held`` joints welded at their angles.
+    """Return the robot with its ``held`` joints welded at their angles.
 
     Link frames of the result are parallel to the base's at its zero pose, as in every description.
     A robot that holds nothing comes back as it is.
@@ -97,7 +97,7 @@ def _welded(text: str) -> WeldedRobot:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a link's frame is in the link that it has become part of."""
+    """Place of a link's frame in the link that it has become part of."""
 
     link: str
     rotation: Array
@@ -107,7 +107,7 @@ class _Place:
         return np.asarray(self.origin + self.rotation @ np.array(place))
 
     def vector(self, place: Sequence[float]) -> Vector3:
-        """The same as plain numbers."""
+        """Return the same as plain numbers."""
         return _vector(self.point(place))
 
 
@@ -183,8 +183,9 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
 
 
 def _load(robot: RobotDescription, places: dict[str, _Place], index: int) -> HeldLoad | None:
-    """What hangs on a held joint; ``None`` for a slide, and where something that stands on the ground
-    hangs on it."""
+    """Return the load on a held joint; ``None`` for a slide, and where something that stands on the ground hangs on
+    it.
+    """
     joint = robot.joints[index]
     rigid, beyond, carried = {joint.child}, {joint.child}, list[int]()
     for k, other in from_base_outwards(robot):
@@ -216,7 +217,7 @@ def _moved_contact(robot: RobotDescription, places: dict[str, _Place], contact: 
 
 
 def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Link:
-    """A link with all that is welded to it."""
+    """Return a link with all that is welded to it."""
     parts = [link for link in robot.links if places[link.name].link == name]
     mass, com, inertia = _lumped(places, parts)
     shapes = list[Shape]()

@@ -79,7 +79,7 @@ class Leaf:
 
     @property
     def is_usual(self) -> bool:
-        """Whether a signal has the field if nobody asks for it."""
+        """True if a signal has the field by default."""
         return not self.path[-1].endswith("covariance") and self.path[0] != "layout"
 
     @property
@@ -92,7 +92,7 @@ class Leaf:
 
 @lru_cache(maxsize=4)
 def type_store(distribution: str) -> Any:
-    """The message types of a distribution of ROS 2.
+    """Return the message types of a distribution of ROS 2.
 
     Raises:
         BlockError: the library is missing, or does not know the distribution.
@@ -305,7 +305,7 @@ class Codec:
         }
 
     def write(self, values: Values, time: int) -> bytes:
-        """The bytes of a message with these numbers and the time [ns]."""
+        """Return the bytes of a message with these numbers and the time [ns]."""
         for stamp in self._stamps:
             stamp.sec, stamp.nanosec = divmod(time, 1_000_000_000)
         for leaf in self.type.leaves:
@@ -316,7 +316,7 @@ class Codec:
         return bytes(data)
 
     def read(self, data: bytes) -> dict[str, NDArray[Any]]:
-        """The numbers in the bytes of a message.
+        """Return the numbers in the bytes of a message.
 
         Raises:
             WrongMessageError: it is no message of this type, or does not fit the signal.
@@ -337,7 +337,7 @@ class Codec:
         return found
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
-        """Where in the message's lists what is first, second, ... in ``order`` is."""
+        """Return the places in the message's lists of the names in ``order``."""
         names = list(getattr(message, "name", ()))
         if not self._order or not names or tuple(names) == self._order:
             return None
@@ -366,7 +366,7 @@ class Codec:
         return result
 
     def _owners(self, message: Any, leaf: Leaf) -> list[tuple[int, Any]]:
-        """What has the leaf's last attribute; with the number in the list of messages, or -1."""
+        """Return the objects that own the leaf's last attribute, each with its place in the list of messages, or -1."""
         if leaf.listed < 0:
             return [(-1, _follow(message, leaf.path[:-1]))]
         elements = _follow(message, leaf.path[: leaf.listed + 1])

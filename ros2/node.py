@@ -30,12 +30,12 @@ ATTACHMENT = _ATTACHMENT.size
 
 
 def is_topic(name: str) -> bool:
-    """Whether ROS 2 takes this for the name of a topic."""
+    """Check whether ROS 2 accepts this as the name of a topic."""
     return _NAME.match(name) is not None
 
 
 def full_name(name: str, namespace: str = "/") -> str:
-    """A topic's name from the root: ``imu`` in ``/bruce`` is ``/bruce/imu``."""
+    """Return a topic's name from the root: ``imu`` in ``/bruce`` is ``/bruce/imu``."""
     return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
 
 
@@ -46,26 +46,26 @@ def dds_type(name: str) -> str:
 
 
 def data_key(domain: int, topic: str, type_name: str, type_hash: str) -> str:
-    """The key expression of a topic's messages."""
+    """Return the key expression of a topic's messages."""
     return f"{domain}/{topic.strip('/')}/{dds_type(type_name)}/{type_hash}"
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What a publisher offers or a subscription asks for; the rest is the middleware's default."""
+    """Quality of service of a publisher or subscription; the rest is the middleware's default."""
 
     reliable: bool = True
     depth: int = 10
 
     def chunk(self) -> str:
-        """The last part of a token: values are left out where they are the default (depth 42)."""
+        """Return the last part of a token: values are left out where they are the default (depth 42)."""
         reliability = "" if self.reliable else "2"
         depth = "" if self.depth == 42 else str(self.depth)
         return f"{reliability}::,{depth}:,:,:,,"
 
 
 def mangled(name: str) -> str:
-    """A name within one chunk of a key expression."""
+    """Return a name within one chunk of a key expression."""
     return name.replace("/", "%") or "%"
 
 
@@ -87,24 +87,24 @@ class NodeName:
         )
 
     def token(self) -> str:
-        """The node's own token."""
+        """Return the node's own token."""
         return self._place(self.number, "NN")
 
     def endpoint(
         self, entity: int, kind: str, topic: str, type_name: str, type_hash: str, quality: Quality
     ) -> str:
-        """The token of a publisher (``MP``) or a subscription (``MS``)."""
+        """Return the token of a publisher (``MP``) or a subscription (``MS``)."""
         place = f"{self._place(entity, kind)}/{mangled(topic)}"
         return f"{place}/{dds_type(type_name)}/{type_hash}/{quality.chunk()}"
 
 
 def attachment(sequence: int, time: int, gid: bytes) -> bytes:
-    """What goes beside a message: its number, its time [ns], and who sends (16 bytes)."""
+    """Return the attachment of a message: its number, its time [ns], and the sender (16 bytes)."""
     return _ATTACHMENT.pack(sequence, time, 16, gid)
 
 
 def sequence_in(data: bytes) -> int | None:
-    """The number of a message, from what came beside it; ``None`` if that is something else."""
+    """Return the number of a message, from what came beside it; ``None`` if that is something else."""
     if len(data) != ATTACHMENT:
         return None
     sequence, _, length, _ = _ATTACHMENT.unpack(data)
@@ -117,7 +117,7 @@ RETRY = 0.5
 
 @dataclass(frozen=True)
 class NodeAddress:
-    """Where a node is: the router's endpoint, the domain, namespace and name."""
+    """Address of a node: the router's endpoint, the domain, namespace and name."""
 
     router: str
     domain: int
@@ -127,7 +127,7 @@ class NodeAddress:
 
 @dataclass(frozen=True)
 class Endpoint:
-    """What a block announces: a publisher or a subscription.
+    """Publisher or subscription that a block announces.
 
     ``joined`` is called with the session, the key of the data and the 16 bytes that name the endpoint;
     what it returns is kept until the node is left.
@@ -227,8 +227,8 @@ _LOCK = threading.Lock()
 
 
 def join(address: NodeAddress) -> Node:
-    """The node of this address, for one more block. Raises ``MissingExtraError``."""
-    need_extra("zenoh", "ros2", "a topic of ROS 2")
+    """Return the node of this address, for one more block. Raises ``MissingExtraError``."""
+    need_extra("rosbags", "ros2", "a topic of ROS 2")
     with _LOCK:
         node = _NODES.setdefault(address, Node(address))
         node.users += 1
@@ -237,7 +237,7 @@ def join(address: NodeAddress) -> Node:
 
 @atexit.register
 def _leave_all() -> None:
-    """A process must not end while a thread of its own is within Zenoh."""
+    """Leave all nodes: a process must not end while a thread of its own is within Zenoh."""
     for node in list(_NODES.values()):
         node.leave()
 

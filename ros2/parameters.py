@@ -1,4 +1,4 @@
-"""What the blocks that talk to ROS 2 have in common: parameters, and ports that follow from a type."""
+"""Parameters and typed ports common to the blocks that talk to ROS 2."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FRAMES = {"body": "base_link", "world": "world"}
 
 
 class Ros2Parameters(Parameters):
-    """What ``ros2.Publish`` and ``ros2.Subscribe`` have in common."""
+    """Parameters common to ``ros2.Publish`` and ``ros2.Subscribe``."""
 
     topic: str = parameter(..., text="the topic, as /joint_states")
     type: str = parameter(..., text="the message type, as sensor_msgs/msg/JointState")
@@ -54,18 +54,18 @@ def _type(
 
 
 def message_type(params: Ros2Parameters) -> MessageType:
-    """The message type that parameters ask for. Raises ``BlockError``."""
+    """Return the message type that parameters ask for. Raises ``BlockError``."""
     sizes = tuple(params.sizes.items())
     return _type(params.type, params.distribution, sizes, tuple(params.fields))
 
 
 def quality(params: Ros2Parameters) -> Quality:
-    """What is offered or asked for."""
+    """Return the quality of service that parameters select."""
     return Quality(params.reliability == "reliable", params.depth)
 
 
 def address(params: Ros2Parameters) -> NodeAddress:
-    """The node of a block."""
+    """Return the node of a block."""
     return NodeAddress(params.router, params.domain, params.namespace, params.node)
 
 
@@ -101,13 +101,13 @@ class Ros2Block(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A twist."""
+        """Return a twist."""
         return {
             "topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist", "router": "tcp/127.0.0.1:1"
         }  # fmt: skip
 
     def codec(self) -> Codec:
-        """What writes and reads this block's messages."""
+        """Return the codec of this block's messages."""
         context: Context = self.context
         found = message_type(self.params)
         order = [joint.name for joint in context.robot.joints] if context.robot is not None else []
@@ -120,7 +120,7 @@ class Ros2Block(Block):
 def texts_of(
     params: Ros2Parameters, robot: RobotDescription | None, found: MessageType
 ) -> dict[str, str | list[str]]:
-    """The texts of a message: those that the graph gives, the frame, and the joints' names."""
+    """Return the texts of a message: those that the graph gives, the frame, and the joints' names."""
     texts: dict[str, str | list[str]] = {}
     frames = dict.fromkeys(leaf.frame for leaf in found.leaves if leaf.frame is not None)
     if frames and any(path.endswith("frame_id") for path in found.texts):

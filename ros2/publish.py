@@ -62,7 +62,7 @@ class Publish(Ros2Block):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class whose input has the fields of the message type."""
+        """Return the class whose input has the fields of the message type."""
         assert isinstance(params, PublishParameters)
         return _class_for(message_type(params).signal)
 
@@ -111,7 +111,7 @@ class Publish(Ros2Block):
         self._node = self._thread = None
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many messages were sent, and how many were not."""
+        """Return the numbers of messages that were sent and that were not."""
         return {"sent": self._sent, "not_sent": self._lost}
 
     def _joined(self, session: Any, key: str, gid: bytes) -> Any:

@@ -19,7 +19,7 @@ from .parameters import Ros2Block, Ros2Parameters, address, message_type, qualit
 
 
 class TopicHealth(Signal):
-    """What has come on a topic."""
+    """State of reception on a topic."""
 
     age = Field(unit="s", text="since the newest message came; before it, since the run began")
     late = Field(dtype="bool", text="whether that is more than max_age")
@@ -68,7 +68,7 @@ class Subscribe(Ros2Block):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class whose output has the fields of the message type."""
+        """Return the class whose output has the fields of the message type."""
         assert isinstance(params, SubscribeParameters)
         return _class_for(message_type(params).signal)
 
@@ -116,7 +116,7 @@ class Subscribe(Ros2Block):
         self._node = None
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many messages came."""
+        """Return the number of messages received."""
         return {"received": self._received, "refused": self._refused}
 
     def hear(self, data: bytes, beside: bytes = b"") -> None:

@@ -1,4 +1,4 @@
-"""What a calibration finds of robots that the trial ``real`` draws, beside what was drawn.
+"""Errors of a calibration on robots that the trial ``real`` draws.
 
 Each robot sways over its standing feet (``graphs/calibrate.yaml``), and ``aloft robot calibrate`` finds what it is like from that alone.
 The truth is what the simulator drew (``studies/oracle``). Torque constants are compared by their ratio to the mean one, because no motion
@@ -32,7 +32,7 @@ SEEDS = range(97840, 97860)
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is found, in a unit, and the largest good error."""
+    """A calibrated quantity with its unit and its largest good error."""
 
     name: str
     unit: str
@@ -87,7 +87,7 @@ def identification(seeds: Sequence[int] = SEEDS, workers: int = 0) -> list[Row]:
 
 
 def row_of(quantity: Quantity, robots: Sequence[Errors]) -> Row:
-    """The row of a quantity, with how many of its errors are within the goal and within the claim."""
+    """Return the row of a quantity: the shares of its errors within the goal and within the claim."""
     errors = np.concatenate([each for each, _ in robots])
     claimed = np.concatenate([each for _, each in robots])
     size = np.abs(errors)
@@ -110,7 +110,7 @@ def _errors_of_robot(seed: int) -> dict[str, Errors]:
 
 
 def errors_of(found: Calibration, graph: Graph) -> dict[str, Errors]:
-    """What a calibration misses of the robot that a graph draws, by the name of the quantity."""
+    """Compute a calibration's errors for the robot that a graph draws, by the name of the quantity."""
     robot = graph.checked.robot
     assert robot is not None
     true = oracle_values(graph)

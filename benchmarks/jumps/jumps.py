@@ -120,12 +120,13 @@ def compile_functions(tasks: Sequence[JumpTask], robot: RobotDescription) -> flo
 
 
 def _kind(task: JumpTask) -> tuple[bool, ...]:
-    """What decides the functions that a task needs: whether it leaves the plane, and has a step."""
+    """Tell which functions a task needs: whether it leaves the plane, and has a step."""
     return bool(task.distance_y or task.twist), bool(task.landing_height)
 
 
 def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
-    """The outcomes of one task: of its plan with an empty key, then of each run by its ``run_key``."""
+    """Plan and run one task; return the outcome of its plan under an empty key, then of each run
+    under its ``run_key``."""
     robot = find_robot("bruce")
     library = PlanLibrary(robot, job.folder, ())
     found = []
@@ -144,7 +145,7 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
 
 
 def run_key(trial: str, push: float, seed: int) -> str:
-    """What a run is kept under, behind its task's key."""
+    """Return the key under which a run is kept, behind its task's key."""
     return f":{trial}:{push:g}:{seed}"
 
 
@@ -155,12 +156,13 @@ def run_once(job: JumpJob, seed: int) -> Outcome:
 
 
 def bruce_jumps(trial: str = TRIAL) -> JumpGraph:
-    """The graph in which BRUCE jumps, in a trial."""
+    """Return the graph in which BRUCE jumps, in a trial."""
     return JumpGraph("bruce", shipped_folder() / "jump.yaml", trial_settings(trial))
 
 
 def pushed_jumps(job: JumpJob, seed: int) -> JumpGraph:
-    """The same graph with a push in the flight, in a direction and at a moment drawn by task and seed."""
+    """Return the same graph with a push in the flight, in a direction and at a moment drawn by task
+    and seed."""
     rng = np.random.default_rng([seed, *job.task.name.encode()])
     rise, drop = job.task.rise or 0.0, job.task.landing_height or 0.0
     flight = sum(math.sqrt(2.0 * max(h, 0.0) / GRAVITY) for h in (rise, rise - drop))

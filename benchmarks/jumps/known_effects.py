@@ -85,7 +85,7 @@ def known_effects(
 
 
 def cells_by_effect() -> Mapping[str, Sequence[Cell]]:
-    """The jumps of each effect."""
+    """Return the jumps of each effect."""
     found: dict[str, list[Cell]] = {}
     for cell in cells(read_study(shipped_folder() / "studies" / "effects.yaml")):
         found.setdefault(cell.labels["effect"], []).append(cell)
@@ -93,7 +93,8 @@ def cells_by_effect() -> Mapping[str, Sequence[Cell]]:
 
 
 def landed(job: EffectJob) -> dict[str, str]:
-    """Why each jump failed, by its name; empty where it landed."""
+    """Run the jumps and return the reason of each failure by the jump's name; empty where it
+    landed."""
     graphs, effects, found = shipped_folder(), cells_by_effect(), {}
     jumps, name = effects[job.effect], f"effect_{[*effects].index(job.effect)}"
     effect = {k: v for k, v in jumps[0].overrides.items() if k.startswith("robot.")}

@@ -46,7 +46,7 @@ MISSED_GOAL = 0.05
 
 
 def random_tasks(count: int = COUNT, seed: int = SEED, harder: bool = False) -> list[JumpTask]:
-    """The first ``count`` tasks of a seed; the same on every machine."""
+    """Draw the first ``count`` tasks of a seed; they are the same on every machine."""
     rng = np.random.default_rng(seed)
     ranges = _HARDER if harder else _KINDS
     kinds = list(ranges)
@@ -66,7 +66,7 @@ def _signed(rng: np.random.Generator, most: float) -> float:
 
 def _step(rng: np.random.Generator, rise: tuple[float, float], step: tuple[float, float],
           ahead: tuple[float, float]) -> dict[str, Any]:  # fmt: skip
-    """A jump onto or off a step; the rise is above the higher ground."""
+    """Draw a jump onto or off a step; the rise is above the higher ground."""
     height = _between(rng, *step)
     return {
         "rise": round(_between(rng, *rise) + max(0.0, height), 4),
@@ -141,7 +141,7 @@ def random_rows(count: int = COUNT, seed: int = SEED) -> list[Row]:
 
 
 def plan_one(task: JumpTask, robot: RobotDescription) -> str:
-    """Why a task has no valid plan; empty if it has one."""
+    """Plan a task and return the reason why it has no valid plan; empty if it has one."""
     try:
         solve_and_check(task, robot)
     except (InvalidPlanError, PlanError) as error:

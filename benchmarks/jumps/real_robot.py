@@ -45,11 +45,11 @@ ARMS: Mapping[str, tuple[Told, bool]] = {
     "calibrated and learning": ("calibration", True),
     "told within the calibration's goals, learning": ("draws", True),
 }
-"""What the controller is told, and whether the robot learns."""
+"""The controller's knowledge of each arm, and whether the robot learns."""
 MISSED_GOAL = 0.05
 """The largest good share of robots that do not land."""
 FOLDER = Path("results") / "real_robot"
-"""Where results, the fragments of calibrations and what robots have learnt go."""
+"""Folder of the results, the fragments of calibrations and the files that robots have learnt."""
 _NOISES = 1000
 
 
@@ -64,7 +64,7 @@ class RobotJob:
 
 
 Jumps = dict[str, list[dict[str, Any]]]
-"""What became of each jump, by its kind: ``success``, ``reason``, and the largest tilt [deg]."""
+"""The outcomes of jumps by kind: ``success``, ``reason``, and the largest tilt [deg]."""
 
 
 def real_robot(
@@ -105,7 +105,8 @@ def real_robot(
 
 
 def chosen(what: str, names: Sequence[str], there: tuple[str, ...]) -> tuple[str, ...]:
-    """The names, all that there are by default. Raises ``AloftError`` for others."""
+    """Check the names and return them, by default all that there are. Raises ``AloftError`` for
+    others."""
     for name in names:
         if name not in there:
             raise AloftError(f"there is no {what} {name!r}; there is {', '.join(map(repr, there))}")
@@ -113,12 +114,12 @@ def chosen(what: str, names: Sequence[str], there: tuple[str, ...]) -> tuple[str
 
 
 def jumps_of(job: RobotJob) -> dict[str, Jumps]:
-    """What becomes of a robot's jumps, by arm."""
+    """Run a robot's jumps and return their outcomes by arm."""
     return {arm: jumps_in(arm, job) for arm in job.arms}
 
 
 def jumps_in(arm: str, job: RobotJob) -> Jumps:
-    """What becomes of the jumps of a robot in one arm."""
+    """Run a robot's jumps in one arm and return their outcomes."""
     told, learns = ARMS[arm]
     file = (FOLDER / f"{_owner(job.robot)}_{job.seed}_{tuple(ARMS).index(arm)}.json").absolute()
     learnt, found, count = LearntJumps(job.robot), Jumps(), 0
@@ -152,7 +153,7 @@ def graph_of(
     seed: int, told: Told, asked: AskedJump, task: Mapping[str, Any], number: int,
     learnt: Path | None = None,
 ) -> Graph:  # fmt: skip
-    """The graph of a robot's jump, with noise of its own."""
+    """Return the graph of a robot's jump, with noise of its own."""
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
     if told == "calibration":
@@ -172,13 +173,14 @@ def graph_of(
 
 
 def with_margin(task: Mapping[str, Any]) -> dict[str, Any]:
-    """The task, planned with ``EFFORT``."""
+    """Return the task with the effort ``EFFORT`` for its plan."""
     return {"effort": EFFORT, **task}
 
 
 @cache
 def calibrated(graph: Path, seed: int, name: str, robot: str = "bruce") -> Path:
-    """The fragment that a calibration of a robot writes, which sways in a graph. Raises ``AloftError``."""
+    """Calibrate a robot that sways in a graph, and return the fragment that this writes. Raises
+    ``AloftError``."""
     folder = FOLDER.absolute()
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{name}_{seed}.yaml"
@@ -188,7 +190,7 @@ def calibrated(graph: Path, seed: int, name: str, robot: str = "bruce") -> Path:
 
 
 def planned(task: Mapping[str, Any], robot: str) -> PlannedJump:
-    """The plan of a robot's task."""
+    """Plan a robot's task."""
     return _planned(frozenset({**with_margin(task), "robot": robot}.items()))
 
 
@@ -199,7 +201,7 @@ def _planned(task: frozenset[tuple[str, Any]]) -> PlannedJump:
 
 
 def _owner(robot: str) -> str:
-    """How the files of a robot begin."""
+    """Return the prefix of a robot's files."""
     return "robot" if robot == "bruce" else robot
 
 
@@ -212,7 +214,8 @@ def _row(what: str, robots: Sequence[Sequence[Mapping[str, Any]]]) -> Row:
 
 
 def missed_row(what: str, landed: int, n: int, goal: float, more: str = "") -> Row:
-    """The share of n robots that do not land, of which ``landed`` do; ``more`` ends the note."""
+    """Return the share of n robots that do not land, of which ``landed`` do; ``more`` ends the
+    note."""
     low, high = wilson_interval(landed, n)
     note = f"{landed} of {n} robots, 95 % interval {low:.2f} to {high:.2f}{more}"
     return Row(f"do not land {what}", 1.0 - landed / n, "", goal=goal, note=note)

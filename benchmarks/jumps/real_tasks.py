@@ -1,4 +1,4 @@
-"""What robots as a bench finds them are asked to do, in which order."""
+"""The jumps that robots as a bench finds them are asked for, in their order."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALONE = "jump.yaml"
 OTHERS = "robots/"
 """The graphs of robots other than BRUCE."""
 TIMES = 5
-"""How often a robot that learns makes a jump of one kind."""
+"""Number of times that a robot that learns makes a jump of one kind."""
 PUSHES = (0.0, 90.0, 180.0, 270.0)
 """The directions of pushes in flight [deg], in which robots take turns."""
 
@@ -46,11 +46,12 @@ class AskedJump:
 
     @property
     def alone(self) -> bool:
-        """Whether it is one jump without a push, from which a robot learns."""
+        """True for one jump without a push, from which a robot learns."""
         return self.graph == ALONE or self.graph.startswith(OTHERS)
 
     def before(self, first: bool) -> list[dict[str, float]]:
-        """The smaller jumps that a robot that learns makes before: all of the ladder at ``first``, then half as far."""
+        """Return the smaller jumps that a robot that learns makes before: all of the ladder at
+        ``first``, then half as far."""
         rungs = ladder(self.task, self.task["rise"])
         return rungs if first else rungs[-1:] if len(self.task) > 1 and self.alone else []
 
@@ -86,11 +87,12 @@ ASKED_OF_OTHERS: Mapping[str, Mapping[str, AskedJump]] = {
     "g1": _others("g1", "in place 5 cm", "ahead 8 cm", 0.05, 0.08),
     "solo12": _others("solo12", "in place 10 cm", "ahead 15 cm", 0.1, 0.15),
 }
-"""What robots other than BRUCE are asked for."""
+"""The jumps that robots other than BRUCE are asked for."""
 
 
 def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
-    """What the robot of a seed is asked for, by name; BRUCE's random task and push are its own."""
+    """Return the jumps that the robot of a seed is asked for, by name; BRUCE's random task and push
+    are its own."""
     if robot != "bruce":
         return ASKED_OF_OTHERS[robot]
     angle = math.radians(PUSHES[seed % len(PUSHES)])
@@ -105,7 +107,7 @@ def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
 
 
 def random_task(seed: int) -> Mapping[str, float]:
-    """A task of 6 to 14 cm, -10 to 22 cm ahead, up to 10 cm aside, and turned by up to 40 deg."""
+    """Draw a task of 6 to 14 cm, -10 to 22 cm ahead, up to 10 cm aside, and turned by up to 40 deg."""
     rng = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:

@@ -31,7 +31,7 @@ SETTINGS = (
 
 
 def expected_delay(delay: float, jitter: float = 0.0) -> float:
-    """The delay [s] that the controller expects, for links that take from ``delay`` to
+    """Return the delay [s] that the controller expects, for links that take from ``delay`` to
     ``delay + jitter`` each way [s]."""
     return ROBOT_DELAY + 2.0 * delay + jitter + PERIOD
 
@@ -48,8 +48,9 @@ def jump(delay: float, seed: int, jitter: float = 0.0, loss: float = 0.0) -> Vir
 def travel(
     delay: float, jitter: float = 0.0, loss: float = 0.0, seed: int = 0
 ) -> Callable[[str, int], int | None]:
-    """How long messages take [ns]: from ``delay`` to ``delay + jitter`` [s], uniformly; none for the
-    share ``loss`` of them. The numbers of a link do not depend on what others carry."""
+    """Return a draw of the travel times of messages [ns]: from ``delay`` to ``delay + jitter`` [s],
+    uniformly; none for the share ``loss`` of them. The numbers of a link do not depend on what
+    others carry."""
     streams: dict[str, np.random.Generator] = {}
 
     def take(key: str, now: int) -> int | None:
@@ -65,7 +66,7 @@ def link_delays(
     delays: Sequence[float] = DELAYS, seeds: Sequence[int] = tuple(range(1000, 1005)),
     jitter: float = 0.0, loss: float = 0.0,
 ) -> list[Row]:  # fmt: skip
-    """For each delay the share of jumps that fail.
+    """Measure the share of jumps that fail for each delay.
 
     Args:
         delays: what a message takes at least [s].

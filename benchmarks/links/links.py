@@ -43,8 +43,9 @@ _DEVICES = list(range(1, 11))
 
 
 def damping(repetitions: int = 40) -> Row:
-    """The longest time from the last command to the instruction that damps, by the watchdog's
-    process, with nothing said by the process that it watches; on a pipe in place of a bus."""
+    """Measure the longest time from the last command to the instruction that damps, by the
+    watchdog's process, with nothing said by the process that it watches; on a pipe in place of a
+    bus."""
     size = len(damping_frame(_DEVICES))
     times = np.full(repetitions, np.inf)
     for k in range(repetitions):
@@ -69,7 +70,7 @@ SENDING_GOAL = 20.0
 """Microseconds of the sending tick a message [us]."""
 COUNT, RATE, PATIENCE = 10, 1000.0, 20.0
 NUMBERS = 64
-"""How many float64 a message carries."""
+"""Number of float64 in a message."""
 RUN = b"benchmrk"
 
 
@@ -135,7 +136,7 @@ class _End:
 
 
 def _links(placed: PlacedGraph) -> tuple[list[MachineLink], MachineLink]:
-    """The links there, and the one back."""
+    """Return the links to the other process, and the one back."""
     back = next(link for link in placed.links if link.sender == "b")
     return [link for link in placed.links if link.sender == "a"], back
 
@@ -266,7 +267,7 @@ def _sending_times(
 
 
 def answer(ports: tuple[int, int]) -> None:
-    """The other process: answers round trips, then counts what ten links bring."""
+    """Answer round trips, then count what ten links bring, in the other process."""
     placed = graph(ports)
     there, back = _links(placed)
     end = _End(placed, "b", wait=True)

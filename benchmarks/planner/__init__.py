@@ -1,1 +1,1 @@
-"""What a plan costs, beside other solvers on the same problem."""
+"""Cost of a plan, beside other solvers on the same problem."""

@@ -1,4 +1,5 @@
-"""What a plan in the loop costs: processor time of random hops of BRUCE, from the request to the checked table.
+"""Cost of a plan in the loop: processor time of random hops of BRUCE, from the request to the
+checked table.
 
 The requests are drawn uniformly within reach by a seed: straight ones ahead and back, those in all directions with
 turns, and those up and down. Solving, the check and the table of the reference count; all of it is one thread. The first
@@ -19,14 +20,14 @@ from ...robots.description import find_robot
 from ..rows import Row
 
 SEED = 32100
-"""Of the requests; nothing is tuned on them."""
+"""Seed of the requests; nothing is tuned on them."""
 COUNT = 100
 GOALS = {"straight": (0.02, 0.04), "all coordinates": (0.06, 0.12), "up and down": (0.06, 0.12)}
 """s, the median and 99 %"""
 
 
 def requests(kind: str, count: int = COUNT, seed: int = SEED) -> list[HopRequest]:
-    """The hops of a kind; the same on every machine."""
+    """Draw the hops of a kind; they are the same on every machine."""
     rng, robot = np.random.default_rng(seed), find_robot("bruce")
     r, s = level_reach(robot), step_reach(robot)
     found = []

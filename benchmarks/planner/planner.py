@@ -1,4 +1,4 @@
-"""What a plan costs: CPU time of the ten basic tasks, cold and warm, and whether the plans are valid.
+"""Cost of a plan: CPU time of the ten basic tasks, cold and warm, and the validity of the plans.
 
 The other formulations and other solvers get the same tasks. Solvers get the same problem object and
 guess, and their CPU time is taken on one core: fatrop, IPOPT, and SNOPT through Drake where Drake is
@@ -44,7 +44,8 @@ SEED = 1
 
 
 def neighbours(seed: int = SEED) -> list[JumpTask]:
-    """The changed tasks, in the order of the files of the shipped ones; the same on every machine."""
+    """Draw the changed tasks, in the order of the files of the shipped ones; they are the same on
+    every machine."""
     generator = np.random.default_rng(seed)
     found = []
     for path in sorted((shipped_folder() / "tasks").glob("*.yaml")):
@@ -195,7 +196,8 @@ def _snopt_rows(
 
 
 def _beside(title: str, own: Solution, other: SnoptResult) -> Row:
-    """A row; where SNOPT finds nothing there is no solution to compare with, so no goal is met."""
+    """Return a row; where SNOPT finds nothing there is no solution to compare with, so no goal is
+    met."""
     note = (
         f"SNOPT {other.cpu:.2f} s, {other.callback_cpu:.2f} s of it in callbacks, "
         f"info {other.info}, cost {other.cost:.5g} (fatrop {own.cost:.5g}), "
@@ -239,8 +241,9 @@ MEDIAN_GOAL, WORST_GOAL = 0.35, 1.0
 
 
 def planner(rounds: int = 3) -> list[Row]:
-    """The rows: CPU seconds of ``solve_jump`` as a whole, median of ``rounds``, functions compiled
-    before; the solver's structure is kept from round to round, as in any process that plans twice.
+    """Measure the CPU seconds of ``solve_jump`` as a whole, median of ``rounds``, functions
+    compiled before; the solver's structure is kept from round to round, as in any process that
+    plans twice.
     """
     robot = find_robot("bruce")
     rows, times, valid = [], [], 0

@@ -31,8 +31,8 @@ OPTIONS: dict[str, float | int] = {
 
 @dataclass(frozen=True)
 class SnoptResult:
-    """What SNOPT found and what it took; CPU times in seconds. ``info`` is its exit code: 1 optimal,
-    13 no feasible point found, 34 out of time."""
+    """SNOPT's solution and its cost; CPU times in seconds. ``info`` is its exit code: 1 optimal, 13
+    no feasible point found, 34 out of time."""
 
     values: Array
     cost: float
@@ -43,7 +43,7 @@ class SnoptResult:
 
     @property
     def solved(self) -> bool:
-        """Whether SNOPT says that it found an optimum, to its tolerances."""
+        """True if SNOPT says that it found an optimum, to its tolerances."""
         return self.info in (1, 2, 3)
 
 
@@ -68,7 +68,7 @@ class _Callback:
         self.shape = (len(rows), self.size + gap)
 
     def pattern(self) -> list[tuple[int, int]]:
-        """The entries of the Jacobian that are not zero."""
+        """Return the entries of the Jacobian that are not zero."""
         found = set(zip(*(x.tolist() for x in self.at), strict=True))
         return sorted(found | set(zip(*(x.tolist() for x in self.next), strict=True)))
 
@@ -95,7 +95,7 @@ class _Callback:
         return result
 
     def cost(self, variables: Any) -> Any:
-        """The piece's cost, with its gradient where it is asked for."""
+        """Return the piece's cost, with its gradient where it is asked for."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
         started = self.owner.on_time()
@@ -141,7 +141,7 @@ class SnoptProgram:
         self.program.AddBoundingBoxConstraint(lower, upper, self.x)
 
     def _bound_lengths(self, k: int, lower: Array, upper: Array) -> None:
-        """The bounds of the control that chooses an interval length also on the states it becomes.
+        """Bound the control that chooses an interval length also on the states it becomes.
 
         They follow from the rest; without them SNOPT tries negative lengths and ends infeasible.
         """
@@ -184,7 +184,7 @@ class SnoptProgram:
             self.program.AddCost(callback.cost, self.x[variables])
 
     def on_time(self) -> float:
-        """The CPU time now. Raises ``_OutOfTime`` where the limit is past."""
+        """Return the CPU time now [s]. Raises ``_OutOfTime`` where the limit is past."""
         now = time.process_time()
         if now > self.until:
             self.is_out_of_time = True

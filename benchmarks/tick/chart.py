@@ -20,8 +20,9 @@ SMALL = 0.04
 
 
 def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The chart as SVG text, light or dark as its reader's screen is, from the rows of ``aloft bench tick``: a bar of stacked blocks for each
-    way, those that take longest first, in microseconds; a broken bar has its sum beside it."""
+    """Draw the chart as SVG text, light or dark as its reader's screen is, from the rows of ``aloft
+    bench tick``: a bar of stacked blocks for each way, those that take longest first, in
+    microseconds; a broken bar has its sum beside it."""
     bars = [(label, _pieces(rows, prefix)) for prefix, label in BARS]
     bars = [(label, pieces) for label, pieces in bars if pieces]
     reference = dict(bars)[BARS[1][1]]
@@ -59,6 +60,6 @@ def tick_chart(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _pieces(rows: Sequence[Mapping[str, Any]], prefix: str) -> dict[str, float]:
-    """The median time of each block [us] in the rows whose names begin so."""
+    """Return the median time of each block [us] in the rows whose names begin so."""
     found = [row for row in rows if row["name"].startswith(prefix) and row["value"] is not None]
     return {row["name"].removeprefix(prefix): float(row["value"]) for row in found}

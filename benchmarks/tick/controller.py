@@ -23,7 +23,8 @@ from ...runtime.running.ticker import Ticker
 
 GRAPH = FOLDER / "jump.yaml"
 OUTSIDE = ("robot", "push", "score")
-"""What is no part of the controller: the simulated robot, and who pushes and judges it."""
+"""Blocks that are no part of the controller: the simulated robot, and those that push and judge it.
+"""
 
 
 @dataclass(frozen=True)
@@ -175,7 +176,8 @@ class HandWrittenLoop(RecordedController):
 
 
 def _outputs_of(bound: BoundGraph, paths: tuple[str, ...]) -> list[tuple[int, int]]:
-    """The bytes of the bus that hold the outputs of those blocks, in as few pieces as possible."""
+    """Return the bytes of the bus that hold the outputs of those blocks, in as few pieces as
+    possible."""
     layout: Any = bound.memory.bus.layout
     ranges = sorted(
         layout.byte_range(name)

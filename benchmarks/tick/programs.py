@@ -37,11 +37,12 @@ class PeerProgram(FullProgram):
     """The full program and a peer that solves it."""
 
     def solve(self, active: Indices) -> Array | None:
-        """The accelerations and then the forces of the points ``active``; none if it fails."""
+        """Solve for the accelerations and then the forces of the points ``active``; return none if
+        it fails."""
         return self.solve_assembled(self.assemble(active), len(active))
 
     def solve_assembled(self, program: FullMatrices, count: int) -> Array | None:
-        """The same, for a program with ``count`` points in stance whose matrices are ready."""
+        """Solve a program with ``count`` points in stance whose matrices are ready."""
         raise NotImplementedError
 
 
@@ -155,8 +156,8 @@ class OsqpController(WholeBodyController):
 
 
 def _complete(matrix: Any, places: NDArray[np.bool_], dense: Array) -> Any:
-    """The sparse matrix with a number in every one of ``places``, which it lacks where a number of
-    ``dense`` happens to be zero."""
+    """Return the sparse matrix with a number in every one of ``places``, which it lacks where a
+    number of ``dense`` happens to be zero."""
     from scipy import sparse
 
     if matrix.nnz == np.count_nonzero(places):
@@ -184,7 +185,7 @@ Times = dict[str, NDArray[np.float64]]
 
 
 def block_rows(controller: RecordedController, prefix: str) -> list[Row]:
-    """The median time of every block, in the order in which they run."""
+    """Return the median time of every block, in the order in which they run."""
     programs = controller.ticker.programs
     for program in programs:
         program.fold()
@@ -220,7 +221,7 @@ def controller_rows(times: Times, of_first: Times, missing: str) -> list[Row]:
 
 
 def program_rows(times: Times, missing: str) -> list[Row]:
-    """From model terms to accelerations, forces and torques."""
+    """Return the rows of the way from model terms to accelerations, forces and torques."""
     if QP not in times:
         return []
     rows = [compare(f"{QP}, beside DAQP", {**times, f"{QP}, beside DAQP": times[QP]}, QP_DAQP,
@@ -246,7 +247,7 @@ def program_rows(times: Times, missing: str) -> list[Row]:
 def state_to_torque_rows(
     own: RecordedController, osqp: RecordedController | None, missing: str
 ) -> list[Row]:
-    """The dynamics and the whole-body controller, tasks included."""
+    """Return the rows of the dynamics and the whole-body controller, tasks included."""
     value = _sum_of(own)
     if osqp is None:
         return [Row(WHOLE_BODY, value, "us/tick", WHOLE_BODY_OSQP, note=missing)]

@@ -72,8 +72,8 @@ SECONDS = 1.0
 
 
 def process_row(jump: RecordedJump, repeats: int = 3) -> Row:
-    """The shortest whole process of ``aloft run graphs/jump.yaml`` of a few, with its recording, as
-    a share of the time that the jump takes in the world."""
+    """Measure the shortest of a few whole processes of ``aloft run graphs/jump.yaml``, with its
+    recording, as a share of the time that the jump takes in the world."""
     with tempfile.TemporaryDirectory() as folder:
         found = time_process(["run", str(GRAPH), "--json"], Path(folder), repeats)
     lasted = json.loads(found.output)["ticks"] * jump.graph.base_period
@@ -86,7 +86,7 @@ def process_row(jump: RecordedJump, repeats: int = 3) -> Row:
 
 
 def busy_wait_row(jump: RecordedJump, seconds: float = SECONDS) -> Row:
-    """The shortest period at which fewer than ``LATE`` of the ticks begin late."""
+    """Find the shortest period at which fewer than ``LATE`` of the ticks begin late."""
     controller = RecordedController(jump)
     controller.run(min(jump.ticks, 200))
     best, shares = 0, []
@@ -106,8 +106,8 @@ def busy_wait_row(jump: RecordedJump, seconds: float = SECONDS) -> Row:
 def late_share(
     controller: RecordedController, jump: RecordedJump, rate: float, seconds: float
 ) -> float:
-    """The share of ticks whose deadline had passed before they could begin. A tick that is late
-    begins at once, and the deadlines after it are counted from there."""
+    """Measure the share of ticks whose deadline had passed before they could begin. A tick that is
+    late begins at once, and the deadlines after it are counted from there."""
     advance, now = controller.ticker.advance, time.perf_counter_ns
     period, count = round(1e9 / rate), max(1, round(seconds * rate))
     late = 0
@@ -184,13 +184,13 @@ class EarlierController:
 
 CHUNK = 50
 PLAIN_TICKS = 200
-"""How many ticks plain Python takes part in: it needs tens of milliseconds for each."""
+"""Number of ticks in which plain Python takes part: it needs tens of milliseconds for each."""
 EVERY = 10
 """One in so many ticks in stance is a state for the solvers by themselves."""
 ROUNDS = 5
 """Turns of the solvers in each of these states, of which the median counts."""
 TORQUE_ERROR = 1e-6
-"""How much the torques of two exact methods may differ [N m]."""
+"""Largest accepted difference between the torques of two exact methods [N m]."""
 
 
 def tick(
@@ -200,7 +200,7 @@ def tick(
     tsid: str = "",
     since: str = "",
 ) -> list[Row]:
-    """The rows.
+    """Measure and return the rows.
 
     Args:
         rounds: how often the jump is run again; plain Python takes part in the first ticks of the first round only.
@@ -327,7 +327,7 @@ class _Programs:
             raise AssertionError(f"tick {tick}: DAQP's torque is {apart:.2g} N m from the own one")
 
     def _solve(self, peer: PeerProgram, active: NDArray[np.int64], program: FullMatrices) -> None:
-        """From the program's matrices, which are ready, to accelerations, forces and torques."""
+        """Solve the program whose matrices are ready for accelerations, forces and torques."""
         answer, n = peer.solve_assembled(program, len(active)), self._acceleration.shape[0]
         if answer is not None:
             self._acceleration[...] = answer[:n]
@@ -343,7 +343,7 @@ def _programs(own: RecordedController, *, with_osqp: bool) -> _Programs:
 
 
 def _osqp_controller(jump: RecordedJump) -> RecordedController:
-    """The controller with OSQP, which has seen every state of the jump once."""
+    """Return the controller with OSQP, which has seen every state of the jump once."""
     controller = RecordedController(jump, fuse=False, instead={"wbc": OsqpController})
     controller.run(jump.ticks)
     block = controller.bound.blocks["wbc"]
@@ -354,7 +354,7 @@ def _osqp_controller(jump: RecordedJump) -> RecordedController:
 
 
 def _tsid_controller(jump: RecordedJump, tsid: ModuleType) -> RecordedController:
-    """The controller with TSID, whose model has the described mass."""
+    """Return the controller with TSID, whose model has the described mass."""
     controller = RecordedController(jump, fuse=False, instead={"wbc": TsidController})
     block, dynamics = controller.bound.blocks["wbc"], controller.bound.blocks["dynamics"]
     assert isinstance(block, TsidController) and isinstance(dynamics, Dynamics)
@@ -372,7 +372,7 @@ def _hot(body: Callable[[], object]) -> float:
 
 
 def _missing(package: str) -> str:
-    """Why a peer cannot be measured; empty where it is installed."""
+    """Return the reason why a peer cannot be measured; empty where it is installed."""
     from importlib.util import find_spec
 
     return (

@@ -49,7 +49,7 @@ INSTALL = (
     "pip install --only-binary :all: --target FOLDER tsid==1.7.1 pin==3.4.0 cmeel-urdfdom==4.0.1 "
     "'cmeel-tinyxml2<11'"
 )
-"""How to get it."""
+"""Command that installs TSID."""
 
 
 def import_tsid(folder: Path) -> ModuleType:
@@ -121,7 +121,7 @@ class TsidProgram:
 
     @property
     def kind(self) -> str:
-        """Whose gains hold in the present phase."""
+        """The kind of phase whose gains hold at present."""
         phase = int(self._block.phase.phase)
         return PHASE_KINDS[(phase >= Phase.THRUST) + (phase > Phase.THRUST)]
 
@@ -144,7 +144,8 @@ class TsidProgram:
         return True
 
     def _formulation(self, kind: str) -> _Formulation:
-        """The formulation for the present points in stance, with the gains of a kind of phase."""
+        """Return the formulation for the present points in stance, with the gains of a kind of
+        phase."""
         block, robot = self._block, self.robot
         known = _Formulation(self._tsid, robot, self._q, self._v)
         p, stance = block.params, block.phase.stance
@@ -169,7 +170,7 @@ class TsidProgram:
         return known
 
     def _body(self, known: _Formulation, gains: Any) -> None:
-        """The centre of mass, the torso and the angular momentum."""
+        """Set the references of the centre of mass, the torso and the angular momentum."""
         block, target, pin = self._block, self._block.target, self._pin
         task, sample = known.com(gains.linear_weight, gains.linear_stiffness, gains.linear_damping)
 
@@ -205,7 +206,7 @@ class TsidProgram:
             known.show.append(show_momentum)
 
     def _swing(self, known: _Formulation, point: int, name: str, gains: Any, kind: str) -> None:
-        """A point without load goes to the ground; in the thrust it is damped across its foot."""
+        """Send a point without load to the ground; in the thrust damp it across its foot."""
         terms, stance = self._block.terms, self._block.phase.stance
         across = kind == "thrust"
         mask = np.array([0.0, 1, 0, 0, 0, 0] if across else [1.0, 1, 1, 0, 0, 0])
@@ -248,7 +249,7 @@ class TsidProgram:
         self, known: _Formulation, name: str, mask: Array, weight: float, stiffness: float,
         damping: float,
     ) -> None:  # fmt: skip
-        """Some joints follow the plan."""
+        """Make some joints follow the plan."""
         task, sample = known.joints(name, mask, weight, stiffness, damping)
         target = self._block.target
 
@@ -261,8 +262,8 @@ class TsidProgram:
         known.show.append(show)
 
     def _regularise_base(self, known: _Formulation, weight: float) -> None:
-        """The base's acceleration in its own frame is zero; TSID counts the classical one, which has
-        the angular times the linear velocity besides."""
+        """Drive the base's acceleration in its own frame to zero; TSID counts the classical one,
+        which has the angular times the linear velocity besides."""
         task, sample = known.frame(
             "base", np.ones(6), weight, np.zeros(6), np.zeros(6), local=True, name="regularise base"
         )
@@ -292,7 +293,7 @@ class _Formulation:
         self, name: str, friction: float, least: float, most: float, force_weight: float,
         weight: float, damping: float,
     ) -> None:  # fmt: skip
-        """A point in stance, whose acceleration is weighted."""
+        """Add a point in stance, whose acceleration is weighted."""
         up = np.array([0.0, 0.0, 1.0])
         point = self._tsid.ContactPoint(name, self._robot, name, up, friction, least, most)
         point.setKp(np.zeros(3))
@@ -302,14 +303,14 @@ class _Formulation:
         self._kept.append(point)
 
     def com(self, weight: Any, stiffness: Any, damping: Any) -> tuple[Any, Any]:
-        """The centre of mass."""
+        """Add a task of the centre of mass."""
         task = self._tsid.TaskComEquality("com", self._robot)
         task.setKp(np.array(stiffness))
         task.setKd(np.array(damping))
         return self._add(task, float(np.mean(weight)), self._tsid.TrajectorySample(3))
 
     def momentum(self, weight: Any, damping: Any) -> tuple[Any, Any]:
-        """The angular momentum, which is damped until it has a reference."""
+        """Add a task of the angular momentum, which is damped until it has a reference."""
         task = self._tsid.TaskAMEquality("momentum", self._robot)
         task.setKp(np.array(damping))
         task.setKd(np.zeros(3))
@@ -321,7 +322,7 @@ class _Formulation:
         self, frame: str, mask: Array, weight: float, stiffness: Array, damping: Array, *,
         local: bool, name: str = "",
     ) -> tuple[Any, Any]:  # fmt: skip
-        """A frame's position or orientation."""
+        """Add a task of a frame's position or orientation."""
         task = self._tsid.TaskSE3Equality(name or f"frame {frame}", self._robot, frame)
         task.setKp(stiffness)
         task.setKd(damping)
@@ -332,7 +333,7 @@ class _Formulation:
     def joints(
         self, name: str, mask: Array, weight: float, stiffness: float, damping: float
     ) -> tuple[Any, Any]:
-        """Some joints' angles."""
+        """Add a task of some joints' angles."""
         task = self._tsid.TaskJointPosture(name, self._robot)
         task.setKp(np.full(len(mask), stiffness))
         task.setKd(np.full(len(mask), damping))
@@ -385,8 +386,9 @@ class TsidController(WholeBodyController):
 EVERY = 40
 """One in so many ticks is compared."""
 TORQUE_ERROR = 1e-2
-"""How much the torques may differ [N m]: TSID's solver adds 1e-8 to the diagonal of the Hessian, a
-ten-thousandth of the weight of forces, which alone decides between forces that do not move the base."""
+"""Largest accepted difference of the torques [N m]: TSID's solver adds 1e-8 to the diagonal of the
+Hessian, a ten-thousandth of the weight of forces, which alone decides between forces that do not
+move the base."""
 
 
 class TsidCheck:

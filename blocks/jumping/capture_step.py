@@ -44,9 +44,14 @@ class StepParams(Parameters):
 
     steps: int = live_parameter(0, ge=0, le=20, text="the most steps it takes; 0: it only stands")
     margin: float = live_parameter(
-        0.015, unit="m", ge=0.0, text="how far outside the support the capture point must be"
+        0.015,
+        unit="m",
+        ge=0.0,
+        text="least distance of the capture point outside the support for a step",
     )
-    confirmation: float = live_parameter(0.006, unit="s", ge=0.0, text="how long it must be there")
+    confirmation: float = live_parameter(
+        0.006, unit="s", ge=0.0, text="time for which it must be there"
+    )
     after: float = live_parameter(
         0.08, unit="s", ge=0.0, text="time after touchdown before which no foot steps"
     )
@@ -55,10 +60,10 @@ class StepParams(Parameters):
     )
     duration: float = live_parameter(0.13, unit="s", gt=0.04, le=1.0, text="of a step")
     height: float = live_parameter(
-        0.015, unit="m", gt=0.0, le=0.2, text="how high the foot is lifted"
+        0.015, unit="m", gt=0.0, le=0.2, text="height to which the foot is lifted"
     )
     beyond: float = live_parameter(
-        0.1, ge=0.0, le=1.0, text="how much farther the foot goes than the capture point"
+        0.1, ge=0.0, le=1.0, text="share by which the foot goes farther than the capture point"
     )
     reach: float = live_parameter(
         0.2, unit="m", gt=0.0, text="farthest place ahead of or behind the other feet"
@@ -89,19 +94,19 @@ class StepMemory(Signal):
     """The state of ``CaptureStep``."""
 
     foot = Field(dtype="int64", text="the foot that steps, counted from 1; 0 for none")
-    elapsed = Field(unit="s", text="how long it has stepped")
+    elapsed = Field(unit="s", text="duration of the step so far")
     taken = Field(dtype="int64", text="steps taken so far")
-    outside = Field(unit="s", text="how long the capture point has been outside the support")
+    outside = Field(unit="s", text="time since the capture point left the support")
     last = Field(unit="s", text="time after touchdown at which the last step ended")
     ground = Field(unit="m", frame="world", text="height of the ground under the stepping foot")
     heading = Field(
         unit="rad", frame="world", text="mean heading of the feet before the first step"
     )
-    foothold = Field(("n_feet", 3), unit="m", frame="world", text="where each foot last went")
+    foothold = Field(("n_feet", 3), unit="m", frame="world", text="last foothold of each foot")
 
 
 class StepConstants(Signal):
-    """What steps need to know of the robot."""
+    """Data of the robot that steps depend on."""
 
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     side = Field("n_feet", unit="", text="1: the foot is on the left, -1: right, 0: in the middle")
@@ -113,10 +118,10 @@ class StepConstants(Signal):
 
 
 class StepScratch(Signal):
-    """What a tick computes on its way."""
+    """Intermediate values of a tick."""
 
     capture = Field(2, unit="m", frame="world", text="the capture point")
-    nearest = Field(2, unit="m", frame="world", text="where the other feet are nearest to it")
+    nearest = Field(2, unit="m", frame="world", text="nearest point of the other feet")
     other = Field(2, unit="m", frame="world", text="for a moment")
     middle = Field(3, unit="m", frame="world", text="of the other feet")
     standing = Field("n_contacts", dtype="bool", text="points of feet that stand")
@@ -342,7 +347,7 @@ def best_foot(
     scratch: StepScratch,
     rate: float,
 ) -> int:
-    """The foot that comes nearest to its foothold; of equals the one that carries least."""
+    """Return the foot that comes nearest to its foothold; of equals the one that carries least."""
     n_feet, best, least = constants.side.shape[0], 0, math.inf
     first = farthest_foot(
         terms.contact_position, constants.foot_of_point, n_feet, scratch.capture, scratch.other

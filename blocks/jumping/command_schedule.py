@@ -20,18 +20,22 @@ class TimedCommand(Parameters):
     """One command."""
 
     at: float = parameter(0.0, unit="s", ge=0.0, text="not before this time of the run")
-    ahead: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far ahead it lands")
-    aside: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="how far to the left")
+    ahead: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="distance ahead")
+    aside: float = parameter(0.0, unit="m", ge=-100.0, le=100.0, text="distance to the left")
     turn: float = parameter(0.0, unit="rad", ge=-3.2, le=3.2, text="turn to the left")
     up: float = parameter(
-        0.0, unit="m", ge=-10.0, le=10.0, text="how much higher the ground is there"
+        0.0,
+        unit="m",
+        ge=-10.0,
+        le=10.0,
+        text="height of the ground there above that of the last landing",
     )
     placed: bool = parameter(
         False,
-        text="whether these are x, y, heading and height in the world, where the run began at zero",
+        text="the place is x, y, heading and height in the world, where the run began at zero",
     )
     replaces: bool = parameter(
-        False, text="whether it takes the place of the one before, if its jump has not begun"
+        False, text="takes the place of the command before, if its jump has not begun"
     )
 
 
@@ -68,13 +72,13 @@ class CommandSchedule(Block):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """The ``count`` of commands."""
+        """Export the ``count`` of commands."""
         assert isinstance(params, cls.Params)
         return {"count": len(params.commands)}
 
     taken = Input(PlanRequest, text="the last request, by the number of its command")
     command = Output(JumpCommand, text="the command that holds; number zero: none yet")
-    memory = State(CommandsGiven, text="how many have been given")
+    memory = State(CommandsGiven, text="number of commands given")
 
     def setup(self) -> None:
         given = self.params.commands

@@ -1,4 +1,4 @@
-"""Commands of jumps to footholds that another program says."""
+"""Jump commands to footholds given by another program."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FootholdCommand(Block):
     is all zeros, as that of ``ros2.Subscribe`` before a message has come.
     """
 
-    pose = Input(FootholdPose, text="where the feet should stand")
+    pose = Input(FootholdPose, text="commanded place of the feet")
     command = Output(JumpCommand, text="the last pose as a command; number zero: none yet")
     memory = State(FootholdTaken, text="the last pose")
 

@@ -30,7 +30,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
-from ...planner.library.jump_table import JumpTable, TableRows, read_table, table_rows
+from ...planner.library.jump_table import JumpTable, TableRows, table_rows
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
@@ -40,6 +40,7 @@ from ...runtime.language.context import Clock, Context
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
+from .table_reading import read_table
 
 _STEP = 0.002
 """Longest step of the integration [s]."""
@@ -72,13 +73,13 @@ class GuidedMotion:
 
 
 def missing_joints(robot: RobotDescription) -> int:
-    """The number of joints that a robot lacks to control its centre of mass and its base."""
+    """Count the joints that a robot lacks to control its centre of mass and its base."""
     rows = sum(ROWS_OF_FOOT[foot_shape(robot, foot)[0]] for foot in range(len(robot.feet)))
     return max(0, rows - (len(robot.joints) - len(robot.held)))
 
 
 def too_few_joints(robot: RobotDescription | None) -> Iterator[UnmetRequirement]:
-    """The unmet requirement of a robot that lacks joints to move its centre of mass and base while it stands."""
+    """Report a robot that lacks joints to move its centre of mass and base while it stands."""
     assert robot is not None
     missing = missing_joints(robot)
     if missing:
@@ -121,7 +122,7 @@ class GuidedBody:
         self._balls = {ball.foot: ball for ball in ball_feet(robot)}
 
     def standing(self, joints: Array) -> Array:
-        """The configuration with these joint angles, upright, the soles' middle at the origin.
+        """Return the configuration with these joint angles, upright, the soles' middle at the origin.
 
         Joints that the description holds have their held angle.
         """
@@ -133,7 +134,7 @@ class GuidedBody:
         return q
 
     def feet(self, q: Array) -> Array:
-        """The sole centres (n_feet, 3) [m]; for a ball foot its lowest point."""
+        """Return the sole centres (n_feet, 3) [m]; for a ball foot its lowest point."""
         self.pinocchio.framesForwardKinematics(self.model, self.data, q)
         return np.array([self._sole(foot) for foot in range(len(self.soles))])
 
@@ -145,30 +146,30 @@ class GuidedBody:
         return np.asarray(joint.act(ball.centre) - [0.0, 0.0, ball.radius])
 
     def contact_points(self, q: Array) -> Array:
-        """The places of all contact points (n_contacts, 3) [m]."""
+        """Return the places of all contact points (n_contacts, 3) [m]."""
         self.pinocchio.framesForwardKinematics(self.model, self.data, q)
         return np.array([self.data.oMf[frame].translation for frame in self.contacts])
 
     def com(self, q: Array) -> Array:
-        """The centre of mass (3,)."""
+        """Return the centre of mass (3,) [m]."""
         return np.array(self.pinocchio.centerOfMass(self.model, self.data, q))
 
     def radii_of_inertia(self, q: Array) -> Array:
-        """The radii of inertia of the whole body about three axes through its centre of mass [m], (3,)."""
+        """Return the radii of inertia of the whole body about three axes through its centre of mass [m], (3,)."""
         self.pinocchio.ccrba(self.model, self.data, q, np.zeros(self.model.nv))
         return np.sqrt(np.diag(self.data.Ig.inertia) / self.mass)
 
     def pitch(self, q: Array) -> float:
-        """The forward pitch of the torso [rad]."""
+        """Return the forward pitch of the torso [rad]."""
         return 2.0 * atan2(float(q[4]), float(q[6]))
 
     def angular_momentum(self, q: Array, v: Array) -> Array:
-        """The angular momentum about the centre of mass [N m s, world], (3,)."""
+        """Return the angular momentum about the centre of mass [N m s, world], (3,)."""
         self.pinocchio.computeCentroidalMomentum(self.model, self.data, q, v)
         return np.array(self.data.hg.angular)
 
     def velocity(self, q: Array, motion: GuidedMotion) -> Array:
-        """The generalised velocity of the motion."""
+        """Return the generalised velocity of the motion."""
         pin, matrix, wanted = self.pinocchio, self._matrix, self._wanted
         pin.computeJointJacobians(self.model, self.data, q)
         pin.updateFramePlacements(self.model, self.data)
@@ -205,7 +206,7 @@ class GuidedBody:
         return np.asarray(choice + found)
 
     def _place_rows(self, foot: int, jacobian: Array, flying: bool) -> Array:
-        """The rows (3, n) of a foot's velocity, from the Jacobian (6, n) of its sole's frame."""
+        """Return the rows (3, n) of a foot's velocity, from the Jacobian (6, n) of its sole's frame."""
         ball = self._balls.get(foot)
         if ball is None:
             return jacobian[0:3]
@@ -235,7 +236,7 @@ class GuidedBody:
         return np.asarray(np.stack([first, np.cross(ahead, first)]) @ turning)
 
     def integrate(self, q: Array, v: Array) -> Array:
-        """The configuration after moving by ``v``."""
+        """Return the configuration after moving by ``v``."""
         return np.array(self.pinocchio.integrate(self.model, q, v))
 
 
@@ -335,10 +336,10 @@ class GuidedReference(Block):
     Params = GuidedParameters
     needs = ("floating base", "feet")
     params: GuidedParameters
-    delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
+    delay = Input(DelayEstimate, default={}, text="lead time of the controller")
     reference = Output(JumpReference, text="the plan at the present instant")
     hold = 0.0
-    """What is fed forward is the mean over so many seconds."""
+    """Time [s] over which the feedforward is averaged."""
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -347,7 +348,7 @@ class GuidedReference(Block):
 
     @abstractmethod
     def make_table(self) -> JumpTable:
-        """The motion of the block's robot."""
+        """Compute the motion of the block's robot."""
 
     def setup(self) -> None:
         self.table = table_rows(self.make_table())

@@ -33,7 +33,7 @@ class PhaseCondition(IntEnum):
     LIFT_OFF_DUE = 2
     """The planned lift-off is over, and all points have left the ground or waited long enough."""
     LEFT_EARLY = 3
-    """In the second half of the thrust no point has had contact for a while."""
+    """No point has had contact for a while, in the second half of the thrust."""
     TOUCHED_DOWN = 4
     """A point has contact after the least share of the predicted flight."""
     OVERDUE = 5
@@ -51,7 +51,7 @@ class PhaseCondition(IntEnum):
 
 
 class PhaseTransition(NamedTuple):
-    """From ``phase`` to the ``following`` one when the ``condition`` holds."""
+    """Change from ``phase`` to the ``following`` one when the ``condition`` holds."""
 
     phase: Phase
     condition: PhaseCondition
@@ -85,10 +85,9 @@ TABLE = np.array([[int(value) for value in row] for row in TRANSITIONS])
 """The transitions as an array (n, 3), for the kernel."""
 
 NOW, IN_PHASE, LIFT_OFF, TOUCHDOWN, REMAINING, UNLOADED, AHEAD, STOOD = range(8)
-"""Elements of ``times`` [s]: the plan's time; how long the phase has lasted; the planned lift-off
-and touchdown of the next flight, the one under way or the last; the predicted time to touchdown;
-how long no point has had contact; by how much the controller works ahead of time; and how long all
-points have had contact."""
+"""Elements of ``times`` [s]: the plan's time; the duration of the phase so far; the planned lift-off and touchdown of
+the next flight, the one under way or the last; the predicted time to touchdown; the time since the last point lost
+contact; the lead time of the controller; and the time for which all points have had contact."""
 
 LATE_LIFT_OFF, EARLY_LIFT_OFF, TOUCHDOWN_SHARE, LANDING_TIME, LOST_CONTACT, EARLY_LANDING = range(6)
 STAND_TIME = 6
@@ -102,7 +101,7 @@ LEAST_AHEAD = 0.0015
 def find_conditions(
     times: Array1D, limits: Array1D, planned: int, another: bool, holds: Flags1D
 ) -> None:
-    """Which conditions hold in this tick.
+    """Mark the conditions that hold in this tick.
 
     Args:
         times, limits: see ``NOW`` and ``LATE_LIFT_OFF``.
@@ -135,7 +134,7 @@ def find_conditions(
 
 @kernel
 def next_phase(table: Indices2D, phase: int, holds: Flags1D) -> int:
-    """The phase that follows by the first row (phase, condition, to) of the table that applies."""
+    """Return the phase that follows by the first row (phase, condition, to) of the table that applies."""
     for row in range(table.shape[0]):
         if table[row, 0] == phase and holds[table[row, 1]]:
             return int(table[row, 2])
@@ -150,8 +149,8 @@ class PhaseMemory(Signal):
     touchdown = Field(unit="s", text="plan time of the last touchdown, negative before the first")
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or last")
     touchdown_time = Field(unit="s", text="planned touchdown of that flight")
-    unloaded = Field("n_contacts", unit="s", text="how long each point has been without contact")
-    stood = Field(unit="s", text="how long all points have had contact")
+    unloaded = Field("n_contacts", unit="s", text="time since each point lost contact")
+    stood = Field(unit="s", text="time for which all points have had contact")
     stance = Field("n_contacts", dtype="bool", text="the points in stance after touchdown")
 
 
@@ -205,16 +204,17 @@ class JumpPhase(Block):
 
     class Params(Parameters):
         start: Literal["clock", "standing"] = parameter(
-            "clock", text="whether the robot stands from the first tick on, or is put down first"
+            "clock",
+            text="start of the plan: at the first tick of a robot that stands, or after it is put down",
         )
         stand_time: float = parameter(
             0.3,
             unit="s",
             gt=0.0,
-            text="how long it must stand on all points before the plan begins",
+            text="time for which it must stand on all points before the plan begins",
         )
         late_lift_off: float = live_parameter(
-            0.0, unit="s", ge=0.0, text="how long to wait for the feet to leave the ground"
+            0.0, unit="s", ge=0.0, text="longest wait for the feet to leave the ground"
         )
         early_lift_off: float = live_parameter(
             0.01,
@@ -232,7 +232,10 @@ class JumpPhase(Block):
             0.35, unit="s", ge=0.0, text="time from touchdown until the robot rises again"
         )
         contact_hold: float = live_parameter(
-            0.0, unit="s", ge=0.0, text="how long a point stays in stance after its contact ends"
+            0.0,
+            unit="s",
+            ge=0.0,
+            text="time for which a point stays in stance after its contact ends",
         )
         flat_height: float = live_parameter(
             0.006, unit="m", ge=0.0, text="height up to which a foot's other points are in stance"
@@ -248,14 +251,14 @@ class JumpPhase(Block):
         )
 
     class Constants(Signal):
-        """What follows from the robot and the parameters."""
+        """Constants derived from the robot and the parameters."""
 
         transitions = Field((len(TRANSITIONS), 3), dtype="int64", text="rows of TRANSITIONS")
         limits = Field(7, text="see LATE_LIFT_OFF")
         foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
 
     class Scratch(Signal):
-        """What a step computes on its way."""
+        """Intermediate values of a step."""
 
         times = Field(8, unit="s", text="see NOW")
         holds = Field(
@@ -266,9 +269,9 @@ class JumpPhase(Block):
     params: Params
     constants: Constants
     reference = Input(JumpReference, text="the plan")
-    contacts = Input(ContactState, text="which points carry load")
+    contacts = Input(ContactState, text="points that carry load")
     terms = Input(DynamicsTerms, text="the present state")
-    delay = Input(DelayEstimate, default={}, text="how far ahead of time the controller works")
+    delay = Input(DelayEstimate, default={}, text="lead time of the controller")
     phase = Output(PhaseState, text="the phase, its times and the stance points")
     memory = State(PhaseMemory, text="the phase, its times, and contacts lately lost")
 
@@ -360,7 +363,7 @@ def count_unloaded(active: Flags1D, period: float, unloaded: Array1D) -> float:
 
 @kernel
 def count_unloaded_points(active: Flags1D) -> int:
-    """The number of points without contact."""
+    """Count the points without contact."""
     count = 0
     for i in range(active.shape[0]):
         count += 0 if active[i] else 1
@@ -369,14 +372,14 @@ def count_unloaded_points(active: Flags1D) -> int:
 
 @kernel
 def planned_touchdown_height(height: float, velocity: float, remaining: float) -> float:
-    """The height [m] of a body after a free fall of ``remaining`` [s] from ``height`` [m] with the
-    upward ``velocity`` [m/s]."""
+    """Return the height [m] of a body after a free fall of ``remaining`` [s] from ``height`` [m] with the upward
+    ``velocity`` [m/s]."""
     return height + remaining * (velocity - 0.5 * GRAVITY * remaining)
 
 
 @kernel
 def time_to_height(height: float, velocity: float, goal: float) -> float:
-    """The time [s] until a falling body comes down to ``goal`` [m].
+    """Return the time [s] until a falling body comes down to ``goal`` [m].
 
     If it never reaches that height, the time until its apex.
     """

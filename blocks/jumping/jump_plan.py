@@ -15,7 +15,6 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     flight_rotation,
-    read_table,
     table_rows,
 )
 from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
@@ -29,6 +28,7 @@ from .plan_progress import (
     ProgressParameters,
     follow_plan,
 )
+from .table_reading import read_table
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
@@ -115,15 +115,15 @@ class JumpPlan(Block):
         library: str = parameter(
             "", text="folder where new plans are kept; the user's cache if empty"
         )
-        solve: bool = parameter(True, text="whether a missing plan may be solved")
+        solve: bool = parameter(True, text="solve a missing plan")
         check: Literal["required", "reported"] = parameter(
-            "required", text="whether the plan must be valid, or is followed and called invalid"
+            "required", text="refuse an invalid plan, or follow it and report it as invalid"
         )
         formulation: Literal["full", "paper", "srbm"] | None = parameter(
             None, text="the planner's formulation, in place of the task's"
         )
         rehearsed: bool = parameter(
-            True, text="whether what a rehearsal of this plan has learnt is exported to the graph"
+            True, text="export to the graph what a rehearsal of this plan has learnt"
         )
         learnt: str = parameter(
             "", text="file of what the robot has learnt from its own jumps; none: nothing"
@@ -137,7 +137,7 @@ class JumpPlan(Block):
     terms = Input(DynamicsTerms, default={}, text="the measured motion, for by: progress")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
-    progress = State(PlanProgress, text="how late the plan is")
+    progress = State(PlanProgress, text="delay of the plan")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -192,7 +192,7 @@ class JumpPlan(Block):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """The ground and the score's expectation that follow from the task."""
+        """Export the ground, the goals of the score and the corrections that follow from the task."""
         from ...planner.task.ground import scene_of
         from ...planner.task.task import JumpTaskError
 
@@ -219,7 +219,7 @@ class JumpPlan(Block):
 
     @classmethod
     def _load(cls, task: JumpTask, params: Params, context: Context) -> Mapping[str, float] | None:
-        """What the kept plan asks of the motors, if a block of the graph wants it."""
+        """Return the load of the motors in the kept plan, if a block of the graph wants it."""
         wanted = {"from": f"{context.path}.load"}
         given = (block.get("with") or {} for block in context.graph.values())
         if not any(value == wanted for each in given for value in each.values()):
@@ -229,7 +229,7 @@ class JumpPlan(Block):
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
-        """What was learnt, in rehearsals and by the robot itself; for both corrections the same
+        """Return the sum of the corrections from rehearsals and from the robot's own jumps; for both the same
         ``UnmetRequirement`` where a file is damaged."""
         from ...planner.library.learnt import LearntFileError
         from ...planner.library.rehearsed import RehearsalFileError
@@ -252,7 +252,7 @@ class JumpPlan(Block):
 
     @classmethod
     def _rehearsed(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
-        """What a rehearsal has learnt."""
+        """Return the corrections that a rehearsal has learnt."""
         from ...planner.library.rehearsed import ZERO, controller_hash, find_rehearsed
 
         assert context.robot is not None
@@ -268,7 +268,7 @@ class JumpPlan(Block):
 
     @classmethod
     def _learnt(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
-        """What the robot itself has learnt."""
+        """Return the corrections that the robot itself has learnt."""
         from ...planner.library.learnt import launch_of, read_learnt
         from ...planner.library.rehearsed import ZERO
 
@@ -338,7 +338,7 @@ class JumpPlan(Block):
         )
 
     def _report_validity(self, plan: PlannedJump) -> ValidityReport | None:
-        """The validity report of a plan that need not be valid; ``None`` if it must be valid."""
+        """Return the validity report of a plan that need not be valid; ``None`` if it must be valid."""
         if self.params.check == "required":
             return None
         from ...planner.checking.validity import PlanTest, ValidityReport
@@ -405,14 +405,14 @@ class TriggeredJumpPlan(JumpPlan):
 
 
 def plan_library(params: JumpPlan.Params, robot: RobotDescription) -> PlanLibrary:
-    """The library in which a block looks for its plan."""
+    """Return the library in which a block looks for its plan."""
     from ...planner.library.library import PlanLibrary
 
     return PlanLibrary(robot, Path(params.library) if params.library else None)
 
 
 def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
-    """The task of a block, in the formulation that is planned.
+    """Return the task of a block, in the formulation that is planned.
 
     Raises:
         LookupError, JumpTaskError: as ``read_or_make_task``.
@@ -421,7 +421,7 @@ def planned_task(params: JumpPlan.Params, context: Context) -> JumpTask:
 
 
 def _as_planned(task: JumpTask, chosen: Literal["full", "paper", "srbm"] | None) -> JumpTask:
-    """The task in the formulation ``chosen``, if there is one."""
+    """Return the task in the formulation ``chosen``, if there is one."""
     if chosen is None:
         return task
     impact = task.impact and chosen == "full"
@@ -429,7 +429,7 @@ def _as_planned(task: JumpTask, chosen: Literal["full", "paper", "srbm"] | None)
 
 
 def _is_file_of(name: str, context: Context) -> bool:
-    """Whether a task names the graph's robot by its file."""
+    """Check that a task names the graph's robot by its file."""
     from ...robots.description import find_robot
 
     folder = context.graph_folder
@@ -439,7 +439,7 @@ def _is_file_of(name: str, context: Context) -> bool:
 
 
 def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> JumpTask:
-    """The task of a graph, which gives the name of its file, its parameters, or both.
+    """Return the task of a graph, which gives the name of its file, its parameters, or both.
 
     Raises:
         LookupError: there is no file of that name beside the graph or among the shipped tasks.

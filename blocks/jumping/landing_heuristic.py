@@ -104,35 +104,35 @@ class LandingParams(PredictionGains):
         0.3, unit="m/s", ge=0.0, le=2.0, text="upward speed of the feet at touchdown"
     )
     retraction_time: float = live_parameter(
-        0.06, unit="s", gt=0.0, text="how long before touchdown it begins"
+        0.06, unit="s", gt=0.0, text="time from its begin to touchdown"
     )
 
 
 class LandingMemory(PredictionMemory):
     """The state of ``LandingHeuristic``."""
 
-    flying = Field(dtype="bool", text="whether the robot flew at the last tick")
+    flying = Field(dtype="bool", text="the robot flew at the last tick")
     offset = Field(
         ("n_feet", 3), unit="m", frame="world", text="feet at lift-off, measured minus planned"
     )
-    goal = Field(("n_feet", 3), unit="m", frame="world", text="where the feet last aimed")
+    goal = Field(("n_feet", 3), unit="m", frame="world", text="last aim of the feet")
     swing = Field(("n_feet", 3), unit="m/s", frame="world", text="their planned speed from the com")
     linear = Field(3, unit="kg m/s", frame="world", text="planned linear momentum")
     angular = Field(3, unit="N m s", frame="world", text="planned angular momentum")
-    started = Field(dtype="bool", text="whether the plan's place in the world is known")
+    started = Field(dtype="bool", text="the plan's place in the world is known")
     origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
     lift_off_time = Field(unit="s", text="planned lift-off of the flight under way or next")
 
 
 class LandingConstants(PredictionConstants):
-    """What the law knows of the robot."""
+    """Data of the robot that the law depends on."""
 
     side = Field("n_feet", unit="", text="1: the foot is on the left, -1: right, 0: in the middle")
     stance = Field(("n_feet", 3), unit="m", frame="body", text="feet from the com in standing")
 
 
 class LandingScratch(PredictionScratch):
-    """What the law computes on its way."""
+    """Intermediate values of the law."""
 
     place = Field(("n_feet", 3), unit="m", frame="world", text="of each foot from the com")
     centre = Field(("n_feet", 3), unit="m", frame="world", text="of the limits p_max, from the com")
@@ -203,7 +203,7 @@ class LandingHeuristic(Block):
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase and the time to touchdown")
     terms = Input(DynamicsTerms, text="the present state")
-    feet = Output(FootTarget, text="where the feet should be, and where they should land")
+    feet = Output(FootTarget, text="targets of the feet, now and at touchdown")
     memory = State(LandingMemory, text="lift-off, and the plan as long as it lasts")
 
     @classmethod
@@ -402,7 +402,7 @@ def early_touchdown_offset(
     memory: LandingMemory,
     scratch: LandingScratch,
 ) -> float:
-    """By how much sooner than planned the lowest point of the soles comes down [s], at most ``MOST_LEAD``.
+    """Return the lead of the soles' lowest point over its planned touchdown [s], at most ``MOST_LEAD``.
 
     ``left`` [s] is the time until soles that are level touch. The point of a sole that is not level is lower than
     its centre, by what the fall takes some milliseconds for.
@@ -416,7 +416,7 @@ def early_touchdown_offset(
 
 @kernel
 def fall_time(speed: float, height: float) -> float:
-    """The time [s] in which a body falls by ``height`` [m] from the downward ``speed`` [m/s].
+    """Return the time [s] in which a body falls by ``height`` [m] from the downward ``speed`` [m/s].
 
     For a negative height it is that since the body was so much higher, at the latest its apex.
     """
@@ -433,7 +433,7 @@ def choose_place(
     place: Vector3,
     scratch: LandingScratch,
 ) -> None:
-    """The landing ``place`` (3,) of a foot from the centre of mass, by the law."""
+    """Choose the landing ``place`` (3,) of a foot from the centre of mass, by the law."""
     planned, side = memory.planned[foot], constants.side[foot]
     if params.law == "predicted":
         shift = memory.shift

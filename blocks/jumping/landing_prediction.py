@@ -28,7 +28,7 @@ from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JumpReference
 
 MOST_LEAD = 0.03
-"""What the fall adds to the lead at most [s]."""
+"""Largest lead from the fall [s]."""
 LAST = 0.02
 """Nearer to touchdown than this [s] the choice stands."""
 
@@ -63,7 +63,7 @@ class PredictionGains(Parameters):
     early: float = live_parameter(
         0.03,
         ge=0.0,
-        text="by how much of the flight, at most, stretched legs touch down early, as a share",
+        text="largest share of the flight by which stretched legs touch down early",
     )
     stop_acceleration: float = live_parameter(
         3.0, gt=0.0, text="stops the fall in the stroke that drawn up legs must keep, in g"
@@ -85,11 +85,11 @@ class PredictionGains(Parameters):
         unit="s",
         ge=0.0,
         le=0.05,
-        text="by how much the feet are ahead of their planned way, ahead and aside",
+        text="lead of the feet on their planned way, ahead and aside",
     )
     lead_by: Literal["time", "fall"] = parameter(
         "time",
-        text="the lead is `lead_time`, or that and by how much sooner than the plan the soles come down",
+        text="the lead is `lead_time` alone, or with the lead of the soles over their planned touchdown added",
     )
     stretch_damping: float = live_parameter(
         0.06, gt=0.0, text="damping where a leg is nearly stretched, in standing heights"
@@ -97,7 +97,7 @@ class PredictionGains(Parameters):
 
 
 class PredictionConstants(Signal):
-    """What the law knows of the robot, and ``PredictionGains`` for its size."""
+    """Data of the robot that the law depends on, and ``PredictionGains`` for its size."""
 
     mass = Field(unit="kg", text="that of the description")
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
@@ -116,22 +116,22 @@ class PredictionConstants(Signal):
 
 
 class PredictionMemory(Signal):
-    """What the law remembers."""
+    """Memory of the law."""
 
     planned = Field(("n_feet", 3), unit="m", frame="world", text="planned feet from the com")
     orientation = Field(4, unit="", text="planned base quaternion x, y, z, w")
     shift = Field(4, unit="m", frame="world", text="chosen: ahead, to the left, apart, upwards")
     planned_touchdown = Field(3, unit="m", frame="world", text="planned com at touchdown")
     flight_time = Field(unit="s", text="lift-off to touchdown with the planned length of the legs")
-    early = Field(unit="s", text="by how much sooner than planned the soles come down")
+    early = Field(unit="s", text="lead of the soles over their planned touchdown")
 
 
 class PredictionScratch(Signal):
-    """What the law computes on its way."""
+    """Intermediate values of the law."""
 
     linear = Field(3, unit="kg m/s", frame="world", text="the linear momentum that is fed back")
     angular = Field(3, unit="N m s", frame="world", text="the angular momentum that is fed back")
-    miss = Field(3, unit="m", frame="world", text="by which unshifted feet miss their place")
+    miss = Field(3, unit="m", frame="world", text="miss of unshifted feet")
     heading = Field((3, 3), unit="", text="of a sole")
     vector = Field(3, text="for a moment")
     fall_speed = Field(
@@ -154,7 +154,7 @@ class PredictionProgram(NamedTuple):
 
 
 def prediction_program(robot: RobotDescription) -> PredictionProgram:
-    """The memory of the program for a robot with feet."""
+    """Allocate the memory of the program for a robot with feet."""
     n = len(robot.contacts)
     cost = LandingCost(np.zeros(3), np.zeros(6), np.zeros((2, 2)), np.zeros(2))
     return PredictionProgram(flight_map(len(robot.joints), n), cost, np.zeros(3 * n))
@@ -244,7 +244,7 @@ def find_ways(
     scratch: PredictionScratch,
     way: Array1D,
 ) -> None:
-    """How far every contact point is from its planned place, with flat soles."""
+    """Compute the ``way`` of every contact point to its planned place, with flat soles."""
     for point in range(constants.foot_of_point.shape[0]):
         foot = constants.foot_of_point[point]
         heading_matrix(plan.foot_yaw[foot], scratch.heading)

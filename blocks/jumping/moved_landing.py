@@ -15,18 +15,18 @@ from ..signals import DynamicsTerms, JumpReference
 AHEAD, ASIDE, UP, TURN = range(4)
 """The axes of a landing: in the jump's frame [m], and the feet's heading [rad]."""
 RAISED = 0.7
-"""By this share of the flight feet are as much higher as they land, so that they pass over the edge."""
+"""Share of the flight at which the feet have gained their landing's extra height, so that they pass over the edge."""
 
 
 class RetargetParameters(Parameters):
-    """How far the landing of a jump under way may be moved."""
+    """Limits to moving the landing of a jump under way."""
 
     retarget_time: float = parameter(
         0.1, unit="s", ge=0.02, le=1.0,
-        text="how long before lift-off the thrust may still be changed to move a landing",
+        text="time before lift-off until which the thrust may be changed to move a landing",
     )  # fmt: skip
     retarget_window: float = parameter(
-        0.3, unit="s", gt=0.0, le=1.0, text="how long before lift-off that begins, at most"
+        0.3, unit="s", gt=0.0, le=1.0, text="longest time before lift-off at which that begins"
     )
     retarget_acceleration: float = parameter(
         3.0, unit="m/s^2", ge=0.0, le=20.0,
@@ -40,45 +40,47 @@ class RetargetParameters(Parameters):
         20.0, unit="rad/s^2", ge=0.0, le=200.0, text="of the body for it, about the vertical"
     )
     retarget_limit: float = parameter(
-        0.05, unit="m", ge=0.0, le=0.3, text="how far a landing is moved ahead and aside at most"
+        0.05, unit="m", ge=0.0, le=0.3, text="largest shift of a landing ahead and aside"
     )
     retarget_height: float = parameter(
-        0.03, unit="m", ge=0.0, le=0.2, text="how much higher or lower it is moved at most"
+        0.03, unit="m", ge=0.0, le=0.2, text="largest change of its height"
     )
     retarget_turn: float = parameter(
-        0.35, unit="rad", ge=0.0, le=1.5, text="how far its heading is turned at most"
+        0.35, unit="rad", ge=0.0, le=1.5, text="largest change of its heading"
     )
     foothold_time: float = parameter(
         0.1, unit="s", ge=0.02, le=1.0,
-        text="how long before touchdown the footholds may still be moved in flight",
+        text="time before touchdown until which the footholds may be moved in flight",
     )  # fmt: skip
     foothold_limit: float = parameter(
         0.02, unit="m", ge=0.0, le=0.2,
-        text="how far the feet land from where the centre of mass needs them, ahead and aside at most",
+        text="largest shift of the feet from where the centre of mass needs them, ahead and aside",
     )  # fmt: skip
     foothold_turn: float = parameter(
-        0.15, unit="rad", ge=0.0, le=1.0, text="how far the feet are turned in flight at most"
+        0.15, unit="rad", ge=0.0, le=1.0, text="largest turn of the feet in flight"
     )
 
 
 class MovedLanding(Signal):
-    """By how much the jump under way differs from its plan. Rows of four are ahead, aside, up [m] and turn [rad]."""
+    """Differences of the jump under way from its plan. Rows of four are ahead, aside, up [m] and turn [rad]."""
 
-    moves = Field(dtype="int64", text="how often its landing has been moved; zero: as planned")
-    landing = Field(4, text="by how much the feet land elsewhere")
-    thrown = Field(4, text="how much of that the thrust does")
-    thrust_began = Field(4, unit="s", text="when the thrust begins to be changed, in plan time")
+    moves = Field(
+        dtype="int64", text="number of times its landing has been moved; zero: as planned"
+    )
+    landing = Field(4, text="shift of the feet's landing")
+    thrown = Field(4, text="share of the shift that the thrust does")
+    thrust_began = Field(4, unit="s", text="start of the thrust's change, in plan time")
     place = Field(4, text="of the body from its plan then")
     rate = Field(4, text="its rate")
     acceleration = Field(4, text="the rate of that")
     final_rate = Field(4, text="the rate with which the body lifts off")
-    swing_began = Field(unit="s", text="when the feet begin to be moved, in plan time")
+    swing_began = Field(unit="s", text="start of the feet's change, in plan time")
     swing = Field(4, text="of the feet from their plan then")
     swing_rate = Field(4, text="its rate")
 
 
 class MotionScratch(Signal):
-    """Room for moving a plan."""
+    """Scratch memory for moving a plan."""
 
     quaternion = Field(4, unit="", text="a rotation about the vertical")
     axis = Field(3, unit="", text="the vertical")
@@ -91,7 +93,7 @@ class MotionScratch(Signal):
 def thrust_motion(
     moved: MovedLanding, axis: int, lift_off: float, time: float
 ) -> tuple[float, float, float]:
-    """By how much a thrust differs from its plan on an axis at a plan time: place, rate and acceleration.
+    """Return the difference of a thrust from its plan on an axis at a plan time: place, rate and acceleration.
 
     From r_0 with the acceleration a_0 the rate goes to v at lift-off, after T_p, where the acceleration
     is the plan's again. With u the share of T_p that is over::
@@ -113,7 +115,8 @@ def thrust_motion(
 
 @kernel
 def fastest_change(acceleration: float, limit: float, duration: float) -> float:
-    """By how much the rate of ``thrust_motion`` can rise within its ``duration``, if a(u) <= ``limit`` from ``acceleration`` on.
+    """Return the largest rise of the rate of ``thrust_motion`` within its ``duration``, if a(u) <= ``limit`` from
+    ``acceleration`` on.
 
     The largest a(u) of (1 - u) (a_0 + c u) is (c + a_0)^2 / (4 c), so c <= 2 A - a_0 + 2 sqrt(A^2 - A a_0).
     """
@@ -177,7 +180,7 @@ def begin_swing(moved: MovedLanding, reference: JumpReference) -> None:
 def swing_motion(
     moved: MovedLanding, axis: int, reference: JumpReference, began: float
 ) -> tuple[float, float]:
-    """By how much feet differ from their plan on an axis: place and rate. They land at rest, as planned."""
+    """Return the difference of the feet from their plan on an axis: place and rate. They land at rest, as planned."""
     touchdown = reference.touchdown_time
     if axis == UP and moved.landing[UP] > 0.0:
         touchdown = began + RAISED * (touchdown - began)
@@ -267,7 +270,7 @@ def turn_feet(reference: JumpReference, moved: MovedLanding, scratch: MotionScra
 
 @kernel
 def middle_of(points: Array2D, out: Array1D) -> None:
-    """The mean of points (n, 3)."""
+    """Compute the mean of points (n, 3)."""
     out[:] = 0.0
     for i in range(points.shape[0]):
         out[:] += points[i] / points.shape[0]

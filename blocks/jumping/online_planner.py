@@ -25,11 +25,9 @@ class PlanAnswer(PlanRows):
     """The state of ``OnlinePlanner``: the last plan, and how much of it has been handed over."""
 
     number = Field(dtype="int64", text="of the request that was planned last")
-    parts = Field(dtype="int64", text="how many parts it has")
-    given = Field(dtype="int64", text="how many of them have been given")
-    outcomes = Field(
-        len(PlanOutcome), dtype="int64", text="how many plans were of each PlanOutcome"
-    )
+    parts = Field(dtype="int64", text="number of its parts")
+    given = Field(dtype="int64", text="number of parts handed over")
+    outcomes = Field(len(PlanOutcome), dtype="int64", text="number of plans of each PlanOutcome")
 
 
 class OnlinePlanner(Block):
@@ -57,7 +55,7 @@ class OnlinePlanner(Block):
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """The width of a plan's rows."""
+        """Return the width of a plan's rows."""
         return row_dimensions(robot)
 
     @classmethod
@@ -134,7 +132,7 @@ class OnlinePlanner(Block):
         self._times.append(found.solve_s + found.check_s)
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many plans there were of each kind, and the processor time of solver and check."""
+        """Return the number of plans of each kind, and the processor time of solver and check."""
         counts = {
             f"plans_{outcome.name.lower()}": int(self.answer.outcomes[outcome])
             for outcome in PlanOutcome

@@ -1,4 +1,4 @@
-"""The velocity that is asked for on the page of a running graph."""
+"""The velocity commanded on the page of a running graph."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class PadHeld(Signal):
     """The state of ``Pad``."""
 
     beat = Field(dtype="int64", text="the last beat")
-    since = Field(unit="s", text="when it came")
+    since = Field(unit="s", text="time of its arrival")
 
 
 class Pad(Block):
@@ -29,10 +29,12 @@ class Pad(Block):
         aside: float = live_parameter(0.0, unit="m/s", ge=-1.0, le=1.0, text="velocity to the left")
         turn: float = live_parameter(0.0, unit="rad/s", ge=-2.0, le=2.0, text="turn to the left")
         beat: int = live_parameter(0, ge=0, text="changes as long as the pad is held")
-        hold_time: float = parameter(1.0, unit="s", gt=0.0, le=10.0, text="how long a beat holds")
+        hold_time: float = parameter(
+            1.0, unit="s", gt=0.0, le=10.0, text="time for which a beat holds"
+        )
 
     params: Params
-    twist = Output(BodyTwist, text="the velocity that is asked for")
+    twist = Output(BodyTwist, text="the commanded velocity")
     memory = State(PadHeld, text="the last beat")
 
     @kernel

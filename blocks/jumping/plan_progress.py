@@ -1,4 +1,4 @@
-"""When a plan is read: by how far the thrust, the fall or the rotation of the robot has come."""
+"""The reading time of a plan, from the progress of the robot's thrust, fall or rotation."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle, wrap
 from ...mathematics.stance_feet import has_contact
-from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
+from ...planner.library.jump_table import FlightRotation, TableRows
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
 from .jump_phase import planned_touchdown_height, time_to_height
+from .table_reading import locate, read_table
 
 FASTEST = 0.5
-"""By how much a plan is slowed down or hastened at most, as a share of time."""
+"""Largest change of a plan's speed, as a share of time."""
 SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
 LEAST_PUSH = 8.0
@@ -26,70 +27,70 @@ LEAST_PUSH = 8.0
 PITCH = 1
 """The axis of a somersault: the world's y axis, which is the body's too."""
 SETTLED = 0.02
-"""From so long after lift-off on [s] the measured momentum is that of the flight."""
+"""Time after lift-off [s] from which the measured momentum is that of the flight."""
 FULL = 0.95
 """The rate of rotation is measured while the planned one is at least this share of its greatest."""
 SPIN_TIME, SPIN_RANGE = 0.03, 0.2
 """Time constant of its mean [s], and by what share it may differ from the plan's."""
 TUCKED_SHIFT, OPEN_SHIFT = 0.3, 0.4
-"""By how much the plan is hastened or slowed down at most before and after the legs have left the tuck,
-as a share of time."""
+"""Largest change of a plan's speed before and after the legs have left the tuck, as a share of time."""
 CLOSING = 0.008
-"""So long before touchdown [s] the plan is on time again."""
+"""Time before touchdown [s] from which the plan is on time again."""
 
 
 class Turning(Parameters):
-    """How the flight of a somersault is retimed; see ``follow_turn``."""
+    """Retiming of a somersault's flight; see ``follow_turn``."""
 
     gain: float = parameter(
         50.0, unit="1/s", ge=0.0, text="rate at which an error of the rotation is corrected"
     )
     early: float = parameter(
-        0.04, unit="s", ge=0.0, le=0.1, text="by how much earlier the legs leave the tuck at most"
+        0.04, unit="s", ge=0.0, le=0.1, text="largest advance of the legs' leaving the tuck"
     )
     late: float = parameter(
         0.005, unit="s", ge=0.0, le=0.05,
-        text="by how much later; then they must hurry, and their feet are faster at touchdown",
+        text="largest delay of it; then they must hurry, and their feet are faster at touchdown",
     )  # fmt: skip
     aim: float = parameter(
         0.0, unit="rad", ge=-0.5, le=0.5,
-        text="how much further than planned the body has turned at touchdown",
+        text="excess of the body's rotation over the planned one at touchdown",
     )  # fmt: skip
 
 
 class ProgressParameters(Parameters):
-    """How ``JumpPlan`` keeps its plan in time with the robot."""
+    """Parameters that keep ``JumpPlan`` in time with the robot."""
 
     by: Literal["progress", "clock"] = parameter(
-        "progress", text="what ends the thrust: the speed reached, if `terms` is wired, or time"
+        "progress",
+        text="condition that ends the thrust: the speed reached, if `terms` is wired, or time",
     )
     progress_time: float = parameter(
-        0.06, unit="s", gt=0.0, text="how long before lift-off the motion counts"
+        0.06, unit="s", gt=0.0, text="time before lift-off in which the motion counts"
     )
     progress_gain: float = parameter(
         40.0, unit="1/s", ge=0.0, text="rate at which an error of the speed is corrected"
     )
     progress_limit: float = parameter(
-        0.008, unit="s", ge=0.0, le=0.05, text="how much later or earlier a thrust may end"
+        0.008, unit="s", ge=0.0, le=0.05, text="largest change of a thrust's end"
     )
     toes_gain: float = parameter(
         5.0, unit="1/s", ge=0.0, text="rate at which the plan is kept in time with such a fall"
     )
     turning: Turning | None = parameter(
-        None, text="how a somersault is timed by its rotation in flight; none: by the clock"
+        None, text="timing of a somersault by its rotation in flight; none: by the clock"
     )
 
 
 class PlanProgress(Signal):
     """The state of ``JumpPlan``."""
 
-    late = Field(unit="s", text="how much later than by the clock the plan is read")
+    late = Field(unit="s", text="delay of the plan's reading time behind the clock")
     before = Field(unit="s", text="``late`` when the last part of the thrust began")
-    spin = Field(unit="", text="how fast a somersault turns, as a share of the plan's rate")
+    spin = Field(unit="", text="rate of a somersault, as a share of the plan's rate")
 
 
 class ProgressConstants(Signal):
-    """What follows from the parameters, the plan and the wires."""
+    """Constants derived from the parameters, the plan and the wires."""
 
     lead = Field(unit="s", text="delay from sensing to torque; negative: the one at ``delay``")
     follows_motion = Field(dtype="bool", text="thrusts and falls end when the robot's do")
@@ -138,7 +139,7 @@ def read_plan(
 def plan_time(
     now: float, delay: DelayEstimate, progress: PlanProgress, constants: ProgressConstants
 ) -> tuple[float, float]:
-    """The plan's time at the time ``now`` of the run, and the delay that is left to compensate [s]."""
+    """Return the plan's time at the time ``now`` of the run, and the delay that is left to compensate [s]."""
     lead = delay.delay if constants.lead < 0.0 else constants.lead
     early = min(delay.ahead, lead)
     return now - progress.late + early, lead - early
@@ -164,7 +165,7 @@ def keep_in_time(
 
 @kernel
 def speed_error(height: float, speed: float, planned_height: float, planned_speed: float) -> float:
-    """By how much [m/s] the robot is too fast for the planned apex, or too slow, if negative.
+    """Return the excess of the robot's speed [m/s] over that of the planned apex; negative if it is too slow.
 
     The apex of a throw is z + v^2 / (2 g), so a height error dz counts like the speed error
     g dz / v.
@@ -181,7 +182,7 @@ def speed_error(height: float, speed: float, planned_height: float, planned_spee
 
 @kernel
 def delay_change(error: float, push: float, gain: float, fastest: float, period: float) -> float:
-    """The change [s] of a plan's delay in one period, so that the thrust ends at the planned apex.
+    """Return the change [s] of a plan's delay in one period, so that the thrust ends at the planned apex.
 
     A thrust that ends later by d makes the robot faster by its acceleration times d.
 
@@ -251,14 +252,15 @@ def follow_fall(
 
 @kernel
 def time_to_fall(height: float, speed: float) -> float:
-    """The time [s] in which a body that is thrown up at ``speed`` [m/s] falls by ``height`` [m]."""
+    """Return the time [s] in which a body that is thrown up at ``speed`` [m/s] falls by ``height`` [m]."""
     square = speed * speed + 2.0 * GRAVITY * max(height, 0.0)
     return (speed + math.sqrt(square)) / GRAVITY
 
 
 @kernel
 def mean_height(position: Array2D, reference: JumpReference, constants: ProgressConstants) -> float:
-    """The mean height [m] of positions of feet (n, 3), of those that carry load in the plan; of all where none does."""
+    """Return the mean height [m] of positions of feet (n, 3), of those that carry load in the plan; of all where none
+    does."""
     total, count = 0.0, 0
     for foot in range(position.shape[0]):
         if has_contact(reference.contact, constants.foot_of_point, foot):
@@ -288,7 +290,7 @@ def follow_turn(
 
         s' = w (c - tau'),     at touchdown:  s_td = s + (c - 1) G - w_td d
 
-    where d is by how much the plan must still be shifted, with its legs out, to land when the robot
+    where d is the shift that the plan still needs, with its legs out, to land when the robot
     falls onto its feet. A shift in the tuck instead changes s_td by w_td - w for every second of it::
 
         tau' = 1 + gain (s_td - aim) / (w - w_td)
@@ -334,15 +336,15 @@ def follow_turn(
 
 @kernel
 def value_at(times: Array1D, values: Array1D, time: float) -> float:
-    """The value at a time in a table that is linear between its rows; (n,) each."""
+    """Return the value at a time in a table that is linear between its rows; (n,) each."""
     low, share = locate(times, time)
     return float(values[low] + share * (values[low + 1] - values[low]))
 
 
 @kernel
 def turned_beyond(rotation: Matrix3, orientation: Array1D) -> float:
-    """By how much [rad] a body of this ``rotation`` has turned further about its y axis than one
-    of the planned ``orientation``, a quaternion x, y, z, w."""
+    """Return the angle [rad] by which a body of this ``rotation`` has turned further about its y axis than one of the
+    planned ``orientation``, a quaternion x, y, z, w."""
     planned = pitch_angle(orientation)
     measured = atan2(-rotation[2, 0], rotation[0, 0])
     return wrap(measured - planned)

@@ -15,14 +15,14 @@ class ReceivedPlan(PlanRows):
     """The plan that is handed over, row by row."""
 
     parts = Field(dtype="int64", text="parts that have come")
-    whole = Field(dtype="bool", text="whether all have come")
+    whole = Field(dtype="bool", text="all parts have come")
 
 
 class FollowedPlan(PlanRows):
     """The plan that is followed."""
 
     sums = Field((PLAN_ROWS, "plan_width"), text="integrals of the columns")
-    touchdowns = Field(1, unit="s", text="when landing begins")
+    touchdowns = Field(1, unit="s", text="start of the landing")
     began = Field(unit="s", text="time of the run at which it began")
 
 

@@ -17,11 +17,8 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     integral,
-    interpolate_rows,
     row_dimensions,
     table_rows,
-    write_columns,
-    write_marks,
 )
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output, State
@@ -44,6 +41,7 @@ from .plan_progress import (
     keep_in_time,
     plan_time,
 )
+from .table_reading import interpolate_rows, write_columns, write_marks
 
 if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
@@ -55,20 +53,20 @@ CYCLE = 2
 
 
 class SpeedMemory(Signal):
-    """What ``SpeedPlan`` remembers."""
+    """Memory of ``SpeedPlan``."""
 
     jump = Field(dtype="int64", text="the jump of the planned rows that is under way")
     landed = Field(dtype="int64", text="touchdowns of the plan so far")
-    skipped = Field(unit="s", text="by how much the repeated cycles have put off the rows' time")
-    place = Field(unit="m", text="where the planned feet stand, ahead of where they began")
+    skipped = Field(unit="s", text="time by which the repeated cycles have put off the rows")
+    place = Field(unit="m", text="place of the planned feet, ahead of where they began")
     before = Field(unit="m", text="the length of the jump before")
     way = Field(unit="m", text="the length of the jump under way")
-    goal = Field(unit="m", text="where the last jump that has lifted off should land")
-    begun = Field(dtype="int64", text="how many have")
+    goal = Field(unit="m", text="landing place of the last jump that has lifted off")
+    begun = Field(dtype="int64", text="number of jumps that have begun")
 
 
 class HoppingConstants(ProgressConstants):
-    """What follows from the parameters and the rows."""
+    """Constants derived from the parameters and the rows."""
 
     hop_time = Field(unit="s", text="from one lift-off to the next")
 
@@ -108,7 +106,7 @@ class SpeedPlan(Block):
         speeds: tuple[float, ...] = parameter(
             (0.0, 0.2, 0.4, 0.6, 0.8), unit="m/s", text="of the rows, rising"
         )
-        jumps: int = parameter(30, ge=ROW, le=10000, text="how many jumps are made")
+        jumps: int = parameter(30, ge=ROW, le=10000, text="number of jumps")
         most_change: float = parameter(
             0.2, unit="m/s", gt=0.0, text="change of the speed from one jump to the next at most"
         )
@@ -124,7 +122,7 @@ class SpeedPlan(Block):
             return speeds
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         mixed = Field("plan_width", text="columns of an instant")
         added = Field(2, text="velocity and acceleration ahead by the change of the weights")
@@ -136,15 +134,15 @@ class SpeedPlan(Block):
     constants: HoppingConstants
     terms = Input(DynamicsTerms, text="the measured motion")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
-    twist = Input(BodyTwist, text="the speed that is asked for: linear[0]")
+    twist = Input(BodyTwist, text="commanded speed: linear[0]")
     reference = Output(JumpReference, text="the mixture at the present instant")
-    goal = Output(CourseGoal, text="where the feet should land")
+    goal = Output(CourseGoal, text="landing place of the feet")
     memory = State(SpeedMemory, text="the jump under way")
-    progress = State(PlanProgress, text="how late the plan is")
+    progress = State(PlanProgress, text="delay of the plan")
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """The width of a plan's rows."""
+        """Return the width of a plan's rows."""
         return row_dimensions(robot)
 
     @classmethod
@@ -166,7 +164,7 @@ class SpeedPlan(Block):
         self.constants.hop_time = p.flight_time + p.contact_time
 
     def _table_of(self, way: float) -> JumpTable:
-        """The row of jumps of this length."""
+        """Return the row of jumps of this length."""
         from ...planner.library.library import PlanLibrary
         from ...planner.library.validation_cache import cached_reference_table
 
@@ -222,13 +220,13 @@ class SpeedPlan(Block):
 
 
 def row_lengths(params: SpeedPlan.Params) -> list[float]:
-    """The length of the jumps of each row [m]."""
+    """Return the length of the jumps of each row [m]."""
     period = params.flight_time + params.contact_time
     return [round(speed * period, 6) for speed in params.speeds]
 
 
 def row_task(params: SpeedPlan.Params, robot: str, way: float) -> JumpTask:
-    """The task of a row of jumps of this length [m]."""
+    """Return the task of a row of jumps of this length [m]."""
     from ...planner.task.task import make_task
 
     return make_task({
@@ -238,7 +236,7 @@ def row_task(params: SpeedPlan.Params, robot: str, way: float) -> JumpTask:
 
 
 def first_rows(tables: list[JumpTable]) -> Array:
-    """When each table begins among the ``joined`` ones [s], (n,)."""
+    """Return the start of each table among the ``joined`` ones [s], (n,)."""
     return np.asarray(2.0 * float(tables[0].time[-1]) * np.arange(len(tables)))
 
 
@@ -270,7 +268,7 @@ def begin_next_jump(
 
 @kernel
 def tell_goal(memory: SpeedMemory, goal: CourseGoal) -> None:
-    """Where the feet should be."""
+    """Write the ``goal`` of the feet."""
     goal.position[0], goal.position[1] = memory.goal, 0.0
     goal.heading, goal.height = 0.0, 0.0
     goal.number = memory.begun
@@ -279,7 +277,7 @@ def tell_goal(memory: SpeedMemory, goal: CourseGoal) -> None:
 
 @kernel
 def triangle_weight(ways: Array1D, number: int, way: float) -> float:
-    """The weight of a row in the linear interpolation between the ``ways`` at a ``way`` within them."""
+    """Return the weight of a row in the linear interpolation between the ``ways`` at a ``way`` within them."""
     weight = 1.0
     if number > 0 and way < ways[number]:
         weight = (way - ways[number - 1]) / (ways[number] - ways[number - 1])

@@ -38,7 +38,7 @@ class SquatJumpParameters(GuidedParameters):
         0.09, unit="m", gt=0.0, le=1.0, text="apex of the centre of mass above standing"
     )
     distance: float = parameter(
-        0.0, unit="m", ge=-1.0, le=1.0, text="how far ahead of the start the feet land"
+        0.0, unit="m", ge=-1.0, le=1.0, text="distance of the landing ahead of the start"
     )
     lean: float = parameter(
         0.8, unit="rad", ge=0.0, le=1.3, text="forward pitch of the torso in the squat"
@@ -56,7 +56,11 @@ class SquatJumpParameters(GuidedParameters):
         0.009, unit="m", ge=-0.1, le=0.3, text="height at touchdown below standing"
     )
     landing_depth: float = parameter(
-        0.06, unit="m", ge=0.0, le=0.5, text="where the landing comes to rest below standing"
+        0.06,
+        unit="m",
+        ge=0.0,
+        le=0.5,
+        text="depth below standing at which the landing comes to rest",
     )
     unloading: float = parameter(
         0.7, ge=0.0, le=1.0, text="share of the weight taken off the feet at lift-off"
@@ -105,7 +109,7 @@ class SquatJumpReference(GuidedReference):
     params: SquatJumpParameters
 
     def make_table(self) -> JumpTable:
-        """The squat, the jump and the landing."""
+        """Compute the squat, the jump and the landing."""
         return _plan(self.robot.model_dump_json(), self.params)
 
     def setup(self) -> None:
@@ -115,7 +119,7 @@ class SquatJumpReference(GuidedReference):
 
 @lru_cache(maxsize=8)
 def _plan(robot: str, task: SquatJumpParameters) -> JumpTable:
-    """The plan for a robot given as JSON; it is computed once for all runs of a process."""
+    """Plan for a robot given as JSON, once for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
     return plan_squat_jump(build_pinocchio_model(description), description, task)
 
@@ -123,7 +127,7 @@ def _plan(robot: str, task: SquatJumpParameters) -> JumpTable:
 def plan_squat_jump(
     built: PinocchioModel, robot: RobotDescription, task: SquatJumpParameters
 ) -> JumpTable:
-    """The whole jump, from standing to standing.
+    """Plan the whole jump, from standing to standing.
 
     Raises:
         BlockError: the legs or the motors cannot do it; the message says which, and what to ask
@@ -153,7 +157,7 @@ def plan_squat_jump(
 
 
 def _lift_off_momentum(jump: _Jump, body: GuidedBody, bottom: Array, start: float) -> float:
-    """The pitching momentum at lift-off with which the torso lands as asked, by secant steps."""
+    """Find the pitching momentum at lift-off with which the torso lands as asked, by secant steps."""
 
     def error(momentum: float) -> float:
         trial = MotionRecorder(body, bottom)
@@ -218,7 +222,7 @@ class _Jump:
         self.forward = (self.task.distance - self.offset) / way
 
     def _plan_legs(self) -> None:
-        """The feet relative to the centre of mass in flight: from lift-off to landing posture."""
+        """Plan the feet relative to the centre of mass in flight: from lift-off to landing posture."""
         self.bottom = np.array([self.offset, 0.0, self.low])
         self.take_off = np.array([self.forward, 0.0, self.speed])
         travel = 0.5 * self.thrust_time * self.forward
@@ -248,11 +252,11 @@ class _Jump:
         )  # fmt: skip
 
     def rest(self, t: float) -> GuidedMotion:
-        """Standing still."""
+        """Stand still."""
         return self._motion(self.home)
 
     def squat(self, t: float) -> GuidedMotion:
-        """Going down and leaning forward, with minimum jerk."""
+        """Go down and lean forward, with minimum jerk."""
         motion = self._rise_or_sink(self.home, self.bottom, t / self.task.squat_time,
                                     self.task.squat_time)  # fmt: skip
         rate = minimum_jerk(t / self.task.squat_time)[1] / self.task.squat_time
@@ -260,11 +264,11 @@ class _Jump:
         return motion
 
     def pause(self, t: float) -> GuidedMotion:
-        """Waiting at the bottom."""
+        """Wait at the bottom."""
         return self._motion(self.bottom)
 
     def thrust(self, t: float, momentum: float) -> GuidedMotion:
-        """Going up, while the pitching momentum grows to that of lift-off."""
+        """Go up, while the pitching momentum grows to that of lift-off."""
         total = self.thrust_time
         u = t / total
         share, rate, way = 3.0 * u**2 - 2.0 * u**3, 6.0 * u * (1.0 - u), u**3 - 0.5 * u**4
@@ -280,7 +284,7 @@ class _Jump:
         return motion
 
     def flight(self, t: float, momentum: float) -> GuidedMotion:
-        """Ballistic flight, in which the legs go to their landing posture."""
+        """Fly, while the legs go to their landing posture."""
         fall = np.array([0.0, 0.0, -GRAVITY])
         motion = self._motion(self.lift_off_com + t * self.take_off + 0.5 * t**2 * fall)
         motion.com_velocity = self.take_off + t * fall
@@ -294,7 +298,7 @@ class _Jump:
         return motion
 
     def landing(self, t: float, pitch: float) -> GuidedMotion:
-        """Going down to rest over the feet, while the torso turns upright from ``pitch``."""
+        """Go down to rest over the feet, while the torso turns upright from ``pitch``."""
         duration = self.task.landing_time
         speed = np.array([self.forward, 0.0, -self.fall])
         goal = np.array([self.task.distance, 0.0, self.rest_height])
@@ -320,7 +324,7 @@ class _Jump:
         return motion
 
     def recover(self, t: float) -> GuidedMotion:
-        """Going up to standing height, with minimum jerk."""
+        """Go up to standing height, with minimum jerk."""
         low = np.array([self.task.distance, 0.0, self.rest_height])
         high = np.array([self.task.distance, 0.0, float(self.home[2])])
         duration = self.task.recover_time

@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...planner.library.jump_table import JumpTable, TableRows, read_table
+from ...planner.library.jump_table import JumpTable, TableRows
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Input, State
@@ -26,6 +26,7 @@ from .guided_motion import (
     MotionRecorder,
     check_limits,
 )
+from .table_reading import read_table
 
 
 class StandReference(GuidedReference):
@@ -46,7 +47,7 @@ class StandReference(GuidedReference):
 
     class Params(GuidedParameters):
         squat_depth: float = parameter(
-            0.0, unit="m", ge=0.0, le=0.5, text="how far the centre of mass goes down; 0: no squat"
+            0.0, unit="m", ge=0.0, le=0.5, text="descent of the centre of mass; 0: no squat"
         )
         stand_time: float = parameter(
             0.5, unit="s", gt=0.0, text="standing before the squat, for the estimator to settle"
@@ -58,14 +59,14 @@ class StandReference(GuidedReference):
     params: Params
 
     def make_table(self) -> JumpTable:
-        """The stance, and the squat if there is one."""
+        """Compute the stance, and the squat if there is one."""
         p = self.params
         times = (p.stand_time, p.squat_time, p.pause_time, p.rise_time)
         return _plan(self.robot.model_dump_json(), float(p.squat_depth), times)
 
 
 class TriggerMemory(Signal):
-    """When the motion begins."""
+    """Start of the motion."""
 
     began = Field(unit="s", text="the time of the run at which the robot stood")
 
@@ -78,7 +79,7 @@ class TriggeredStandReference(StandReference):
     """
 
     phase = Input(PhaseState, text="the phase; the motion begins after HANG")
-    memory = State(TriggerMemory, text="when the motion begins")
+    memory = State(TriggerMemory, text="start of the motion")
 
     @kernel
     @staticmethod
@@ -102,7 +103,7 @@ class TriggeredStandReference(StandReference):
 
 @lru_cache(maxsize=8)
 def _plan(robot: str, depth: float, times: tuple[float, float, float, float]) -> JumpTable:
-    """The motion for a robot given as JSON; it is computed once for all runs of a process."""
+    """Compute the motion for a robot given as JSON, once for all runs of a process."""
     description = RobotDescription.model_validate_json(robot)
     return plan_stand(description, depth, times)
 
@@ -110,7 +111,7 @@ def _plan(robot: str, depth: float, times: tuple[float, float, float, float]) ->
 def plan_stand(
     robot: RobotDescription, depth: float, times: tuple[float, float, float, float]
 ) -> JumpTable:
-    """The stance, and with a ``depth`` above zero [m] the squat, as a table.
+    """Compute the stance, and with a ``depth`` above zero [m] the squat, as a table.
 
     Args:
         robot: the robot that stands.

@@ -19,14 +19,14 @@ class StartFrame(Block):
     """
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         vector = Field(3, text="a vector")
         turn = Field(4, text="quaternion of the rotation")
 
     scratch: Scratch
     state = Input(BaseState, text="pose and velocity of the base by the estimator")
-    frame = Input(JumpFrame, text="where the jump begins")
+    frame = Input(JumpFrame, text="start of the jump")
     base = Output(BaseState, text="the same in that frame")
 
     @kernel

@@ -1,4 +1,4 @@
-"""Plays jumps one after the other, each of which is asked for when the one before has landed."""
+"""Jumps one after the other, each requested when the one before has landed."""
 
 from __future__ import annotations
 
@@ -12,13 +12,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import hypot, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
-from ...planner.library.jump_table import (
-    FlightRotation,
-    TableRows,
-    fed_forward,
-    integrate_rows,
-    row_dimensions,
-)
+from ...planner.library.jump_table import FlightRotation, TableRows, fed_forward, row_dimensions
 from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
 from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
@@ -71,6 +65,7 @@ from .plan_progress import (
     read_plan,
 )
 from .received_plan import BEHIND, FollowedPlan, ReceivedPlan, receive
+from .table_reading import integrate_rows
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
@@ -81,23 +76,23 @@ MOST_BIAS = 0.02
 SAME_TURN = 0.02
 """A difference of heading [rad] that is none."""
 MOVED_TURN = 0.05
-"""A jump is asked for anew where the feet have turned by so much [rad]."""
+"""Turn of the feet [rad] from which a jump is requested anew."""
 
 
 class SteeringState(Signal):
-    """What ``SteeredPlan`` remembers besides its plans."""
+    """Memory of ``SteeredPlan`` besides its plans."""
 
-    started = Field(dtype="bool", text="whether the first tick is over")
+    started = Field(dtype="bool", text="the first tick is over")
     start = Field(2, unit="m", frame="world", text="middle of the feet when it first stood")
     start_heading = Field(unit="rad", frame="world", text="their heading then")
     origin = Field(3, unit="m", frame="world", text="origin of the jump's frame")
     heading = Field(unit="rad", frame="world", text="heading of that frame")
-    goal = Field(2, unit="m", frame="world", text="where the middle of the feet should be")
+    goal = Field(2, unit="m", frame="world", text="goal of the middle of the feet")
     goal_heading = Field(unit="rad", frame="world", text="their heading there")
     bias = Field(
         (3, 2),
         unit="m",
-        text="by how much landings go too far ahead and aside: of jumps ahead, back and others",
+        text="error of landings ahead and aside: of jumps ahead, back and others",
     )
     kind = Field(dtype="int64", text="the row of the last request")
     level = Field(unit="m", text="height of the ground there, above that where it first stood")
@@ -106,17 +101,17 @@ class SteeringState(Signal):
     before_level = Field(unit="m", text="the height there")
     taken = Field(dtype="int64", text="number of the last command that was taken")
     requests = Field(dtype="int64", text="requests so far")
-    asked_from = Field(2, unit="m", frame="world", text="where the feet were at the last request")
+    asked_from = Field(2, unit="m", frame="world", text="place of the feet at the last request")
     asked_heading = Field(unit="rad", frame="world", text="their heading then")
     asked = Field(4, text="the last request: ahead, aside [m], turn [rad] and up [m]")
     jumps = Field(dtype="int64", text="plans begun so far")
     changed = Field(dtype="int64", text="commands that moved the landing of a jump under way")
     nearest = Field(dtype="int64", text="those of them that only the nearest was done of")
-    waits = Field(dtype="bool", text="whether a plan was asked for that has not begun")
+    waits = Field(dtype="bool", text="a plan was requested and has not begun")
 
 
 class SteeringConstants(ProgressConstants):
-    """What follows from the parameters and the robot's stored plans."""
+    """Constants derived from the parameters and the robot's stored plans."""
 
     ahead = Field(unit="m", text="the farthest jump ahead")
     back = Field(unit="m", text="the farthest back")
@@ -126,17 +121,17 @@ class SteeringConstants(ProgressConstants):
 
 
 class SteeredPlan(Block):
-    """Asks for the next jump where a command has come, and follows its plan.
+    """Requests the next jump when a command has come, and follows its plan.
 
     The robot stands, jumps, lands and stands. While it stands, and from ``ask_time`` after a touchdown, a
     command with a greater number than the last one is taken: the place and heading where the feet should
     be move on by it, or to it where it is ``placed``. Until the plan begins a command that
-    ``replaces`` takes the place of the one that was taken, and the jump is asked for anew. The ``request`` is the way from where the feet *are* to that goal, so a
+    ``replaces`` takes the place of the one that was taken, and the jump is requested anew. The ``request`` is the way from where the feet *are* to that goal, so a
     landing that missed its place is corrected by the next jump. ``OnlinePlanner``, which works in the
     background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
     ``rest_time`` and is at rest, the plan begins at the measured place and heading of the feet. It is at rest where its capture
     point c + c' / w, seen from the middle of the feet, is within ``rest_offset`` of where the plan has it; for that it waits by ``rest_limit`` at
-    most. A robot that has taken a step, or slid by ``ask_again``, since the jump was asked for asks anew. The plan of a jump
+    most. A robot that has taken a step, or slid by ``ask_again``, since the request makes a new one. The plan of a jump
     that cannot be done goes to the nearest place that can; from then on the goal is there.
 
     A command that ``replaces`` still moves the landing of the jump under way (``moved_landing``), as often as it likes. Until ``retarget_time`` before lift-off
@@ -163,7 +158,7 @@ class SteeredPlan(Block):
     exactly those of the description. So a ``learning`` share of the last error is added to a bias of that kind
     of jump, which its requests are shortened by.
 
-    The ground has the height that the commands say, and a robot that stands is taken to stand on it: ``up`` is
+    The ground has the height that the commands give, and a robot that stands is taken to stand on it: ``up`` is
     the difference between the ground of two commands and never measured.
 
     The places are those of the estimator, which drifts by a few millimetres a jump; ``goal`` tells where the feet should
@@ -179,10 +174,13 @@ class SteeredPlan(Block):
             0.4, unit="s", gt=0.0, text="standing at the start, before a command is taken"
         )
         ask_time: float = parameter(
-            0.15, unit="s", ge=0.0, text="how long after touchdown a command is taken"
+            0.15, unit="s", ge=0.0, text="time after touchdown from which a command is taken"
         )
         rest_time: float = parameter(
-            0.3, unit="s", ge=0.0, text="how long it rises and stands before the next plan begins"
+            0.3,
+            unit="s",
+            ge=0.0,
+            text="time in which it rises and stands before the next plan begins",
         )
         rest_offset: float = parameter(
             0.05, gt=0.0,
@@ -190,11 +188,11 @@ class SteeredPlan(Block):
             "the centre of mass",
         )  # fmt: skip
         rest_limit: float = parameter(
-            2.0, unit="s", ge=0.0, text="how much longer than `rest_time` it waits for that at most"
+            2.0, unit="s", ge=0.0, text="longest wait for that beyond `rest_time`"
         )
         ask_again: float = parameter(
             0.01, unit="m", gt=0.0,
-            text="a jump is asked for anew where the feet have moved so far since, or have turned by 0.05 rad",
+            text="shift of the feet from which a jump is requested anew; a turn by 0.05 rad counts too",
         )  # fmt: skip
         learning: float = parameter(
             0.5, ge=0.0, le=1.0,
@@ -202,7 +200,7 @@ class SteeredPlan(Block):
         )  # fmt: skip
 
     class Scratch(MotionScratch):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         values = Field("plan_width", text="columns of an instant")
         place = Field(
@@ -224,17 +222,17 @@ class SteeredPlan(Block):
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
     reference = Output(JumpReference, text="the plan at the present instant")
     request = Output(PlanRequest, text="the jump that should be planned")
-    frame = Output(JumpFrame, text="where the jump begins in the estimator's world")
-    goal = Output(CourseGoal, text="where the feet should be by all commands so far")
+    frame = Output(JumpFrame, text="start of the jump in the estimator's world")
+    goal = Output(CourseGoal, text="goal of the feet by all commands so far")
     received = State(ReceivedPlan, text="the next plan")
     followed = State(FollowedPlan, text="the plan that is followed")
-    memory = State(SteeringState, text="the goal, and what was asked for")
-    progress = State(PlanProgress, text="how late the plan is")
-    moved = State(MovedLanding, text="where the jump under way lands instead")
+    memory = State(SteeringState, text="the goal and the last request")
+    progress = State(PlanProgress, text="delay of the plan")
+    moved = State(MovedLanding, text="shift of the landing of the jump under way")
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """The width of a plan's rows."""
+        """Return the width of a plan's rows."""
         return row_dimensions(robot)
 
     @classmethod
@@ -263,7 +261,7 @@ class SteeredPlan(Block):
         self.constants.foot_of_point[:] = self.robot.foot_of_contact()
 
     def start(self) -> None:
-        """The robot stands until the first plan begins."""
+        """Stand until the first plan begins."""
         followed = self.followed
         followed.rows[:] = standing_row(self.robot)
         followed.time[:] = BEHIND * np.arange(PLAN_ROWS)
@@ -356,7 +354,7 @@ class SteeredPlan(Block):
         tell_goal(memory, followed.outcome, goal)
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many targets changed after their jump had begun, and of how many the nearest was done."""
+        """Return how many targets changed after their jump had begun, and of how many the nearest was done."""
         return {
             "targets_changed": int(self.memory.changed),
             "targets_not_reached": int(self.memory.nearest),
@@ -425,7 +423,7 @@ def request_way(middle: Array1D, heading: float, memory: SteeringState) -> None:
 
 @kernel
 def has_moved(middle: Array1D, heading: float, way: float, memory: SteeringState) -> bool:
-    """Whether the feet stand elsewhere than where the jump was asked for: after a step, or having slid."""
+    """Check whether the feet have moved since the jump was requested: by a step, or by sliding."""
     x, y = middle[0] - memory.asked_from[0], middle[1] - memory.asked_from[1]
     return hypot(x, y) > way or abs(wrap(heading - memory.asked_heading)) > MOVED_TURN
 
@@ -434,7 +432,7 @@ def has_moved(middle: Array1D, heading: float, way: float, memory: SteeringState
 def is_at_rest(
     terms: DynamicsTerms, reference: JumpReference, offset: float, scratch: SteeredPlan.Scratch
 ) -> bool:
-    """Whether the capture point is as near to where the plan has it as ``offset``, in heights of the centre of mass."""
+    """Check that the capture point is within ``offset`` of the plan's, in heights of the centre of mass."""
     middle_of(reference.foot_position, scratch.middle)
     middle_of(terms.foot_position, scratch.middle_rate)
     height = terms.com[2] - scratch.middle_rate[2]
@@ -565,7 +563,7 @@ def follow(received: ReceivedPlan, followed: FollowedPlan, memory: SteeringState
 
 @kernel
 def tell_goal(memory: SteeringState, outcome: int, goal: CourseGoal) -> None:
-    """The goal from where the robot stood at the start."""
+    """Write the ``goal`` relative to the feet's place at the start."""
     x, y = memory.goal[0] - memory.start[0], memory.goal[1] - memory.start[1]
     sine, cosine = sincos(memory.start_heading)
     goal.position[0] = cosine * x + sine * y

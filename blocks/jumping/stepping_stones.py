@@ -36,8 +36,8 @@ class StoneParameters(Parameters):
 class RandomStones(Parameters):
     """Stones that are drawn: each is ahead of the one before. All draws are uniform and independent."""
 
-    count: int = parameter(10, ge=1, le=200, text="how many there are")
-    seed: int = parameter(0, ge=0, le=2**31, text="what they are drawn by")
+    count: int = parameter(10, ge=1, le=200, text="number of stones")
+    seed: int = parameter(0, ge=0, le=2**31, text="seed of the random draws")
     gap: Interval = parameter(
         (0.02, 0.14), unit="m", text="least and greatest gap between a stone and the next one"
     )
@@ -49,7 +49,8 @@ class RandomStones(Parameters):
     )
 
     def draw(self, depth: float) -> tuple[StoneParameters, ...]:
-        """The stones, each ``depth`` [m] from its front to its back edge; the robot stands on one before the first of them."""
+        """Draw the stones, each ``depth`` [m] from its front to its back edge; the robot stands on one before the first
+        of them."""
         rng = np.random.default_rng(self.seed)
         x = y = top = 0.0
         found = []
@@ -62,20 +63,20 @@ class RandomStones(Parameters):
 
 
 class SteppingStonesParameters(Parameters):
-    """Where the stones are."""
+    """Places of the stones."""
 
     stones: tuple[StoneParameters, ...] = parameter((), text="the stones, in order; none: `random`")
-    random: RandomStones = parameter(RandomStones(), text="how they are drawn")
+    random: RandomStones = parameter(RandomStones(), text="parameters of their random draws")
     size: Interval = parameter((0.12, 0.20), unit="m", text="extent of a stone ahead and aside")
     start: Interval = parameter(
         (0.30, 0.40), unit="m",
         text="extent behind and aside of the one on which the robot starts, whose front edge is that of a stone",
     )  # fmt: skip
     depth: float = parameter(
-        0.10, unit="m", gt=0.0, le=5.0, text="how far the floor is below the lowest stone"
+        0.10, unit="m", gt=0.0, le=5.0, text="depth of the floor below the lowest stone"
     )
     seen: int = parameter(
-        1, ge=1, le=STONES_SEEN, text="how many stones ahead are seen; the robot jumps to the first"
+        1, ge=1, le=STONES_SEEN, text="number of stones seen ahead; the robot jumps to the first"
     )
 
     @model_validator(mode="after")
@@ -101,7 +102,7 @@ class SteppingStonesParameters(Parameters):
         return self.stones or self.random.draw(self.size[0])
 
     def boxes(self) -> list[dict[str, Any]]:
-        """The stone on which the robot starts and all others, as the boxes of a scene."""
+        """Return the stone on which the robot starts and all others, as the boxes of a scene."""
         stones = self.placed()
         floor = min(0.0, *(stone.top for stone in stones)) - self.depth
         front, half = 0.5 * self.size[0], 0.5 * self.start[1]
@@ -132,10 +133,10 @@ class SteppingStones(Block):
     ``SteeredPlan``). ``seen`` holds the next stones, for a planner that looks further ahead. Stones are
     ``placed`` commands: their places are those of the world, and do not depend on where earlier jumps have landed.
 
-    The robot takes its ground from here, so stones are said once: ``robot.scene: {from: commands.scene}``.
+    The robot takes its ground from here, so stones are given once: ``robot.scene: {from: commands.scene}``.
     It begins on a larger stone. Between the stones there is nothing to stand on.
 
-    The heights are what the robot is told; nothing measures them.
+    The robot takes the heights as given; nothing measures them.
     """
 
     Params = SteppingStonesParameters
@@ -143,7 +144,7 @@ class SteppingStones(Block):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """The ``count`` of stones, and the ``scene`` that they make."""
+        """Export the ``count`` of stones, and the ``scene`` that they make."""
         assert isinstance(params, cls.Params)
         boxes = params.boxes()
         return {"count": len(boxes) - 1, "scene": {"floor": boxes[0]["bottom"], "boxes": boxes}}
@@ -151,7 +152,7 @@ class SteppingStones(Block):
     taken = Input(PlanRequest, text="the last request, by the number of its command")
     command = Output(JumpCommand, text="the next stone; number zero: none yet")
     seen = Output(SeenStones, text="the stones ahead")
-    memory = State(StonesTaken, text="how many have been commanded")
+    memory = State(StonesTaken, text="number of stones commanded")
 
     def setup(self) -> None:
         self.rows = np.array([[s.x, s.y, s.top] for s in self.params.placed()], dtype=np.float64)

@@ -65,7 +65,7 @@ class SwayReference(GuidedReference):
             None,
             unit="m",
             ge=0.0,
-            text="how far the centre of mass goes down before it sways; by default by its height",
+            text="descent of the centre of mass before it sways; by default by its height",
         )
         frequency: float | None = parameter(
             None, unit="Hz", gt=0.0, le=5.0, text="of the first waves; by default by its height"
@@ -77,11 +77,11 @@ class SwayReference(GuidedReference):
 
     @classmethod
     def example_parameters(cls) -> dict[str, object]:
-        """A short sway, as its table takes a while."""
+        """Return a short sway, as its table takes a while."""
         return {"sway_time": 3.0}
 
     def make_table(self) -> JumpTable:
-        """The stance and the motion after it."""
+        """Compute the stance and the motion after it."""
         p, usual = self.params, usual_sway(self.robot)
         chosen = Sway(
             *(
@@ -93,8 +93,8 @@ class SwayReference(GuidedReference):
 
 
 class Sway(NamedTuple):
-    """How far the centre of mass sways along three axes [m] and the base about three [rad], how far down the centre of mass
-    goes before [m], and the frequency of the first waves [Hz]."""
+    """Amplitudes of the centre of mass along three axes [m] and of the base about three [rad], the descent of the
+    centre of mass before [m], and the frequency of the first waves [Hz]."""
 
     shift: ThreeNumbers
     turn: ThreeNumbers
@@ -103,7 +103,7 @@ class Sway(NamedTuple):
 
 
 def usual_sway(robot: RobotDescription) -> Sway:
-    """How a robot sways by default, in whole millimetres, hundredths of a radian and tenths of a hertz.
+    """Return the default sway of a robot, in whole millimetres, hundredths of a radian and tenths of a hertz.
 
     The centre of pressure stays as far within the support, for its size, as that of a biped with small feet does (BRUCE).
     """
@@ -123,7 +123,7 @@ def usual_sway(robot: RobotDescription) -> Sway:
 
 @lru_cache(maxsize=8)
 def _kept_plan(robot: str, chosen: Sway, stand_time: float, sway_time: float) -> JumpTable:
-    """As ``_plan``, computed once for all runs of a process, and kept for later ones."""
+    """Compute as ``_plan``, once for all runs of a process, and keep the table for later ones."""
     decided_by = f"{robot} {chosen} {stand_time} {sway_time}".encode() + code_digest(*_CODE)
     arrays = kept_arrays(
         decided_by, lambda: _plan(robot, chosen, stand_time, sway_time).as_arrays()
@@ -132,7 +132,7 @@ def _kept_plan(robot: str, chosen: Sway, stand_time: float, sway_time: float) ->
 
 
 def _plan(robot: str, chosen: Sway, stand_time: float, sway_time: float) -> JumpTable:
-    """The motion for a robot given as JSON."""
+    """Compute the motion for a robot given as JSON."""
     description = RobotDescription.model_validate_json(robot)
     body = GuidedBody(build_pinocchio_model(description), description)
     table = MotionRecorder(body, body.standing(description.standing_position))

@@ -13,15 +13,15 @@ from ..signals import ContactSwitches, Phase, PhaseState, SwitchFault, SwitchHea
 class SwitchMemory(Signal):
     """The state of ``SwitchMonitor``."""
 
-    last = Field("n_contacts", dtype="bool", text="whether each switch was closed in the last tick")
-    started = Field(dtype="bool", text="whether there was a last tick")
+    last = Field("n_contacts", dtype="bool", text="the switch was closed in the last tick")
+    started = Field(dtype="bool", text="there was a last tick")
     changes = Field("n_contacts", text="recent changes of each switch, older ones count less")
     closed = Field("n_contacts", dtype="int64", text="ticks in a row it was closed in the air")
     opened = Field("n_contacts", dtype="int64", text="ticks in a row it was open under a stand")
     missing = Field("n_contacts", dtype="int64", text="ticks in all it was open under a stand")
-    pressed = Field("n_contacts", dtype="bool", text="whether it was ever closed")
-    heavy = Field("n_contacts", dtype="bool", text="whether it was open for long and is not stuck")
-    fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="what is wrong with it")
+    pressed = Field("n_contacts", dtype="bool", text="the switch was ever closed")
+    heavy = Field("n_contacts", dtype="bool", text="the switch was open for long and is not stuck")
+    fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="fault of the switch")
 
 
 class SwitchMonitor(Block):
@@ -33,7 +33,7 @@ class SwitchMonitor(Block):
       closed with no more than ``few_changes``; or it was never closed before the robot was in the air.
       By default this is not judged, for it needs a robot that loads all its points when it stands.
     * **Heavy**, which is no fault: it was open for half of ``stand_time`` in all while the robot stood, so its threshold is
-      about the load on its point or above. Where the plan has the robot stand, an open heavy switch says nothing,
+      about the load on its point or above. Where the plan has the robot stand, an open heavy switch means nothing,
       and its point counts as loaded: in ``STAND``, ``SQUAT`` and ``RECOVER``.
     * **Bouncing**: the number of its changes, of which those ``bounce_window`` ago count by 1/e, is
       above ``bounce_changes``. A good switch with a load near its threshold chatters too: BRUCE's
@@ -72,7 +72,7 @@ class SwitchMonitor(Block):
         )
 
     class Constants(Signal):
-        """What follows from the parameters."""
+        """Constants derived from the parameters."""
 
         air_samples = Field(dtype="int64", text="ticks closed in the air that are no fault yet")
         stand_samples = Field(dtype="int64", text="ticks open while standing; 0: not judged")
@@ -82,7 +82,7 @@ class SwitchMonitor(Block):
     constants: Constants
     switches = Input(ContactSwitches, text="the raw switches")
     phase = Input(PhaseState, text="the phase the robot is in")
-    health = Output(SwitchHealth, text="which switches are at fault")
+    health = Output(SwitchHealth, text="faults of the switches")
     memory = State(SwitchMemory, text="counts, and the faults found")
 
     def prepare(self) -> None:

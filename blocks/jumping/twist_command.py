@@ -1,4 +1,4 @@
-"""Commands of jumps from a velocity that is asked for: of a stick, a pad on a page, or another program."""
+"""Jump commands from a commanded velocity: of a stick, a pad on a page, or another program."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class TwistTaken(Signal):
 
 
 class TwistCommand(Block):
-    """Commands one jump after the other as long as a velocity is asked for.
+    """Commands one jump after the other as long as a velocity is commanded.
 
     A jump goes as far as the velocity leads in ``jump_time``, which is the time from one jump to the next. As long as a
-    velocity is asked for there is a next command, with the velocity of the moment. It is withdrawn when the
+    velocity is commanded there is a next command, with the velocity of the moment. It is withdrawn when the
     velocity ends. Where the velocity has changed by more than ``change`` after a command was
     taken, a command that ``replaces`` it is given; ``SteeredPlan`` takes it if that jump has not begun. An upward velocity alone is a
     jump on the spot. What is out of reach is the planner's to shorten.
@@ -42,10 +42,10 @@ class TwistCommand(Block):
         most_turn: float = parameter(0.8, unit="rad", gt=0.0, le=3.2, text="the largest turn")
 
     params: Params
-    twist = Input(BodyTwist, text="the velocity that is asked for")
+    twist = Input(BodyTwist, text="the commanded velocity")
     taken = Input(PlanRequest, text="the last request, by the number of its command")
     command = Output(JumpCommand, text="the next jump; the number of one that was taken: none")
-    memory = State(TwistTaken, text="what was taken last")
+    memory = State(TwistTaken, text="last commands taken")
 
     @kernel
     @staticmethod

@@ -5,23 +5,8 @@ Units, frames and orders are those of the package ``signals``.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
+from ...planner.task.phase import Phase
 from ...runtime.language.signals import Field, Signal
-
-
-class Phase(IntEnum):
-    """What the robot is doing, in the order of a jump."""
-
-    HANG = -1
-    """It hangs in a gantry, or is put down, and does not carry itself yet."""
-    STAND = 0
-    SQUAT = 1
-    THRUST = 2
-    FLIGHT = 3
-    LANDING = 4
-    RECOVER = 5
-    FAULT = 6
 
 
 class JumpReference(Signal):

@@ -7,8 +7,7 @@ world instead.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
+from ...planner.online.plan_outcome import PlanOutcome
 from ...runtime.language.signals import Field, Signal
 
 PART_ROWS = 20
@@ -17,21 +16,6 @@ PLAN_ROWS = 240
 """Rows of a plan at most."""
 STONES_SEEN = 2
 """How many stones ahead may be seen."""
-
-
-class PlanOutcome(IntEnum):
-    """Which plan answers a request."""
-
-    NONE = 0
-    """None was asked for."""
-    PLANNED = 1
-    """A plan of what was asked."""
-    NEAREST = 2
-    """What was asked is out of reach; the plan is of the nearest that is within."""
-    UNSOLVED = 3
-    """No motion was found; the plan is the nearest of the stored ones."""
-    INVALID = 4
-    """The plan failed its check; the nearest of the stored ones is followed."""
 
 
 class JumpCommand(Signal):

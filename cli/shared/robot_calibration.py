@@ -136,7 +136,7 @@ def _measured(
 
 def _by_phase(run: SwayedRun, found: Calibration) -> dict[str, dict[str, float]]:
     """What is not explained in the phases in which the robot moves as it is told."""
-    from ...blocks.signals.jumping import Phase
+    from ...planner.task.phase import Phase
     from ...robots.phase_residuals import phase_residuals
 
     standing = (Phase.STAND, Phase.SQUAT, Phase.RECOVER)

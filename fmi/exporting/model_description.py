@@ -48,7 +48,7 @@ class Scalar:
     most: float | None = None
 
     def elements(self, size: int) -> Iterator[Scalar]:
-        """Each number as a variable, counted from 1, of ``size`` bytes."""
+        """Yield each number as a variable, counted from 1, of ``size`` bytes."""
         for k, index in enumerate(product(*(range(1, n + 1) for n in self.shape))):
             yield replace(
                 self, name=f"{self.name}[{','.join(map(str, index))}]", place=self.place + k * size,
@@ -56,7 +56,7 @@ class Scalar:
             )  # fmt: skip
 
     def counted_from_one(self) -> Scalar:
-        """The same with an index that begins with 1, as in FMI."""
+        """Return the same with an index that begins with 1, as in FMI."""
         return replace(self, name=re.sub(r"\[(\d+)\]$", lambda m: f"[{int(m[1]) + 1}]", self.name))
 
 
@@ -68,7 +68,7 @@ def model_description(
     title: str,
     sources: Sequence[str],
 ) -> bytes:
-    """The file ``modelDescription.xml``. A variable's value reference is its place in ``scalars``."""
+    """Return the file ``modelDescription.xml``. A variable's value reference is its place in ``scalars``."""
     first = version == "3.0"
     period, about = made.part.graph.base_period, made.about
     root = Element(
@@ -121,7 +121,7 @@ def model_description(
 
 
 def build_description(name: str, sources: Sequence[str]) -> bytes:
-    """The file ``buildDescription.xml`` of FMI 3.0: which sources are compiled."""
+    """Return the file ``buildDescription.xml`` of FMI 3.0: which sources are compiled."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
     configuration.set("description", "GNU C for x86-64 and aarch64")
@@ -143,7 +143,7 @@ def _units(scalars: Sequence[Scalar]) -> dict[str, Unit]:
 
 
 def _common(each: Scalar, reference: int) -> dict[str, str]:
-    """The attributes of a variable, in both versions."""
+    """Return the attributes of a variable, in both versions."""
     variability = {"t": "continuous", "p": "tunable"}.get(each.of, "discrete")
     return {
         "name": each.name,
@@ -155,7 +155,7 @@ def _common(each: Scalar, reference: int) -> dict[str, str]:
 
 
 def _typed(each: Scalar, units: dict[str, Unit]) -> dict[str, str]:
-    """What belongs to the type of a variable: unit, bounds and start."""
+    """Return the attributes of a variable's type: unit, bounds and start."""
     found = {"unit": each.unit} if each.unit in units and each.kind == "f" and each.unit else {}
     found |= {key: repr(v) for key, v in (("min", each.least), ("max", each.most)) if v is not None}
     if each.start:
@@ -164,7 +164,7 @@ def _typed(each: Scalar, units: dict[str, Unit]) -> dict[str, str]:
 
 
 def _number(value: float, kind: str) -> str:
-    """A start value as XML has it."""
+    """Return a start value as XML has it."""
     if kind == "f":
         return repr(value)
     return str(int(value)) if kind == "i" else str(bool(value)).lower()
@@ -186,7 +186,7 @@ def _variable_2(to: Element, each: Scalar, reference: int, units: dict[str, Unit
 
 
 def _structure(to: Element, scalars: Sequence[Scalar], first: bool) -> None:
-    """Which output depends on which input; FMI 2.0 counts variables from 1 instead of naming them."""
+    """Add the dependencies of outputs on inputs; FMI 2.0 counts variables from 1 instead of naming them."""
     shift = 0 if first else 1
     outputs = [(k, each) for k, each in enumerate(scalars) if each.of == "o"]
 

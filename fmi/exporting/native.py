@@ -84,7 +84,7 @@ def write_native(made: Prepared, to: Path, version: str, title: str) -> None:
 
 
 def compiler() -> str:
-    """The C compiler for the binary; empty where there is none."""
+    """Return the C compiler for the binary; empty where there is none."""
     return TARGETS["x86_64"].linker()
 
 
@@ -99,7 +99,7 @@ def _compile(folder: Path, sources: Sequence[str], to: Path) -> None:
 
 
 def _variables(made: Prepared, version: str) -> Iterator[Scalar]:
-    """The variables of the FMU; in FMI 2.0 every element is one."""
+    """Yield the variables of the FMU; in FMI 2.0 every element is one."""
     yield Scalar("time", "t", "f", 0, (), "s", "the time")
     cut = made.part.cut
     for of, terminals, fields in (
@@ -174,7 +174,7 @@ static const char *text_of(int32_t status)
 
 
 def _assembler_in_c(text: str) -> str:
-    """The kernels as one C file that holds their text for an assembler, by the kind of processor."""
+    """Return the kernels as one C file that holds their text for an assembler, by the kind of processor."""
     parts = [
         "/* The kernels of the graph, as GNU C: machine code as a text, by the kind of processor. */"
     ]

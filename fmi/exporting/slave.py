@@ -1,4 +1,4 @@
-"""What an exported FMU is made of: the methods that PythonFMU3 calls, on a running graph.
+"""Methods of an exported FMU that PythonFMU3 calls, on a running graph.
 
 ``RunningGraph`` is the graph inside the FMU as FMI sees it: values at communication points.
 """
@@ -74,11 +74,11 @@ class RunningGraph:
             self._fresh = False
 
     def input(self, name: str) -> list[Any]:
-        """The elements of an input."""
+        """Return the elements of an input."""
         return list(self._values[name].tolist())
 
     def output(self, name: str) -> list[Any]:
-        """The elements of an output at the present communication point."""
+        """Return the elements of an output at the present communication point."""
         self._compute()
         return list(np.ravel(self._run[self._sources[name]]).tolist())
 
@@ -115,7 +115,7 @@ class RunningGraph:
         return self._run.reason
 
     def state(self) -> bytes:
-        """What the graph remembers at the present communication point, always as many bytes."""
+        """Return the graph's state at the present communication point, always as many bytes."""
         before = self._before
         inputs = b"".join(view.tobytes() for view in self._values.values())
         head = _HEAD.pack(before.tick, len(before.bus), len(before.state), len(inputs))
@@ -146,7 +146,7 @@ class RunningGraph:
 
 
 def terminals(interface: Mapping[str, Any]) -> Sequence[tuple[str, Mapping[str, Any]]]:
-    """All terminals in the order of the FMU's variables, each with its causality."""
+    """Return all terminals in the order of the FMU's variables, each with its causality."""
     return [(kind, each) for kind in ("input", "output") for each in interface[f"{kind}s"]]
 
 
@@ -209,7 +209,7 @@ class GraphSlave:
         )
 
     def to_xml(self, model_options: Any = None) -> Element:
-        """The model description, with the step and with what depends on what."""
+        """Return the model description, with the step and with what depends on what."""
         root: Element = super().to_xml(model_options or {})  # type: ignore[misc]  # PythonFMU3 is not typed
         kind = root.find("CoSimulation")
         structure = root.find("ModelStructure")

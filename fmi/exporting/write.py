@@ -35,8 +35,9 @@ class {name}(GraphSlave, Fmi3Slave):
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: the file, its terminals, and what FMPy's validator says, if it is here.
-    ``python`` says why the FMU needs Python; none: it does not."""
+    """Exported file, its terminals, and the findings of FMPy's validator, if it is installed. ``python`` holds the
+    reasons why the FMU needs Python; empty: it does not.
+    """
 
     file: Path
     period: float
@@ -159,7 +160,7 @@ def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
 
 
 def _hash(folder: Path) -> str:
-    """The hash of what the FMU is made of, for the name of its module, which Python knows once."""
+    """Return the hash of what the FMU is made of, for the name of its module, which Python knows once."""
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*")):
         if file.is_file():

@@ -15,8 +15,8 @@ from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.terrain import SupportsScene, Terrain
 from ...runtime.running.memory import BoundGraph
-from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 from .dependencies import contents, digests, files_read, parameter_files, project_state
+from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 
 RECORDED_VERSIONS = (
     "aloft", "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
@@ -28,6 +27,7 @@ from ..models.exact_dynamics import dynamics_of
 from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import LEVEL, edge_of, ground_axes
@@ -39,14 +39,14 @@ BALLS = 13
 
 
 def step_edge(task: JumpTask, jump: int = 0) -> float | None:
-    """The x at which the ground changes height under one of the task's jumps; see ``edge_of``."""
+    """Return the x at which the ground changes height under one of the task's jumps; see ``edge_of``."""
     return edge_of(task.hops()[jump], task.places()[jump])
 
 
 def ground_height(
     task: JumpTask, x: Array, progress: Array | float, y: Array | float = 0.0
 ) -> Array:
-    """The ground's height [m] at ``x``, ``y`` [m].
+    """Return the ground's height [m] at ``x``, ``y`` [m].
 
     ``progress``, of the same shape, is how many flights are over, with the share of the present
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
@@ -114,8 +114,9 @@ def body_heights(
 def arm_clearance_deficit(
     robot: RobotDescription, poses: LinkPoses, wanted: float
 ) -> tuple[Array, str] | None:
-    """The same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks most.
-    ``None`` where no arm has shapes that could touch."""
+    """Return the same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks
+    most. ``None`` where no arm has shapes that could touch.
+    """
     parent = {joint.child: joint.parent for joint in robot.joints}
     lack: Array | None = None
     worst_link, most = "", -np.inf
@@ -147,7 +148,7 @@ def leg_clearance_deficit(robot: RobotDescription, poses: LinkPoses, wanted: flo
 
 
 def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
-    """The distances (pairs, n) between all shapes of one leg and all of another."""
+    """Yield the distances (pairs, n) between all shapes of one leg and all of another."""
     chains = [
         [shape for link in chain for shape in moving_shapes(robot, poses, link)]
         for chain in legs(robot)
@@ -333,7 +334,7 @@ class Evidence:
         return float(pitch), float(yaw)
 
     def moment(self, sample: int) -> str:
-        """The time of a sample as text."""
+        """Return the time of a sample as text."""
         return f"at {self.replay.samples.time[sample]:.3f} s"
 
     def figures(self) -> dict[str, float]:
@@ -357,6 +358,6 @@ class Evidence:
 
 
 def worst(array: Array) -> tuple[int, int]:
-    """The row and column of the largest number."""
+    """Return the row and column of the largest number."""
     row, column = np.unravel_index(int(array.argmax()), array.shape)
     return int(row), int(column)

@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
 from ..models.link_shapes import arms
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
@@ -41,7 +41,7 @@ bounds its impulse at touchdown."""
 
 
 def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
-    """The plan begins at rest in its stance over the origin and ends at rest."""
+    """Yield the plan begins at rest in its stance over the origin and ends at rest."""
     plan, joints = e.plan, [joint.name for joint in e.robot.joints]
     missed = np.abs(plan.position[0, 7:] - e.start_joints)
     yield PlanTestResult("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
@@ -97,8 +97,9 @@ def interval_defects(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def discretisation(e: Evidence) -> Iterator[PlanTestResult]:
-    """The planner's own equations on the ground, of the formulation that is built on them; in the
-    air it conserves momentum, as exact dynamics do."""
+    """Yield the planner's own equations on the ground, of the formulation that is built on them; in the air it
+    conserves momentum, as exact dynamics do.
+    """
     if e.plan.task.formulation != "full":
         return
     grounded = e.plan.phase[:-1] != Phase.FLIGHT
@@ -135,7 +136,7 @@ def flight(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def task_done(e: Evidence) -> Iterator[PlanTestResult]:
-    """Every jump reaches the height, place, heading and rotation that the task asks for."""
+    """Yield every jump reaches the height, place, heading and rotation that the task asks for."""
     task, r = e.plan.task, e.replay
     hops, places = task.hops(), task.places()
     for name, missed, limit, unit, text in (
@@ -276,8 +277,8 @@ def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
 
 
 def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
-    """The error of all generalised velocities behind the impulse at a knot, infinite where there
-    is no impact, and every motor's impulse that keeps a joint still [N m s] (n_joints,).
+    """Return the error of all generalised velocities behind the impulse at a knot, infinite where there is no impact,
+    and every motor's impulse that keeps a joint still [N m s] (n_joints,).
 
     Joints that the description holds yield a little under an impact and come back: the impulse
     of their motors counts as none.
@@ -294,7 +295,7 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
 
 
 def momentum(e: Evidence) -> Iterator[PlanTestResult]:
-    """The angular momentum at lift-offs and touchdowns is no more than the task allows."""
+    """Yield the angular momentum at lift-offs and touchdowns is no more than the task allows."""
     task, r = e.plan.task, e.replay
     lasting = np.diff(e.plan.time, append=np.inf) > 0.0
     ends = [stop + int(not lasting[stop]) for _, stop in r.flights]
@@ -340,7 +341,7 @@ def machine(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def allowed_motor_torque(e: Evidence, effort: float | Array) -> Array:
-    """The torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
+    """Return the torque [N m] that a share of the motors' abilities allows at the samples' speeds."""
     motors = e.motors
     # Braking torque is the peak at any speed; driving torque falls between corner and no load.
     driving = np.sign(e.motor_torque) * e.motor_speed / effort

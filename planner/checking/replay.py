@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.whole_body_motion import MotionTerms
@@ -27,6 +26,7 @@ from ..models.exact_dynamics import (
     joint_motions,
     rotation_between,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 FLIGHT_STEP = 0.002
@@ -131,7 +131,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
 
 
 def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
-    """The knots at lift-off and at touchdown of every flight, the latter before any impact.
+    """Return the knots at lift-off and at touchdown of every flight, the latter before any impact.
 
     Raises:
         ValueError: there are more or fewer flights than jumps.
@@ -162,7 +162,7 @@ class _Flight:
 
 
 def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
-    """The flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
+    """Return the flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
     passed: list[Array] = [np.zeros(1)]
     steps, times, knots = list[Array](), list[Array](), list[int]()
     for k in range(lift_off, touchdown):
@@ -185,8 +185,9 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
-    """The joints (n_joints) that stand still before and behind the impact at a knot: roll and yaw
-    of a mirrored jump, which their motors keep."""
+    """Return the joints (n_joints) that stand still before and behind the impact at a knot: roll and yaw of a mirrored
+    jump, which their motors keep.
+    """
     still = (plan.velocity[k : k + 2, 6:] == 0.0).all(axis=0)
     return np.asarray(still)
 
@@ -216,8 +217,9 @@ def _sample(
     plan: PlannedJump, dynamics: ExactDynamics,
     time: Array, knot: NDArray[np.int64], places: Array, rates: Array,
 ) -> tuple[ReplaySamples, MotionTerms, NDArray[np.int64]]:  # fmt: skip
-    """All knots and the given states between them, in time's order; what follows from them; and which
-    samples are the knots."""
+    """Return all knots and the given states between them, in time's order; what follows from them; and which samples
+    are the knots.
+    """
     count = len(plan.time)
     own = np.arange(count)
     # A knot comes before what lies in the interval behind it.

@@ -65,7 +65,7 @@ class ValidityReport:
         return tuple(test for test in self.tests if not test.passed)
 
     def as_json(self) -> dict[str, Any]:
-        """The report as plain data, as it stands in a plan's file."""
+        """Return the report as plain data, as it stands in a plan's file."""
         return {
             "valid": self.valid,
             "tests": [dict(vars(test)) for test in self.tests],
@@ -105,7 +105,7 @@ def _run_tests(evidence: Evidence) -> Iterator[PlanTest]:
 
 
 def checked(plan: PlannedJump, robot: RobotDescription) -> PlannedJump:
-    """The plan with its validity report."""
+    """Return the plan with its validity report."""
     return plan.with_report(check_plan(plan, robot).as_json())
 
 

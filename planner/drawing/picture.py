@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...plotting import (
     COLOURS,
@@ -31,6 +30,7 @@ from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
 from ..models.link_shapes import legs
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ WIDTH, POSTURES_HEIGHT, PANEL_HEIGHT = 14.0, 2.9, 2.3
 
 
 def plan_picture(plan: PlannedJump, robot: RobotDescription) -> str:
-    """The picture as SVG text."""
+    """Return the picture as SVG text."""
     evidence = Evidence(plan, robot, replay(plan, robot))
     panels = plan_panels(evidence)
     rows = -(-len(panels) // COLUMNS)
@@ -173,28 +173,28 @@ def phases_of(plan: PlannedJump) -> list[Shade]:
 
 
 def com_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
-    """The path of the centre of mass, from where it stands at first."""
+    """Return the path of the centre of mass, from where it stands at first."""
     path = 100.0 * (plan.com - plan.com[0])
     lines = [Curve(name, plan.time, path[:, k]) for k, name in enumerate(("forward", "left", "up"))]
     return "centre of mass, from standing [cm]", lines
 
 
 def velocity_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
-    """The velocity of the centre of mass."""
+    """Return the velocity of the centre of mass."""
     names = ("forward", "left", "up")
     lines = [Curve(name, plan.time, plan.com_velocity[:, k]) for k, name in enumerate(names)]
     return "velocity of the centre of mass [m/s]", lines
 
 
 def momentum_lines(plan: PlannedJump) -> tuple[str, list[Curve]]:
-    """The angular momentum about the centre of mass."""
+    """Return the angular momentum about the centre of mass."""
     names = ("roll", "pitch", "yaw")
     lines = [Curve(n, plan.time, plan.angular_momentum[:, k]) for k, n in enumerate(names)]
     return "angular momentum about the centre of mass [N m s]", lines
 
 
 def force_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """The vertical force on every contact point, and the sum of all; constant over each interval."""
+    """Return the vertical force on every contact point, and the sum of all; constant over each interval."""
     time, k = _interval_ends(e.plan)
     up = e.plan.contact_force[k, :, 2]
     lines = [Curve(c.name, time, up[:, n]) for n, c in enumerate(e.robot.contacts)]
@@ -213,7 +213,7 @@ def friction_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def feet_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """The heights of the contact points, and of the ground under each of them."""
+    """Return the heights of the contact points, and of the ground under each of them."""
     s = e.replay.samples
     ground = 100.0 * (s.points[:, :, 2] - e.point_height)
     lines = [
@@ -227,7 +227,7 @@ def feet_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def torque_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """The torques of the two motors that work hardest, and what their speed allows at each instant.
+    """Return the torques of the two motors that work hardest, and what their speed allows at each instant.
 
     Of two motors that do the same, as the legs' do in a jump straight ahead, one is shown.
     """
@@ -245,7 +245,7 @@ def torque_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def torque_share_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """All motor torques as shares of what the motors can do at their speed."""
+    """Return all motor torques as shares of what the motors can do at their speed."""
     lines = _motor_lines(e, 100.0 * _torque_share(e))
     return "motor torque [% of the limit at its speed]", lines
 
@@ -257,7 +257,7 @@ def speed_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def _interval_ends(plan: PlannedJump) -> tuple[Array, NDArray[np.int64]]:
-    """The times of both ends of every interval that has a length, and the interval's number.
+    """Return the times of both ends of every interval that has a length, and the interval's number.
 
     Lines of what is constant over each interval have these points.
     """
@@ -267,12 +267,12 @@ def _interval_ends(plan: PlannedJump) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _torque_share(e: Evidence) -> Array:
-    """The motor torques as shares of what the motors can do at their speed, (samples, n_motors)."""
+    """Return the motor torques as shares of what the motors can do at their speed, (samples, n_motors)."""
     return np.asarray(np.abs(e.motor_torque) / np.maximum(allowed_motor_torque(e, 1.0), 1e-3))
 
 
 def _motor_lines(e: Evidence, shares: Array) -> list[Curve]:
-    """The three motors that work hardest with their names, all others grey below them, the limit."""
+    """Return the three motors that work hardest with their names, all others grey below them, the limit."""
     time, shares = e.replay.samples.time, np.minimum(shares, MOST_SHARE)
     named = _busiest(shares / 100.0, shares)[:3]
     others = [k for k in range(shares.shape[1]) if k not in named]
@@ -283,7 +283,7 @@ def _motor_lines(e: Evidence, shares: Array) -> list[Curve]:
 
 
 def _busiest(shares: Array, lines: Array) -> list[int]:
-    """The motors in the order of their root mean square share, the largest first.
+    """Return the motors in the order of their root mean square share, the largest first.
 
     A motor whose line is hidden behind the line of one before it is left out: in a jump straight
     ahead both legs do the same.
@@ -301,5 +301,5 @@ def _name(e: Evidence, motor: int) -> str:
 
 
 def _limit(time: Array, value: float) -> Curve:
-    """A limit that does not change."""
+    """Return a limit that does not change."""
     return Curve("limit", np.array([time[0], time[-1]]), np.full(2, value), limit=True)

@@ -84,7 +84,7 @@ class LearntJumps:
     lessons: tuple[Lesson, ...] = ()
 
     def correction(self, launch: Launch | None) -> tuple[Vector, Vector]:
-        """The corrections of velocity and angular momentum for a jump."""
+        """Return the corrections of velocity and angular momentum for a jump."""
         if launch is None or not self.lessons:
             return ZERO, ZERO
         launches = np.array([lesson.launch for lesson in self.lessons])

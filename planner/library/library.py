@@ -26,12 +26,12 @@ from ..task.task import JumpTask, JumpTaskError
 
 
 def shipped_folder() -> Path:
-    """The folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
+    """Return the folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
     return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
 
 
 def find_task(name: str, *folders: Path) -> Path:
-    """The task's file of that name in the first folder that has it, or among the shipped graphs.
+    """Return the task's file of that name in the first folder that has it, or among the shipped graphs.
 
     Raises:
         LookupError: there is none.
@@ -43,7 +43,7 @@ def find_task(name: str, *folders: Path) -> Path:
 
 
 def shipped_tasks() -> list[str]:
-    """The shipped tasks by the names that graphs give them, such as ``tasks/in_situ.yaml``."""
+    """Return the shipped tasks by the names that graphs give them, such as ``tasks/in_situ.yaml``."""
     return sorted(f"tasks/{path.name}" for path in (shipped_folder() / "tasks").glob("*.yaml"))
 
 
@@ -84,7 +84,7 @@ def task_distance(first: JumpTask, second: JumpTask) -> float | None:
 
 
 def _scaled_distance(first: Mapping[str, Any], second: Mapping[str, Any]) -> float | None:
-    """The distance between two tasks in the parameters of ``SCALES``, by their names."""
+    """Return the distance between two tasks in the parameters of ``SCALES``, by their names."""
     total = 0.0
     for name, scale in SCALES.items():
         one, other = first.get(name), second.get(name)
@@ -112,12 +112,12 @@ def _without_none(data: Any) -> Any:
 
 
 def kept_name(task: JumpTask, robot: RobotDescription) -> str:
-    """The name of a task's file: its name, for people, and its hash."""
+    """Return the name of a task's file: its name, for people, and its hash."""
     return f"{readable_name(task.name) or 'jump'}-{task.hash(robot)}.npz"
 
 
 def readable_name(name: str) -> str:
-    """A name as a part of a file's name."""
+    """Return a name as a part of a file's name."""
     return re.sub(r"[^A-Za-z0-9_.+]+", "_", name).strip("_")
 
 
@@ -156,7 +156,7 @@ class PlanLibrary:
         return self._folders
 
     def path_of(self, task: JumpTask) -> Path | None:
-        """The file of the plan of exactly this task, or ``None``."""
+        """Return the file of the plan of exactly this task, or ``None``."""
         for folder in self._folders:
             found = sorted(folder.glob(f"*-{task.hash(self.robot)}.npz"))
             if found:
@@ -164,7 +164,7 @@ class PlanLibrary:
         return None
 
     def attempt(self, task: JumpTask, solve: Solver | None = None) -> PlannedJump:
-        """A plan of a task, valid or not, with its report, which is made anew.
+        """Return a plan of a task, valid or not, with its report, which is made anew.
 
         As ``plan``, but one that fails the validity check is kept too, in a folder of its own
         where ``plan`` and everybody else never look: it must be asked for in this way.
@@ -185,12 +185,12 @@ class PlanLibrary:
             return error.plan
 
     def hashes(self) -> frozenset[str]:
-        """The hashes of all tasks that have a file, in one look at the folders."""
+        """Return the hashes of all tasks that have a file, in one look at the folders."""
         files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
         return frozenset(path.stem.rpartition("-")[2] for path in files)
 
     def find(self, task: JumpTask) -> PlannedJump | None:
-        """The plan of exactly this task, or ``None``.
+        """Return the plan of exactly this task, or ``None``.
 
         Raises:
             PlanFileError: its file is damaged; the message names it.
@@ -218,7 +218,7 @@ class PlanLibrary:
             return None
 
     def nearest(self, task: JumpTask) -> tuple[PlannedJump, float] | None:
-        """The valid plan of the nearest task that can be started from, and how far it is."""
+        """Return the valid plan of the nearest task that can be started from, and how far it is."""
         # The files hold whole tasks, so plain data is compared: to make a task of each takes longer
         # than to plan one.
         wanted = task.resolved(self.robot).model_dump(mode="json")
@@ -241,7 +241,7 @@ class PlanLibrary:
         return plan, next(d for d, name in found if plan.task.hash(self.robot) in name)
 
     def _first_valid(self, names: Iterable[str]) -> PlannedJump | None:
-        """The first of these files that holds a valid plan of the task that it is named after."""
+        """Return the first of these files that holds a valid plan of the task that it is named after."""
         for name in names:
             try:
                 plan = read_plan(name)
@@ -274,7 +274,7 @@ class PlanLibrary:
         return self._first_valid(name for _, _, name in sorted(found))
 
     def tasks(self) -> Iterator[tuple[Path, JumpTask]]:
-        """Every kept plan's file and task, in the order of their names; broken files are left out.
+        """Yield every kept plan's file and task, in the order of their names; broken files are left out.
 
         Only the header of each file is read.
         """
@@ -285,7 +285,7 @@ class PlanLibrary:
                 continue
 
     def headers(self) -> Iterator[tuple[Path, dict[str, Any]]]:
-        """Every file with its header; broken files are left out."""
+        """Yield every file with its header; broken files are left out."""
         for folder in self._folders:
             for path in sorted(folder.glob("*-*.npz")):
                 header = _header(path)
@@ -320,7 +320,7 @@ class PlanLibrary:
     def plan(
         self, task: JumpTask, solve: Solver | None = None, *, anew: bool = False
     ) -> tuple[PlannedJump, bool]:
-        """A valid plan of a task, and whether it was kept already.
+        """Return a valid plan of a task, and whether it was kept already.
 
         The exact plan where it is kept; else solved, from the nearest plan if there is one and
         from nothing if that fails, checked, and kept. ``anew`` looks for no kept plan. One in the
@@ -356,8 +356,9 @@ _headers: dict[Path, tuple[tuple[int, int, int], dict[str, Any] | None]] = {}
 
 
 def _header(path: Path) -> dict[str, Any] | None:
-    """The header of a plan's file, not to be changed; ``None`` if it is broken. It is read again only
-    where the file was replaced."""
+    """Return the header of a plan's file, not to be changed; ``None`` if it is broken. It is read again only where the
+    file was replaced.
+    """
     try:
         found = path.stat()
     except OSError:
@@ -373,7 +374,7 @@ def _header(path: Path) -> dict[str, Any] | None:
 
 
 def _robot_of(path: Path) -> str | None:
-    """The robot that a plan's file is for; ``None`` where the file cannot be read."""
+    """Return the robot that a plan's file is for; ``None`` where the file cannot be read."""
     try:
         return read_plan(path).task.robot
     except PlanFileError:
@@ -388,7 +389,7 @@ def solve_and_check(
     *,
     refine: bool = True,
 ) -> PlannedJump:
-    """A valid plan of a task with its report; a warm start that leads nowhere is tried without.
+    """Return a valid plan of a task with its report; a warm start that leads nowhere is tried without.
 
     With ``refine`` a plan that fails the check because its intervals are too long is solved again on
     finer ones.
@@ -426,7 +427,7 @@ def solve_and_check(
 def solve_task(
     task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
 ) -> PlannedJump:
-    """The planner."""
+    """Return the planner."""
     from ..solving.solve import solve_jump
 
     return solve_jump(task, robot, warm_start=warm_start)

@@ -48,7 +48,7 @@ class SearchedParameter:
     unit: str
 
     def text(self, value: float) -> str:
-        """A value with its unit."""
+        """Return a value with its unit."""
         return f"{round(value * self.shown, 6):g} {self.unit}".strip()
 
 
@@ -185,8 +185,9 @@ def seconds_left(spent: float) -> float:
 
 
 def candidates(task: JumpTask, family: str) -> list[str]:
-    """The parameters that the task sets to something else than a modest value: those that the
-    constraint speaks of, then those that are furthest from modest."""
+    """Return the parameters that the task sets to something else than a modest value: those that the constraint speaks
+    of, then those that are furthest from modest.
+    """
     far: dict[str, float] = {}
     for name in AXES:
         values = values_towards(task, name)
@@ -212,7 +213,7 @@ def values_towards(task: JumpTask, parameter: str) -> list[float]:
 
 
 def _quick(solve: Solver | None, near: bool) -> Solver:
-    """The planner, which gives up soon. From a near plan, too, it tries from nothing by itself."""
+    """Return the planner, which gives up soon. From a near plan, too, it tries from nothing by itself."""
     from ..solving.solve import solve_jump
 
     def make(
@@ -282,9 +283,10 @@ class _FeasibleSearch:
         )  # fmt: skip
 
     def _kept(self, way: list[dict[str, float]]) -> tuple[int, PlannedJump | None]:
-        """The point of a way that a kept plan of a similar task goes up to, or where that has no plan
-        one at three quarters of it, and a plan there, which is the kept one or starts from it; else
-        ``None``. With little time left, three quarters come first."""
+        """Return the point of a way that a kept plan of a similar task goes up to, or where that has no plan one at
+        three quarters of it, and a plan there, which is the kept one or starts from it; else ``None``. With little time
+        left, three quarters come first.
+        """
         parameter, *others = way[0]
         if self._library is None or others or self.spent:
             return 0, None
@@ -307,7 +309,7 @@ class _FeasibleSearch:
         return 0, None
 
     def _try(self, values: Mapping[str, float], start: PlannedJump | None) -> PlannedJump | None:
-        """A valid plan with those values, or ``None``."""
+        """Return a valid plan with those values, or ``None``."""
         self._progress(", ".join(f"{name}: {AXES[name].text(x)}" for name, x in values.items()))
         self._solves += 1
         task = self._task.model_copy(update=dict(values))

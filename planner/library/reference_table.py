@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
@@ -40,6 +39,7 @@ from ..models.exact_dynamics import (
     dynamics_of,
     joint_motions,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 
@@ -57,7 +57,7 @@ def reference_table(
     stand_time: float,
     steps: Mapping[Phase, float] | None = None,
 ) -> JumpTable:
-    """The plan as a table that begins with standing still for ``stand_time`` [s].
+    """Return the plan as a table that begins with standing still for ``stand_time`` [s].
 
     Two rows are at most ``STEP`` apart, or what ``steps`` says for a phase [s].
     """
@@ -138,7 +138,7 @@ class _States(NamedTuple):
 
 
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
-    """The motion, knots and what lies between them; two rows at an impact."""
+    """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
     lengths = np.diff(plan.time)
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
@@ -226,7 +226,7 @@ def _middle_values(
 
 
 def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
-    """The reference's fields in n states under those forces (n, n_contacts, 3)."""
+    """Return the reference's fields in n states under those forces (n, n_contacts, 3)."""
     feet = dynamics.feet(q, v)
     arms = feet.points - feet.com[:, None]
     moments = arms[:, :, AFTER] * force[:, :, BEFORE] - arms[:, :, BEFORE] * force[:, :, AFTER]

@@ -72,7 +72,7 @@ class Rehearsed:
 
 
 def controller_hash(blocks: Mapping[str, Mapping[str, Any]], rate: float, plan: str) -> str:
-    """A hash of the controller in a graph: of every block on which the robot's command depends.
+    """Return a hash of the controller in a graph: of every block on which the robot's command depends.
 
     The robot itself with its seed and trial, the score, and the task are no part of it.
 
@@ -98,7 +98,7 @@ def controller_hash(blocks: Mapping[str, Mapping[str, Any]], rate: float, plan: 
 
 
 def _sources(wires: Any, blocks: Mapping[str, Any]) -> Iterator[str]:
-    """The blocks that a block's wires come from."""
+    """Yield the blocks that a block's wires come from."""
     if isinstance(wires, Mapping):
         wires = list(wires.values())
     if isinstance(wires, list):
@@ -175,7 +175,7 @@ def _path(folder: Path, plan: Path, controller: str) -> Path:
 
 
 def _hash_of(plan: Path) -> str:
-    """The hash of a plan's file."""
+    """Return the hash of a plan's file."""
     return hashlib.sha256(plan.read_bytes()).hexdigest()
 
 

@@ -56,14 +56,14 @@ def check_unless_noted(content: bytes, check: Callable[[], None]) -> None:
 
 
 def _code() -> bytes:
-    """A digest of the code of the check and of the versions of what computes."""
+    """Return a digest of the code of the check and of the versions of what computes."""
     return code_digest(*FOLDERS)
 
 
 KEPT = 32
 """How many results are kept, of the plans used last."""
 
-TABLE_FOLDERS = (*FOLDERS, "planner/library", "blocks/signals")
+TABLE_FOLDERS = (*FOLDERS, "planner/library")
 """The code that decides on a table."""
 
 _Result = TypeVar("_Result")
@@ -76,7 +76,7 @@ class ResultCache(Generic[_Result]):
         self._results: OrderedDict[Hashable, _Result] = OrderedDict()
 
     def get(self, key: Hashable, compute: Callable[[], _Result]) -> _Result:
-        """The result for ``key``, computed if it is not kept. Nothing is kept of an error."""
+        """Return the result for ``key``, computed if it is not kept. Nothing is kept of an error."""
         if key not in self._results:
             self._results[key] = compute()
         self._results.move_to_end(key)
@@ -90,7 +90,7 @@ _tables = ResultCache[JumpTable]()
 
 
 def content(plan: PlannedJump, robot: RobotDescription) -> bytes:
-    """A digest of all numbers of a plan, of its task, and of the robot."""
+    """Return a digest of all numbers of a plan, of its task, and of the robot."""
     digest = hashlib.blake2b(digest_size=16)
     for name in ARRAYS:
         array = getattr(plan, name)

@@ -71,17 +71,17 @@ class Coordinates:
         return tuple(i for i, axis in enumerate(self.free_base) if axis >= 3)
 
     def expand(self, reduced: Any) -> Any:
-        """The robot's coordinates of an expression of reduced ones."""
+        """Return the robot's coordinates of an expression of reduced ones."""
         import casadi as ca
 
         return ca.mtimes(ca.DM(self.matrix), reduced)
 
     def reduce(self, whole: Array) -> Array:
-        """The reduced coordinates of a mirrored motion (..., n_velocities)."""
+        """Return the reduced coordinates of a mirrored motion (..., n_velocities)."""
         return np.asarray(whole @ self._reduction)
 
     def reduce_forces(self, forces: Array) -> Array:
-        """The contact force variables from all contact forces (..., 3 n_contacts)."""
+        """Return the contact force variables from all contact forces (..., 3 n_contacts)."""
         return np.asarray(forces @ self._force_reduction)
 
     @cached_property
@@ -144,8 +144,7 @@ def _mirrored(model: SymbolicModel, name: str) -> Coordinates | None:
 
 
 def _force_matrix(contacts: int, pairs: Sequence[Pair], axes: tuple[int, ...]) -> Array:
-    """All contact forces by those on the computed limbs; mirrored forces push the other way
-    sideways."""
+    """Return all contact forces by those on the computed limbs; mirrored forces push the other way sideways."""
     twins = [twin for pair in pairs for twin in pair.contacts]
     forces = np.zeros((3 * contacts, len(axes) * len(twins)))
     for number, (c, d) in enumerate(twins):

@@ -17,7 +17,7 @@ ORDER = [1, 0, 2]
 
 
 def angles_of(rotation: Array) -> Array:
-    """The angles [rad] (..., 3) of rotation matrices (..., 3, 3)."""
+    """Return the angles [rad] (..., 3) of rotation matrices (..., 3, 3)."""
     about_x = np.arcsin(np.clip(-rotation[..., 1, 2], -1.0, 1.0))
     about_y = np.arctan2(rotation[..., 0, 2], rotation[..., 2, 2])
     about_z = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1])
@@ -25,14 +25,14 @@ def angles_of(rotation: Array) -> Array:
 
 
 def euler_angles(quaternions: Array) -> Array:
-    """The angles [rad] of a motion's quaternions, both (n, ...), followed through full turns."""
+    """Return the angles [rad] of a motion's quaternions, both (n, ...), followed through full turns."""
     angles = angles_of(matrices_of_quaternions(quaternions))
     angles[:, 1:] = np.unwrap(angles[:, 1:], axis=0)
     return angles
 
 
 def euler_rates(angles: Array, angular_velocity: Array) -> Array:
-    """The rates [rad/s] of the angles (..., 3) at a body-frame angular velocity (..., 3)."""
+    """Return the rates [rad/s] of the angles (..., 3) at a body-frame angular velocity (..., 3)."""
     (x, _, z), (p, q, r) = _parts(angles), _parts(angular_velocity)
     # Undone: angular velocity = Rz' (x rate, y rate cos x, -y rate sin x) + (0, 0, z rate).
     about_y = (np.sin(z) * p + np.cos(z) * q) / np.cos(x)
@@ -68,12 +68,12 @@ def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[A
 
 
 def _parts(vectors: Array) -> tuple[Array, Array, Array]:
-    """The three components of vectors (..., 3)."""
+    """Return the three components of vectors (..., 3)."""
     return vectors[..., 0], vectors[..., 1], vectors[..., 2]
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The cross product of vectors (..., 3); NumPy's own takes several times as long."""
+    """Return the cross product of vectors (..., 3); NumPy's own takes several times as long."""
     (ax, ay, az), (bx, by, bz) = _parts(a), _parts(b)
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
@@ -84,12 +84,12 @@ def times(matrices: Array, vectors: Array) -> Array:
 
 
 def times_transposed(matrices: Array, vectors: Array) -> Array:
-    """The transposed matrices (..., 3, 3) times vectors (..., 3)."""
+    """Return the transposed matrices (..., 3, 3) times vectors (..., 3)."""
     return np.asarray(np.add.reduce(matrices * vectors[..., :, None], axis=-2))
 
 
 def pose_of(q: Array) -> Array:
-    """The robot's positions, with a quaternion x, y, z, w, of the planner's coordinates (..., n_velocities).
+    """Return the robot's positions, with a quaternion x, y, z, w, of the planner's coordinates (..., n_velocities).
 
     The quaternion is a product of half angles: it changes sign only where a full turn does.
     """
@@ -100,8 +100,9 @@ def pose_of(q: Array) -> Array:
 
 
 def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
-    """The robot's velocities and accelerations, with the base's part in the body frame, of the
-    planner's coordinates, their rates and accelerations, all (..., n_velocities)."""
+    """Return the robot's velocities and accelerations, with the base's part in the body frame, of the planner's
+    coordinates, their rates and accelerations, all (..., n_velocities).
+    """
     angles = q[..., 3:6][..., ORDER]
     spin, turn = angular_motion(angles, v[..., 3:6][..., ORDER], bend[..., 3:6][..., ORDER])
     to_world = rotation(angles)
@@ -114,8 +115,9 @@ def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
 
 
 def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
-    """The planner's coordinates and their rates, both (n, n_velocities), of a motion: ``position``
-    (n, n_positions) and ``velocity`` (n, n_velocities) as ``pose_of`` and ``twist_of`` give them."""
+    """Return the planner's coordinates and their rates, both (n, n_velocities), of a motion: ``position`` (n,
+    n_positions) and ``velocity`` (n, n_velocities) as ``pose_of`` and ``twist_of`` give them.
+    """
     angles = euler_angles(position[:, 3:7])
     places = np.hstack([position[:, :3], angles[:, ORDER], position[:, 7:]])
     moved = times(rotation(angles), velocity[:, :3])

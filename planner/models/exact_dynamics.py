@@ -128,7 +128,7 @@ class ExactDynamics:
         self._columns = [self._moving(frame) for frame in built.contact_frames]
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
-        """The contact points and behind them the sole centres. Of balls both are the lowest point."""
+        """Return the contact points and behind them the sole centres. Of balls both are the lowest point."""
         bodies = [robot.base, *(joint.child for joint in robot.joints)]
         feet, owners = robot.feet, robot.foot_of_contact()
         places = [list(c.position) for c in robot.contacts] + [list(foot.sole) for foot in feet]
@@ -140,7 +140,7 @@ class ExactDynamics:
         return FixedPoints(np.array(body, dtype=np.int64), np.array(places).reshape(-1, 3), below)
 
     def _moving(self, frame: int) -> list[int]:
-        """The generalised velocities that move a frame."""
+        """Return the generalised velocities that move a frame."""
         found = list[int]()
         for joint in self.model.supports[self.model.frames[frame].parentJoint]:
             first = self.model.joints[joint].idx_v
@@ -173,13 +173,14 @@ class ExactDynamics:
         return self._contact_places()
 
     def points(self, q: Array) -> Array:
-        """The contact points in the world [m], of balls the lowest points, (n_contacts, 3)."""
+        """Return the contact points in the world [m], of balls the lowest points, (n_contacts, 3)."""
         self.pin.framesForwardKinematics(self.model, self.data, q)
         return self._contact_places()
 
     def soles(self, q: Array) -> tuple[Array, Array]:
-        """The sole centres [m] (n_feet, 3), of balls the lowest points, and the feet's headings
-        [rad] (n_feet,)."""
+        """Return the sole centres [m] (n_feet, 3), of balls the lowest points, and the feet's headings [rad]
+        (n_feet,).
+        """
         self.pin.framesForwardKinematics(self.model, self.data, q)
         return self.sole_places(), self.foot_angles()[0]
 
@@ -203,7 +204,7 @@ class ExactDynamics:
         return np.array(places).reshape(-1, 3)
 
     def sole_places(self) -> Array:
-        """The sole centres in the state that was evaluated last."""
+        """Return the sole centres in the state that was evaluated last."""
         places, points = self._places(self.sole_frames), self._contact_places()
         for ball in self.balls:
             places[ball.foot] = points[ball.point]
@@ -261,7 +262,7 @@ class ExactDynamics:
         return yaw[0], pitch[0]
 
     def _angles(self, turns: Array, base: Array) -> tuple[Array, Array]:
-        """The same, both (n, n_feet), of feet (n, n_feet, 3, 3) and a base (n, 3, 3) turned like that."""
+        """Return the same, both (n, n_feet), of feet (n, n_feet, 3, 3) and a base (n, 3, 3) turned like that."""
         ahead = turns[..., 0]
         each, shape = ahead.reshape(-1, 3).tolist(), ahead.shape[:-1]
         yaw = np.array([math.atan2(y, x) for x, y, _ in each]).reshape(shape)
@@ -281,7 +282,7 @@ class ExactDynamics:
         return np.array([self.data.oMf[frame].translation for frame in frames]).reshape(-1, 3)
 
     def com(self, q: Array) -> Array:
-        """The centre of mass [m], (3,)."""
+        """Return the centre of mass [m], (3,)."""
         return np.array(self.pin.centerOfMass(self.model, self.data, q))
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -339,7 +340,7 @@ class ExactDynamics:
     def _evaluation(
         self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
     ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
-        """The call for so many instants, with its memory: to make a call takes longer than to run it."""
+        """Return the call for so many instants, with its memory: to make a call takes longer than to run it."""
         count, points = pushes[0], (len(fixed.body), 3)
         shapes = (
             (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
@@ -355,8 +356,9 @@ class ExactDynamics:
         return call, given, terms
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
-        """The centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint angles, as
-        rigid, seen from its base."""
+        """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
+        angles, as rigid, seen from its base.
+        """
         terms = self._at_origin(joints[None], np.zeros((1, len(joints))))
         return terms.com[0], terms.inertia[0][WHOLE]
 
@@ -371,7 +373,7 @@ class ExactDynamics:
         return self._evaluate(self._centres, position, velocity, None, None)
 
     def mass_matrix(self, q: Array) -> Array:
-        """The joint-space inertia with all rotors."""
+        """Return the joint-space inertia with all rotors."""
         matrix = np.triu(self.pin.crba(self.model, self.data, q))
         return np.asarray(matrix + np.triu(matrix, 1).T + self._rotor_coupling)
 
@@ -389,7 +391,7 @@ class ExactDynamics:
         return np.hstack([pull, times_transposed(turn, moment) + cross(com, pull)])
 
     def joint_torque(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
-        """The torques [N m] of one instant, (n_joints,), without friction."""
+        """Return the torques [N m] of one instant, (n_joints,), without friction."""
         found: Array = self.motion(q[None], v[None], joints[None], force[None]).torque[0]
         return found
 
@@ -410,7 +412,7 @@ class ExactDynamics:
     def velocity_after_impact(
         self, q: Array, v: Array, impulse: Array, held: NDArray[np.bool_] | None = None
     ) -> tuple[Array, Array]:
-        """The generalised velocity behind contact impulses [N s, world], (n_contacts, 3).
+        """Return the generalised velocity behind contact impulses [N s, world], (n_contacts, 3).
 
         Joints that are ``held`` (n_joints) keep their velocity, by impulses [N m s] (n_joints) of
         their motors, which come second; the other motors give none.
@@ -427,7 +429,7 @@ class ExactDynamics:
     def integrate(
         self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
     ) -> list[tuple[float, Array, Array]]:
-        """The motion over one interval from the state (q, v) under constant contact forces (n_contacts, 3).
+        """Return the motion over one interval from the state (q, v) under constant contact forces (n_contacts, 3).
 
         Returns time since the interval began [s], q and v after every step; ``q`` is followed as
         position and quaternion, and the joints' part of both is the planned one.
@@ -441,7 +443,9 @@ class ExactDynamics:
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
     def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
-        """The states after every step of all segments in turn: (n_steps, n_positions) and (n_steps, n_velocities)."""
+        """Return the states after every step of all stretches in turn: (n_steps, n_positions) and (n_steps,
+        n_velocities).
+        """
         angles = np.concatenate([one.angles for one in segments])
         speeds = np.concatenate([one.speeds for one in segments])
         steps = np.concatenate([one.steps for one in segments])
@@ -503,12 +507,12 @@ def run_compiled(call: KernelCall) -> None:
 
 @per_robot
 def dynamics_of(robot: RobotDescription) -> ExactDynamics:
-    """The dynamics of a robot, made once."""
+    """Return the dynamics of a robot, made once."""
     return ExactDynamics(robot)
 
 
 def rotation_between(first: Array, second: Array) -> Array:
-    """The angles [rad] (...) between unit quaternions (..., 4)."""
+    """Return the angles [rad] (...) between unit quaternions (..., 4)."""
     # From half angles: an arc cosine would lose half the digits where the two are alike.
     half = np.minimum(
         np.linalg.norm(first - second, axis=-1), np.linalg.norm(first + second, axis=-1)
@@ -517,7 +521,7 @@ def rotation_between(first: Array, second: Array) -> Array:
 
 
 def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
-    """The joints of a plan between that knot and the next."""
+    """Return the joints of a plan between that knot and the next."""
     every = joint_motions(plan_position, plan_velocity, time, np.array([knot]))
     start, end, before, after, _ = every
     duration = float(time[knot + 1] - time[knot])
@@ -527,7 +531,7 @@ def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: 
 def joint_motions(
     position: Array, velocity: Array, time: Array, knots: NDArray[np.int64]
 ) -> JointMotion:
-    """The same between each of some knots and the one behind it."""
+    """Return the same between each of some knots and the one behind it."""
     return JointMotion(
         position[knots, 7:], position[knots + 1, 7:], velocity[knots, 6:], velocity[knots + 1, 6:],
         (time[knots + 1] - time[knots])[:, None],
@@ -537,7 +541,7 @@ def joint_motions(
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
 ) -> list[Segment]:
-    """The intervals of a plan from its states at some knots, each in two steps."""
+    """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
     angles, speeds, _ = joints.at(np.asarray(quarters))

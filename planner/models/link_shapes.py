@@ -47,17 +47,19 @@ class MovingShape:
 
 
 def moving_shapes(robot: RobotDescription, poses: LinkPoses, link: str) -> list[MovingShape]:
-    """The shapes of a link at the instants of the poses."""
+    """Return the shapes of a link at the instants of the poses."""
     return [MovingShape(shape, *poses.of(link)) for shape in robot.link(link).shapes]
 
 
 def legs(robot: RobotDescription) -> list[list[str]]:
-    """The links of every leg, from the base outwards, legs in the order of the feet."""
+    """Return the links of every leg, from the base outwards, legs in the order of the feet."""
     return [[robot.joints[k].child for k in chain_to(robot, foot.link)] for foot in robot.feet]
 
 
 def arms(robot: RobotDescription) -> list[list[str]]:
-    """The links of every limb that moves and has no foot, from the base outwards, limbs in the order of their joints."""
+    """Return the links of every limb that moves and has no foot, from the base outwards, limbs in the order of their
+    joints.
+    """
     in_legs, found = {link for chain in legs(robot) for link in chain}, list[list[str]]()
     for _, joint in from_base_outwards(robot):
         own = next((arm for arm in found if joint.parent in arm), None)
@@ -69,8 +71,9 @@ def arms(robot: RobotDescription) -> list[list[str]]:
 
 
 def gaps_between(some: Sequence[MovingShape], others: Sequence[MovingShape]) -> Array:
-    """The distances (n_some n_others, n) [m] between some shapes and others; of all pairs of these. Where two overlap,
-    minus how deep."""
+    """Return the distances (n_some n_others, n) [m] between some shapes and others; of all pairs of these. Where two
+    overlap, minus how deep.
+    """
     if not some or not others:
         return np.zeros((0, 0))
     gaps = np.zeros((len(some) * len(others), len(some[0].position)))

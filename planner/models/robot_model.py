@@ -32,8 +32,8 @@ SAME = {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 1.0, 0.0, 0.0
 
 
 def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
-    """The model of a robot without its held joints, with the actuator profile in use, and what
-    places it on the ground.
+    """Return the model of a robot without its held joints, with the actuator profile in use, and what places it on the
+    ground.
 
     Raises:
         PlanError: held joints share motors with others.
@@ -42,8 +42,8 @@ def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
 
 
 def symmetric_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
-    """The same of the robot made exactly the same left and right, where it nearly is; else of the
-    robot as it is.
+    """Return the same of the robot made exactly the same left and right, where it nearly is; else of the robot as it
+    is.
 
     Raises:
         PlanError: held joints share motors with others.
@@ -70,8 +70,8 @@ def _model(
 
 
 def twin_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder] | None:
-    """The same of a robot whose limbs mirror each other but whose masses do not, as Talos' do not by a little, made the
-    same left and right: its jumps are good guesses for the robot's. ``None`` for other robots.
+    """Return the same of a robot whose limbs mirror each other but whose masses do not, as Talos' do not by a little,
+    made the same left and right: its jumps are good guesses for the robot's. ``None`` for other robots.
 
     Raises:
         PlanError: held joints share motors with others.
@@ -130,9 +130,8 @@ class StanceFinder:
         self._levelled: dict[bytes, Array] = {}
 
     def on_ground(self, joints: Array, place: StanceLocation) -> Stance:
-        """The stance at a place. On ground that leans the base is as upright as on level ground, and
-        the centre of mass as far from the soles' middle: only the legs differ. The base is lower by
-        as much as the lowest foot is.
+        """Return the stance at a place. On ground that leans the base is as upright as on level ground, and the centre
+        of mass as far from the soles' middle: only the legs differ. The base is lower by as much as the lowest foot is.
 
         Raises:
             PlanError: there is none on level ground, or the legs do not reach ground that leans.
@@ -181,7 +180,7 @@ class StanceFinder:
         return Stance(q, points, self._body.com(pose_of(q)), place.heading, footholds, place.slope)
 
     def _on_points(self, q: Array, goals: Array) -> Array:
-        """The coordinates with joints for which the contact points are at those places."""
+        """Return the coordinates with joints for which the contact points are at those places."""
         q = q.copy()
         for _ in range(LEG_STEPS):
             points, jacobian = self._body.contact_jacobians(pose_of(q))
@@ -193,7 +192,7 @@ class StanceFinder:
         return q
 
     def _level(self, joints: Array) -> Array:
-        """The coordinates with those joints, over the origin, whose base leans as in ``place``."""
+        """Return the coordinates with those joints, over the origin, whose base leans as in ``place``."""
         key = joints.tobytes()
         if key not in self._levelled:
             if len(self._levelled) > MOST_PLACED:
@@ -213,7 +212,7 @@ class StanceFinder:
     def place(
         self, joints: Array, *, heading: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
     ) -> Stance:
-        """The stance with the soles' middle over ``at`` [m] and the contact points at its height.
+        """Return the stance with the soles' middle over ``at`` [m] and the contact points at its height.
 
         The base leans so that the plane through all contact points is level.
 
@@ -246,8 +245,9 @@ class StanceFinder:
 
 def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
                ) -> tuple[Stance, ...]:  # fmt: skip
-    """The task's stances: at the start, between jumps, with the same joint angles, and at the end.
-    The pitch includes the body's turns so far."""
+    """Return the task's stances: at the start, between jumps, with the same joint angles, and at the end. The pitch
+    includes the body's turns so far.
+    """
     names = [joint.name for joint in finder.robot.joints]
     first, last = task.start_joints(robot), task.end_joints(robot)
     places = task.places()
@@ -262,8 +262,9 @@ def stances_of(task: JumpTask, robot: RobotDescription, finder: StanceFinder
 
 
 def _normal(points: Array) -> Array:
-    """The upward normal of the plane nearest to points (n, 3); it leans in no direction in which
-    the points have no width, so one point or a line of them is on level ground as it is."""
+    """Return the upward normal of the plane nearest to points (n, 3); it leans in no direction in which the points have
+    no width, so one point or a line of them is on level ground as it is.
+    """
     off = points - points.mean(axis=0)
     slopes = np.linalg.lstsq(off[:, :2], off[:, 2], rcond=1e-6)[0]
     normal = np.array([-slopes[0], -slopes[1], 1.0])

@@ -52,13 +52,14 @@ class RigidBody:
     standing: float
 
     def at_hop(self, speed: float) -> float:
-        """The longest leg [m] at lift-off and touchdown with that vertical speed [m/s]: the foot,
-        at rest at first, lags behind the body while it gains its speed."""
+        """Return the longest leg [m] at lift-off and touchdown with that vertical speed [m/s]: the foot, at rest at
+        first, lags behind the body while it gains its speed.
+        """
         return min(self.standing, self.longest - SPARE - 0.5 * BLEND * abs(speed))
 
 
 def composite_inertia(robot: RobotDescription, start: Stance) -> RigidBody:
-    """The body of a robot in its stance."""
+    """Return the body of a robot in its stance."""
     joints = start.coordinates[6:]
     com, inertia = ExactDynamics(robot).standing_inertia(joints)
     hips, straight, lengths, knees = [], [], [], []
@@ -99,7 +100,7 @@ def quaternion_product(a: Any, b: Any) -> Any:
 
 
 def quaternion_rotation(q: Any) -> Any:
-    """The rotation from body to world of a unit quaternion."""
+    """Return the rotation from body to world of a unit quaternion."""
     import casadi as ca
 
     x, y, z, w = q[0], q[1], q[2], q[3]
@@ -111,7 +112,7 @@ def quaternion_rotation(q: Any) -> Any:
 
 
 def quaternion_step(q: Any, spin: Any, step: Any) -> Any:
-    """A unit quaternion after ``step`` seconds of turning with ``spin`` (body).
+    """Return a unit quaternion after ``step`` seconds of turning with ``spin`` (body).
 
     Euler's step in the tangent, brought back to length one: q[k] - q[k-1] = v[k] dt on the sphere.
     """

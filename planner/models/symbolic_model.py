@@ -34,7 +34,7 @@ NO_TWINS: Mapping[int, int] = {}
 
 
 def base_rotation(angles: Expression) -> Expression:
-    """The rotation from body to world of pitch, roll, yaw."""
+    """Return the rotation from body to world of pitch, roll, yaw."""
     import casadi as ca
 
     sp, cp = ca.sin(angles[0]), ca.cos(angles[0])
@@ -48,7 +48,7 @@ def base_rotation(angles: Expression) -> Expression:
 
 
 def base_angular_velocity(angles: Expression, rates: Expression) -> Expression:
-    """The base's angular velocity in the body frame."""
+    """Return the base's angular velocity in the body frame."""
     import casadi as ca
 
     sr, cr = ca.sin(angles[1]), ca.cos(angles[1])
@@ -63,7 +63,7 @@ def base_angular_velocity(angles: Expression, rates: Expression) -> Expression:
 def base_angular_acceleration(
     angles: Expression, rates: Expression, accelerations: Expression
 ) -> Expression:
-    """The time derivative of ``base_angular_velocity``, in the body frame."""
+    """Return the time derivative of ``base_angular_velocity``, in the body frame."""
     import casadi as ca
 
     sr, cr = ca.sin(angles[1]), ca.cos(angles[1])
@@ -78,7 +78,7 @@ def base_angular_acceleration(
 
 
 def joint_origin(joint: Joint, place: Expression) -> Expression:
-    """The child's origin in the parent's frame; a slide carries it along its axis."""
+    """Return the child's origin in the parent's frame; a slide carries it along its axis."""
     import casadi as ca
 
     origin = ca.DM(list(joint.origin))
@@ -86,7 +86,7 @@ def joint_origin(joint: Joint, place: Expression) -> Expression:
 
 
 def joint_rotation(joint: Joint, angle: Expression) -> Expression:
-    """The rotation from child to parent: none for a slide, Rodrigues' formula for a hinge.
+    """Return the rotation from child to parent: none for a slide, Rodrigues' formula for a hinge.
 
     A hinge about a coordinate axis gets a matrix with structural zeros, which is far cheaper.
     """
@@ -152,7 +152,7 @@ class SymbolicModel:
         return frames
 
     def point(self, frames: dict[str, Any], link: str, place: Sequence[float]) -> Expression:
-        """The world position of a point of a link."""
+        """Return the world position of a point of a link."""
         import casadi as ca
 
         rotation, origin = frames[link]
@@ -202,7 +202,7 @@ class SymbolicModel:
         return found
 
     def com(self, q: Expression) -> Expression:
-        """The centre of mass in the world."""
+        """Return the centre of mass in the world."""
         import casadi as ca
 
         frames = self.frames(q)
@@ -273,8 +273,9 @@ class SymbolicModel:
         return needed[base], passed, ca.vertcat(*moved)
 
     def base_wrench(self, base: Expression, passed: dict[int, Expression], share: int) -> Any:
-        """The wrench that the robot needs from outside, of ``inverse_dynamics``' results, where every
-        computed limb stands for ``share`` of them."""
+        """Return the wrench that the robot needs from outside, of ``inverse_dynamics``' results, where every computed
+        limb stands for ``share`` of them.
+        """
         joints = self.robot.joints
         limbs = [w for i, w in passed.items() if joints[i].parent == self.robot.base]
         return base + share * sum(limbs)
@@ -304,8 +305,7 @@ class SymbolicModel:
         limbs: Sequence[int] | None = None,
         twins: Mapping[int, int] = NO_TWINS,
     ) -> list[Any]:
-        """The torques that keep held joints still in a motion, of those ``loads`` on the base and
-        those limbs.
+        """Return the torques that keep held joints still in a motion, of those ``loads`` on the base and those limbs.
 
         Args:
             q, v, a: coordinates, velocities and accelerations.
@@ -425,7 +425,7 @@ def centroidal_momentum(
     limbs: Sequence[int] | None = None,
     share: int = 1,
 ) -> Centroidal:
-    """The momentum of the base and ``share`` times those limbs, or all.
+    """Return the momentum of the base and ``share`` times those limbs, or all.
 
     Of a mirrored motion, with half of the limbs and a share of two, only what is not zero by
     symmetry means anything: x and z of the centre and of the linear momentum, y of the angular.

@@ -49,8 +49,8 @@ class Pair:
 
 
 def limbs_of(robot: RobotDescription) -> tuple[list[list[int]], dict[str, int]]:
-    """The joints of every limb, parents first, and for every link the number of its limb, -1 for
-    the base. Links whose joints lead to the base through the same first joint form a limb.
+    """Return the joints of every limb, parents first, and for every link the number of its limb, -1 for the base. Links
+    whose joints lead to the base through the same first joint form a limb.
 
     Raises:
         ValueError: a joint is listed before the one that carries it.
@@ -70,8 +70,9 @@ def limbs_of(robot: RobotDescription) -> tuple[list[list[int]], dict[str, int]]:
 
 
 def mirrored_pairs(robot: RobotDescription) -> tuple[Pair, ...] | None:
-    """The pairs of limbs that mirror each other within the tolerances above; ``None`` if some limb
-    or the base has no mirror image, or the robot has none of its limbs in pairs."""
+    """Return the pairs of limbs that mirror each other within the tolerances above; ``None`` if some limb or the base
+    has no mirror image, or the robot has none of its limbs in pairs.
+    """
     limbs, of_link = limbs_of(robot)
     base = robot.link(robot.base)
     if abs(base.com[1]) > LENGTH or not _alike_inertia(base, base):
@@ -90,7 +91,7 @@ def mirrored_pairs(robot: RobotDescription) -> tuple[Pair, ...] | None:
 
 
 def symmetrised(robot: RobotDescription, pairs: Sequence[Pair]) -> RobotDescription:
-    """The robot with every pair of limbs made exact mirror images by averaging both.
+    """Return the robot with every pair of limbs made exact mirror images by averaging both.
 
     A robot that is symmetric already is returned as it is.
     """
@@ -130,7 +131,7 @@ def _pair(
     robot: RobotDescription, limbs: list[list[int]], of_link: dict[str, int], first: int,
     other: int,
 ) -> Pair | None:  # fmt: skip
-    """The pair of those limbs, if they mirror each other."""
+    """Return the pair of those limbs, if they mirror each other."""
     if len(limbs[first]) != len(limbs[other]):
         return None
     image = {robot.base: robot.base}
@@ -195,7 +196,7 @@ def _alike_inertia(one: Link, other: Link) -> bool:
 def _contact_pairs(
     robot: RobotDescription, of_link: dict[str, int], image: dict[str, str], first: int, other: int
 ) -> tuple[tuple[int, int], ...] | None:
-    """Every contact point of the first limb with its mirror image on the other."""
+    """Return every contact point of the first limb with its mirror image on the other."""
     link_of = {foot.name: foot.link for foot in robot.feet}
     points: list[list[int]] = [
         [k for k, c in enumerate(robot.contacts) if of_link[link_of[c.foot]] == limb]

@@ -82,7 +82,7 @@ class Corrector:
         compile_calls([self._call])
 
     def correct(self, problem: FullProblem, guess: Array) -> Correction:
-        """The nearest variables to the guess that fulfil the problem's constraints, as far as the steps lead."""
+        """Return the nearest variables to the guess that fulfil the problem's constraints, as far as the steps lead."""
         held = problem.row_lower == problem.row_upper
         self._variables[:] = guess
         self._inverse[:] = self._squares

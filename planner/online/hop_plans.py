@@ -33,7 +33,9 @@ def own_path(robot: RobotDescription, *, steps: bool = False) -> Path:
 
 
 def samples_file(robot: RobotDescription, *, steps: bool = False) -> Path | None:
-    """The file of a robot's plans of hops: one that ships comes first, so that a cache changes no run with it."""
+    """Return the file of a robot's plans of hops: one that ships comes first, so that a cache changes no run with
+    it.
+    """
     shipped = shipped_path(robot.name, steps=steps)
     if shipped.is_file():
         return shipped
@@ -58,7 +60,7 @@ _read = lru_cache(maxsize=4)(read_samples)
 
 
 def samples_of_hops(robot: RobotDescription, *, steps: bool = False) -> PlanSamples:
-    """The plans of hops of a robot on level ground, or of those up and down.
+    """Return the plans of hops of a robot on level ground, or of those up and down.
 
     Raises:
         PlanFileError: there are none, or the file is broken.
@@ -67,7 +69,7 @@ def samples_of_hops(robot: RobotDescription, *, steps: bool = False) -> PlanSamp
 
 
 def samples_of_steps(robot: RobotDescription) -> PlanSamples | None:
-    """The plans of hops of a robot up and down, if it has any."""
+    """Return the plans of hops of a robot up and down, if it has any."""
     there = samples_file(robot, steps=True) is not None
     return samples_of_hops(robot, steps=True) if there else None
 
@@ -87,11 +89,11 @@ def step_reach(robot: RobotDescription) -> StepReach:
 
 
 def hop_table(plan: PlannedJump, robot: RobotDescription) -> JumpTable:
-    """The plan as a table of few rows, which begins with the squat."""
+    """Return the plan as a table of few rows, which begins with the squat."""
     return reference_table(plan, robot, 0.0, COARSE_STEPS)
 
 
 def standing_row(robot: RobotDescription) -> Array:
-    """The row of a table in which the robot stands as every hop begins, (width,)."""
+    """Return the row of a table in which the robot stands as every hop begins, (width,)."""
     first: Array = table_rows(hop_table(samples_of_hops(robot).plan(0), robot)).rows[0]
     return first

@@ -22,7 +22,7 @@ class HopProblems:
         self._of_kind: dict[object, Callable[[JumpTask], FullProblem]] = {}
 
     def problem(self, task: JumpTask, coordinates: str) -> FullProblem:
-        """The problem of a resolved task with one jump on level ground, or up or down."""
+        """Return the problem of a resolved task with one jump on level ground, or up or down."""
         kind = kind_of(task), coordinates
         if kind not in self._of_kind:
             if len(self._of_kind) >= MOST_KINDS:

@@ -46,8 +46,9 @@ class HopReach(NamedTuple):
     rise: float
 
     def nearest(self, wanted: HopRequest) -> HopRequest:
-        """The nearest request that a jump can do: in half an ellipse ahead and half of one back, and within
-        the largest turn."""
+        """Return the nearest request that a jump can do: in half an ellipse ahead and half of one back, and within the
+        largest turn.
+        """
         shorter = max(self._share(wanted), 1.0)
         turn = _clip(wanted.turn, -self.turn, self.turn)
         up = wanted.up if wanted.level else 0.0
@@ -79,7 +80,7 @@ class StepReach(NamedTuple):
     rise: float
 
     def nearest(self, wanted: HopRequest) -> HopRequest:
-        """The nearest request in the box of these limits."""
+        """Return the nearest request in the box of these limits."""
         return HopRequest(
             _clip(wanted.ahead, self.least, self.ahead), _clip(wanted.aside, -self.aside, self.aside),
             _clip(wanted.turn, -self.turn, self.turn), _clip(wanted.up, -self.down, self.up),
@@ -96,7 +97,7 @@ def _rounded(value: float) -> float:
 
 @lru_cache(maxsize=4)
 def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
-    """The task of the requested jump of a robot, whose apex is ``rise`` [m] above standing on level ground.
+    """Return the task of the requested jump of a robot, whose apex is ``rise`` [m] above standing on level ground.
 
     Raises:
         JumpTaskError: there is no such jump.
@@ -116,7 +117,7 @@ def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
 
 
 def coarse(task: JumpTask) -> JumpTask:
-    """A task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
+    """Return a task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
 
     def on_fewer(phase_spec: PhaseSpec) -> PhaseSpec:
         return (

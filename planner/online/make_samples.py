@@ -46,7 +46,7 @@ STILL = HopRequest(0.0, 0.0, 0.0)
 
 
 def halton(index: int, base: int) -> float:
-    """The number ``index`` of the van der Corput sequence, in [0, 1)."""
+    """Return the number ``index`` of the van der Corput sequence, in [0, 1)."""
     value, share = 0.0, 1.0
     while index > 0:
         share /= base
@@ -56,7 +56,7 @@ def halton(index: int, base: int) -> float:
 
 
 def request(index: int, reach: HopReach) -> HopRequest:
-    """A request of the sequence."""
+    """Return a request of the sequence."""
     distance, direction, turn = (halton(index // 2 + 1, base) for base in BASES[:3])
     radius, angle = MARGIN * math.sqrt(distance), math.pi * (direction - 0.5)
     along = reach.ahead if index % 2 == 0 else -reach.back
@@ -68,7 +68,7 @@ def request(index: int, reach: HopReach) -> HopRequest:
 
 
 def step_request(index: int, reach: StepReach) -> HopRequest:
-    """A request of the sequence of jumps up and down."""
+    """Return a request of the sequence of jumps up and down."""
     distance, aside, turn, up = (2.0 * halton(index + 1, base) - 1.0 for base in BASES)
     level, height = 0.5 * (reach.up - reach.down), 0.5 * (reach.up + reach.down)
     middle, half = 0.5 * (reach.ahead + reach.least), 0.5 * (reach.ahead - reach.least)
@@ -126,7 +126,7 @@ def plan_level_hops(
 def reached(
     wanted: HopReach, requests: Sequence[HopRequest], planned: Sequence[HopRequest]
 ) -> HopReach:
-    """The largest share of the limits within which enough requests have a plan."""
+    """Return the largest share of the limits within which enough requests have a plan."""
     for percent in range(100, 0, -5):
         share = 0.01 * percent
         within = [one for one in requests if wanted.share(one) <= MARGIN * share]
@@ -166,7 +166,7 @@ def _plan_all(
 
 
 def apart(one: HopRequest, other: HopRequest) -> float:
-    """The distance between two requests, in units of ``SCALES``."""
+    """Return the distance between two requests, in units of ``SCALES``."""
     return math.hypot(*((np.array(one) - np.array(other)) / SCALES).tolist())
 
 
@@ -186,7 +186,7 @@ def _nearest(
 def _plan(
     wanted: HopRequest, robot: RobotDescription, rise: float, near: PlannedJump | None
 ) -> PlannedJump | None:
-    """A valid plan on the knots of all samples, with all coordinates."""
+    """Return a valid plan on the knots of all samples, with all coordinates."""
     task = coarse(task_of(wanted, robot.name, rise).resolved(robot))
     for start in (near, None) if near is not None else (None,):
         try:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...blocks.signals import PlanOutcome
 from ...robots.description import RobotDescription
 from ..checking.validity import checked
 from ..problem.problem import FullProblem
@@ -15,6 +14,7 @@ from ..task.plan import PlannedJump
 from .correction import Corrector
 from .hop_problems import HopProblems
 from .hop_request import HopRequest, coarse, task_of
+from .plan_outcome import PlanOutcome
 from .plan_samples import PlanSamples
 
 
@@ -64,11 +64,11 @@ class HopPlanner:
                 self.plan(HopRequest(ahead, aside, 0.0, up))
 
     def samples(self, wanted: HopRequest) -> PlanSamples:
-        """The stored plans of jumps of its kind."""
+        """Return the stored plans of jumps of its kind."""
         return self._level if wanted.level or self._steps is None else self._steps
 
     def plan(self, wanted: HopRequest) -> HopPlan:
-        """The plan of a request, or of what is nearest to it."""
+        """Return the plan of a request, or of what is nearest to it."""
         within = self.samples(wanted).reach.nearest(wanted)
         found, steps, solve_s = self._solve(within)
         if found is None:
@@ -99,7 +99,7 @@ class HopPlanner:
         return HopPlan(plan, done, outcome, steps, failed, solve_s, check_s)
 
     def _solve(self, wanted: HopRequest) -> tuple[PlannedJump | None, int, float]:
-        """A plan that has not been checked, the steps and the processor time [s]."""
+        """Return a plan that has not been checked, the steps and the processor time [s]."""
         started = time.process_time()
         rise = self.samples(wanted).reach.rise
         task = coarse(task_of(wanted, self.robot.name, rise).resolved(self.robot))

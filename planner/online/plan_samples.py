@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
 from .hop_request import HopReach, HopRequest, StepReach, task_of
 
@@ -51,8 +51,9 @@ class PlanSamples:
     reach: HopReach | StepReach
 
     def weights(self, wanted: HopRequest) -> Array:
-        """The share of each plan in that of the request, (n,). Feet land in another way after a jump
-        back than after one ahead, so plans of the other direction have none."""
+        """Return the share of each plan in that of the request, (n,). Feet land in another way after a jump back than
+        after one ahead, so plans of the other direction have none.
+        """
         apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
         alike = (self.requests[:, 0] < 0.0) == (wanted.ahead < 0.0)
@@ -66,7 +67,7 @@ class PlanSamples:
         return np.asarray(trust * (basis * goal).sum(axis=1))
 
     def nearest(self, wanted: HopRequest) -> int:
-        """The plan whose request is the nearest, of those within reach."""
+        """Return the plan whose request is the nearest, of those within reach."""
         apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
         for row, request in enumerate(self.requests.tolist()):
@@ -83,7 +84,7 @@ class PlanSamples:
         return replace(plan, lift_off_time=lift_off, touchdown_time=touchdown)
 
     def interpolated(self, wanted: HopRequest) -> PlannedJump:
-        """A motion near the plan of a request. It obeys no law of motion exactly."""
+        """Return a motion near the plan of a request. It obeys no law of motion exactly."""
         return self._make(wanted, self.weights(wanted))
 
     def _make(self, wanted: HopRequest, weights: Array) -> PlannedJump:
@@ -111,7 +112,7 @@ def differences(requests: Array, wanted: HopRequest) -> Array:
 
 
 def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:
-    """The weighted sum over the first axis."""
+    """Return the weighted sum over the first axis."""
     used = np.flatnonzero(weights)
     flat = rows.reshape(len(rows), -1)[used].astype(np.float64)
     return np.asarray((weights[used, None] * flat).sum(axis=0).reshape(rows.shape[1:]))
@@ -123,7 +124,7 @@ def samples_of(
     asked: Sequence[HopRequest],
     reach: HopReach | StepReach,
 ) -> PlanSamples:
-    """The plans of these requests together. Quaternions take the sign with w >= 0."""
+    """Return the plans of these requests together. Quaternions take the sign with w >= 0."""
     arrays = {name: np.stack([getattr(plan, name) for plan in plans]) for name in ARRAYS}
     turn = arrays["position"][:, :, 3:7]
     turn *= np.where(turn[:, :, 3:] < 0.0, -1.0, 1.0)
@@ -157,7 +158,7 @@ def write_samples(path: Path, samples: PlanSamples) -> Path:
 
 
 def read_samples(path: Path) -> PlanSamples:
-    """The plans in a file.
+    """Return the plans in a file.
 
     Raises:
         PlanFileError: there is no file, it is broken, or it is of another format.

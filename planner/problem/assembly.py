@@ -107,7 +107,7 @@ class Assembly:
         raise KeyError(name)
 
     def fixed_rows(self, k: int) -> Indices:
-        """The rows of a knot's fixed variables."""
+        """Return the rows of a knot's fixed variables."""
         end = int(self.row_start[k]) + self.ng[k]
         return np.arange(end - len(self.knots[k].fixed), end)
 
@@ -211,7 +211,7 @@ class Assembly:
         return found
 
     def jacobian(self) -> Any:
-        """The function ``nlp_jac_g`` alone."""
+        """Return the function ``nlp_jac_g`` alone."""
         import casadi as ca
 
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
@@ -312,7 +312,7 @@ def _gather(vector: Any, index: Indices, shape: tuple[int, int]) -> Any:
 
 
 def _scatter(values: Any, index: Indices, size: int) -> Any:
-    """A dense vector with the values added up at their entries."""
+    """Return a dense vector with the values added up at their entries."""
     import casadi as ca
 
     columns = np.arange(len(index))
@@ -321,7 +321,7 @@ def _scatter(values: Any, index: Indices, size: int) -> Any:
 
 
 def _nonzeros(matrix: Any) -> Any:
-    """The non-zeros as a dense column."""
+    """Return the non-zeros as a dense column."""
     import casadi as ca
 
     return matrix.nz[:] if matrix.nnz() else ca.MX(0, 1)

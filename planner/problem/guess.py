@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ..task.phase import Phase
 from .layout import ProblemPhase
 from .problem import FullProblem
 
@@ -32,8 +32,9 @@ def flight_guess(problem: FullProblem, number: int) -> tuple[float, float]:
 
 
 def ballistic_guess(problem: FullProblem) -> Array:
-    """Every variable of the problem: the robot stands, flies as its centre of mass would, and
-    stands again; the weight is shared equally by the contact points."""
+    """Return every variable of the problem: the robot stands, flies as its centre of mass would, and stands again; the
+    weight is shared equally by the contact points.
+    """
     coordinates, assembly = problem.coordinates, problem.assembly
     n = coordinates.size
     weight = problem.model.robot.weight / len(problem.model.robot.contacts)
@@ -69,7 +70,7 @@ def ballistic_guess(problem: FullProblem) -> Array:
 
 
 def _mean_length(problem: FullProblem, problem_phase: ProblemPhase) -> float:
-    """The mean length of a phase's intervals [s]."""
+    """Return the mean length of a stretch's intervals [s]."""
     if problem_phase.flies:
         return flight_guess(problem, problem_phase.place)[0] / problem_phase.count
     low, high = problem_phase.bounds
@@ -88,8 +89,9 @@ def _guess_lengths(problem: FullProblem, guess: Array, k: int, mean: float) -> N
 
 
 def displaced_guess(problem: FullProblem, straight: FullProblem, values: Array) -> Array:
-    """Every variable of a problem, from the solution of jumps straight ahead or in place, with the same knots:
-    the whole robot is moved and turned in proportion to the flight."""
+    """Return every variable of a problem, from the solution of jumps straight ahead or in place, with the same knots:
+    the whole robot is moved and turned in proportion to the flight.
+    """
     coordinates, assembly = problem.coordinates, problem.assembly
     n, own, plane = coordinates.size, straight.coordinates, straight.assembly
     guess = ballistic_guess(problem)

@@ -50,9 +50,9 @@ HIP_JOINTS = 3
 
 def body_points(model: SymbolicModel, coordinates: Coordinates
                 ) -> list[tuple[tuple[str, tuple[float, float, float]], float, float]]:  # fmt: skip
-    """The points of the legs that must not touch anything in flight, from the knee down: (link, place),
-    radius and +1 for a left leg, -1 for a right one. Contact points first; only balls have a radius
-    there."""
+    """Return the points of the legs that must not touch anything in flight, from the knee down: (link, place), radius
+    and +1 for a left leg, -1 for a right one. Contact points first; only balls have a radius there.
+    """
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     found = []

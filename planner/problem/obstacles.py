@@ -88,7 +88,7 @@ def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
 
 
 def _along(shape: Shape) -> list[Edge]:
-    """The long edges of a hull, and a capsule's axis: what a step's edge could pass between the corners of."""
+    """Return the long edges of a hull, and a capsule's axis: what a step's edge could pass between the corners of."""
     found = edges(shape)
     longest = max(math.dist(*edge) for edge in found)
     return [edge for edge in found if math.dist(*edge) > LONG * longest]
@@ -186,9 +186,10 @@ def step_parameters(
     hop: Hop, edge: float | None, start: StanceLocation, end: StanceLocation, share: float,
     leans: bool, beside: float = 0.0,
 ) -> dict[str, Any]:  # fmt: skip
-    """The piece's parameters under a jump from ``start`` to ``end``. With no edge the ground changes
-    in the middle of the flight; ``share`` of its time is past. Planes if it ``leans``. The higher ground reaches
-    ``beside`` [m] beyond its edge, for what must keep off its side."""
+    """Return the piece's parameters under a jump from ``start`` to ``end``. With no edge the ground changes in the
+    middle of the flight; ``share`` of its time is past. Planes if it ``leans``. The higher ground reaches ``beside``
+    [m] beyond its edge, for what must keep off its side.
+    """
     ground, step = start.z, hop.landing_height or 0.0
     onwards = 1.0 if (hop.distance_x or 0.0) >= 0.0 else -1.0
     if edge is not None:

@@ -35,13 +35,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models import simple_models as centroidal
 from ..models.euler_angles import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, Grid, SimpleProblem, ballistic_flight, uniform_grid
@@ -60,13 +60,14 @@ SOURCES = (
 
 
 def state_size(model: SymbolicModel) -> int:
-    """The numbers in q, r, rdot and h."""
+    """Return the numbers in q, r, rdot and h."""
     return model.size + 1 + 9
 
 
 def parameter_sizes(model: SymbolicModel) -> dict[str, dict[str, int]]:
-    """The parameters ``w`` of every piece: name -> size, in order. ``Q_q``, ``Q_v``, ``Q_h`` and
-    ``Q_f`` are the diagonals of the cost's weights, ``q_nom`` its nominal position."""
+    """Return the parameters ``w`` of every piece: name -> size, in order. ``Q_q``, ``Q_v``, ``Q_h`` and ``Q_f`` are the
+    diagonals of the cost's weights, ``q_nom`` its nominal position.
+    """
     contacts = len(model.robot.contacts)
     weights = {"q_nom": model.size + 1, "Q_q": model.size + 1, "Q_v": model.size, "Q_h": 1}
     return {
@@ -78,7 +79,7 @@ def parameter_sizes(model: SymbolicModel) -> dict[str, dict[str, int]]:
 
 
 def make_piece(model: SymbolicModel, name: str) -> StageFunction:
-    """The functions of a piece with exact derivatives."""
+    """Return the functions of a piece with exact derivatives."""
     import casadi as ca
 
     w = {key: ca.SX.sym(key, size) for key, size in parameter_sizes(model)[name].items()}
@@ -140,7 +141,7 @@ def _interval(model: SymbolicModel, x: Any, v: Any, pull: Any, F: Any, w: Any) -
 
 
 def _posture(model: SymbolicModel, x: Any, w: Any) -> tuple[Any, Any]:
-    """The centre of mass and the contact points are those of the position."""
+    """Return the centre of mass and the contact points are those of the position."""
     import casadi as ca
 
     n = model.size + 1
@@ -192,7 +193,7 @@ class PaperProblemBuilder:
         self.q_start, self.q_end = pose_of(start.coordinates), pose_of(end.coordinates)
 
     def build(self) -> SimpleProblem:
-        """The problem with its bounds, parameters and guess."""
+        """Return the problem with its bounds, parameters and guess."""
         sizes = parameter_sizes(self.model)
         self.fill = BoundsBuilder(self._knots(), self.pieces, sizes)
         for k in range(self.last + 1):

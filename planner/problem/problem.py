@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.kinematics import fall_height
@@ -23,6 +22,7 @@ from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .arm_range import arm_ranges
@@ -52,7 +52,7 @@ class FullProblem(NonlinearProgram):
 
     Attributes:
         stances: where the robot stands at the start, between jumps and at the end.
-        problem_phases: the phases with their intervals.
+        stretches: the phases with their intervals.
         steps: the interval lengths [s]; by their mean where that is a variable.
         exact: the model of the robot as it is; ``model`` is the same left and right in mirrored
             coordinates.
@@ -96,11 +96,11 @@ class FullProblem(NonlinearProgram):
         return self.flights[0]
 
     def phase_at(self, k: int) -> ProblemPhase:
-        """The stretch of the interval that begins with a knot; the last one at the end."""
+        """Return the stretch of the interval that begins with a knot; the last one at the end."""
         return next((s for s in self.problem_phases if k < s.stop), self.problem_phases[-1])
 
     def posture(self, k: int) -> Array:
-        """The posture, of all coordinates, that the cost prefers: standing, turning in flight."""
+        """Return the posture, of all coordinates, that the cost prefers: standing, turning in flight."""
         problem_phase = self.phase_at(k)
         here = self.stances[problem_phase.place].coordinates
         if not problem_phase.flies:
@@ -146,7 +146,7 @@ class ProblemBuilder:
         self._arm_ranges = arm_ranges(model.robot, task.leg_clearance)
 
     def build(self) -> FullProblem:
-        """The problem with its bounds and parameters."""
+        """Return the problem with its bounds and parameters."""
         self.assembly = Assembly(self.structure.knots, self.pieces)
         size, rows = self.assembly.variables, self.assembly.constraints
         self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
@@ -166,8 +166,10 @@ class ProblemBuilder:
         return self.problem
 
     def moved(self, task: JumpTask, stances: Sequence[Stance]) -> FullProblem:
-        """The built problem for a task that leads elsewhere: only distances, turn, rise and landing height may differ,
-        with the same signs, so that the structure is the same. What does not follow from them is not worked out again."""
+        """Return the built problem for a task that leads elsewhere: only distances, turn, rise and landing height may
+        differ, with the same signs, so that the structure is the same. What does not follow from them is not worked out
+        again.
+        """
         other, built = copy(self), self.problem
         other.task, other.structure = task, self.structure.moved(task, stances)
         other.stances, other.hops = other.structure.stances, other.structure.hops
@@ -252,7 +254,7 @@ class ProblemBuilder:
         self.lower[at], self.upper[at] = nominal - lean, nominal + lean
 
     def _least_load(self, problem_phase: ProblemPhase) -> float:
-        """The least upward force of every contact point on the ground [N]."""
+        """Return the least upward force of every contact point on the ground [N]."""
         if not self.margins.load or problem_phase.impact or problem_phase.phase == Phase.LANDING:
             return 0.0
         robot = self.model.robot
@@ -295,7 +297,7 @@ class ProblemBuilder:
             start += size
 
     def _effort(self, k: int) -> float:
-        """The share of the motors' abilities that the plan may use from knot ``k`` to the next."""
+        """Return the share of the motors' abilities that the plan may use from knot ``k`` to the next."""
         landed = self.of_knot[k].phase is Phase.LANDING
         return self.task.landing_effort if landed else self.task.effort
 
@@ -323,12 +325,12 @@ class ProblemBuilder:
         ]
 
     def _peak_torque(self, k: int) -> Array:
-        """The most torque of the computed motors that the plan may use [N m]."""
+        """Return the most torque of the computed motors that the plan may use [N m]."""
         chosen = list(self.coordinates.joints)
         return np.asarray(self.model.robot.motors.peak_torque[chosen] * self._effort(k))
 
     def _top_speed(self, k: int) -> Array:
-        """The highest speed of the computed motors that the plan may use [rad/s]."""
+        """Return the highest speed of the computed motors that the plan may use [rad/s]."""
         chosen = list(self.coordinates.joints)
         return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self._effort(k))
 
@@ -352,7 +354,7 @@ class ProblemBuilder:
         }
 
     def nominal(self, k: int) -> Array:
-        """The posture that the cost prefers."""
+        """Return the posture that the cost prefers."""
         if k not in self._nominal:
             self._nominal[k] = self.coordinates.reduce(self.problem.posture(k))
         return self._nominal[k]
@@ -369,8 +371,9 @@ class ProblemBuilder:
         self._rows(problem_phase.piece, k, [base, *self._motor_rows(k), self._cones(), pressure])
 
     def _axes(self, problem_phase: ProblemPhase, heading: float = 0.0) -> dict[str, Array]:
-        """The parameter of a piece on ground that leans: the axes of forces, and of feet where these
-        have that heading."""
+        """Return the parameter of a piece on ground that leans: the axes of forces, and of feet where these have that
+        heading.
+        """
         axes = ground_axes(self.stances[problem_phase.place].slope, heading)
         return {"axes": axes.ravel(order="F")} if self.leans else {}
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Assembly, Knot, NonlinearProgram
 from .stage_functions import StageFunction
@@ -108,8 +108,9 @@ def ballistic_flight(task: JumpTask, *, backward_steps: int = 0) -> tuple[float,
 def joint_torques(
     dynamics: ExactDynamics, time: Array, position: Array, velocity: Array, force: Array
 ) -> Array:
-    """The torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints),
-    by exact inverse dynamics under the planned contact forces (N, n_contacts, 3); zero at impacts."""
+    """Return the torques [N m] that a planned motion needs in the middle of its intervals, (N, n_joints), by exact
+    inverse dynamics under the planned contact forces (N, n_contacts, 3); zero at impacts.
+    """
     torque = np.zeros((len(time), velocity.shape[1] - 6))
     lasting = np.flatnonzero(np.diff(time) > 0.0)
     places, rates = dynamics.follow(half_steps(position, velocity, time, force, lasting))
@@ -138,12 +139,12 @@ class SimpleProblem(NonlinearProgram):
     end: Stance
 
     def state(self, values: Array, k: int) -> Array:
-        """The states of a knot."""
+        """Return the states of a knot."""
         start = self.assembly.state_start[k]
         return values[start : start + self.assembly.nx[k]]
 
     def control(self, values: Array, k: int) -> Array:
-        """The controls of a knot."""
+        """Return the controls of a knot."""
         start = self.assembly.control_start[k]
         return values[start : start + self.assembly.nu[k]]
 
@@ -192,7 +193,7 @@ class BoundsBuilder:
 
     def done(self, task: JumpTask, model: SymbolicModel, grid: Grid, start: Stance, end: Stance
              ) -> SimpleProblem:  # fmt: skip
-        """The program."""
+        """Return the program."""
         return SimpleProblem(
             self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
             self.parameters, self.families, task, model,

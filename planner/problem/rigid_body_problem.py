@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.robot_model import Stance
@@ -36,6 +35,7 @@ from ..models.symbolic_model import (
     base_angular_velocity,
     base_rotation,
 )
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, SimpleProblem, ballistic_flight, uniform_grid
@@ -51,7 +51,7 @@ SOURCES = (
 
 
 def parameter_sizes(model: SymbolicModel) -> dict[str, dict[str, int]]:
-    """The parameters ``w`` of every piece: name -> size, in order."""
+    """Return the parameters ``w`` of every piece: name -> size, in order."""
     contacts, legs = len(model.robot.contacts), len(model.limbs)
     weights = {"nominal": 3, "orientation": 1, "rates": 1, "acceleration": 1}
     return {
@@ -64,7 +64,7 @@ def parameter_sizes(model: SymbolicModel) -> dict[str, dict[str, int]]:
 
 
 def make_piece(model: SymbolicModel, name: str) -> StageFunction:
-    """The functions of a piece with exact derivatives."""
+    """Return the functions of a piece with exact derivatives."""
     import casadi as ca
 
     w = {key: ca.SX.sym(key, size) for key, size in parameter_sizes(model)[name].items()}
@@ -149,7 +149,7 @@ class RigidBodyProblemBuilder:
         self.ankles = {id(stance): ankles(model.robot, stance) for stance in (start, end)}
 
     def build(self) -> SimpleProblem:
-        """The problem with its bounds, parameters and guess."""
+        """Return the problem with its bounds, parameters and guess."""
         self.fill = BoundsBuilder(self._knots(), self.pieces, parameter_sizes(self.model))
         for k in range(self.last + 1):
             for name in self.fill.assembly.knots[k].pieces:

@@ -81,7 +81,7 @@ class IntermediateExpressions:
         self.expressions: list[Any] = []
 
     def __call__(self, expression: Any) -> Any:
-        """A symbol that stands for the expression from here on."""
+        """Return a symbol that stands for the expression from here on."""
         import casadi as ca
 
         dense = ca.densify(expression)
@@ -91,7 +91,7 @@ class IntermediateExpressions:
         return symbol
 
     def put_back(self, expressions: list[Any]) -> list[Any]:
-        """The expressions without the symbols."""
+        """Return the expressions without the symbols."""
         import casadi as ca
 
         if not self.symbols:
@@ -99,7 +99,7 @@ class IntermediateExpressions:
         return list(ca.substitute(expressions, [self._symbol], [self._expression]))
 
     def jacobian(self, rows: Any, variables: Any) -> Any:
-        """The whole derivative of rows by the variables."""
+        """Return the whole derivative of rows by the variables."""
         import casadi as ca
 
         direct = ca.jacobian(rows, variables)
@@ -109,7 +109,7 @@ class IntermediateExpressions:
         return self.put_back([direct + through])[0]
 
     def hessian(self, value: Any, variables: Any) -> tuple[Any, Any]:
-        """The whole second derivative of a value by the variables, and the first."""
+        """Return the whole second derivative of a value by the variables, and the first."""
         import casadi as ca
 
         if not self.symbols:
@@ -162,9 +162,10 @@ def flight_interval(
     model: SymbolicModel, coordinates: Coordinates,
     q: Expression, v: Expression, h: Expression, a: Expression, r: Expression, lift: IntermediateExpressions,
 ) -> FlightInterval:  # fmt: skip
-    """The interval of ``h`` seconds that begins with the reduced state ``q``, ``v``; ``a`` are the
-    mean accelerations, of the joints the constant ones, and ``r`` the angles' rates in the middle.
-    Positions and velocities at its end and in its middle are lifted."""
+    """Return the interval of ``h`` seconds that begins with the reduced state ``q``, ``v``; ``a`` are the mean
+    accelerations, of the joints the constant ones, and ``r`` the angles' rates in the middle. Positions and velocities
+    at its end and in its middle are lifted.
+    """
     import casadi as ca
 
     turning = list(coordinates.turning)
@@ -211,7 +212,7 @@ def flight_interval(
 
 
 def _copied(expression: Expression) -> Expression:
-    """An expression whose elements may be replaced."""
+    """Return an expression whose elements may be replaced."""
     import casadi as ca
 
     return ca.vertcat(*ca.vertsplit(ca.densify(expression)))
@@ -242,7 +243,7 @@ class StageFunction:
 
 
 def parameter_sizes(coordinates: Coordinates, sloped: bool = False) -> dict[str, dict[str, int]]:
-    """The parameters ``w`` of every piece, or of those for ``sloped`` ground: name -> size, in order.
+    """Return the parameters ``w`` of every piece, or of those for ``sloped`` ground: name -> size, in order.
 
     ``axes`` are columns of the ground's axes, of the ``contact`` piece along and across the feet.
     Planes are c0, c1, c2 of heights c0 + c1 x + c2 y.
@@ -281,7 +282,7 @@ COORDINATES: Mapping[str, Callable[[SymbolicModel], Coordinates | None]] = {
 
 
 def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
-    """The coordinates of that name. Raises ``ValueError`` where the robot has none."""
+    """Return the coordinates of that name. Raises ``ValueError`` where the robot has none."""
     chosen = COORDINATES[name](model)
     if chosen is None:
         raise ValueError(f"{model.robot.name} is not the same left and right")
@@ -294,8 +295,9 @@ def piece_expressions(
     name: str,
     lifted: IntermediateExpressions | None = None,
 ) -> tuple[Any, Any, Any, Any]:
-    """The symbols ``z`` and ``w`` of a piece, its cost and its rows; with ``lifted`` in terms of
-    what is lifted there, too."""
+    """Return the symbols ``z`` and ``w`` of a piece, its cost and its rows; with ``lifted`` in terms of what is lifted
+    there, too.
+    """
     import casadi as ca
 
     lift = IntermediateExpressions() if lifted is None else lifted
@@ -331,7 +333,7 @@ def _interval(
     model: SymbolicModel, coordinates: Coordinates, name: str, q: Any, v: Any,
     w: Mapping[str, Any], lift: IntermediateExpressions,
 ) -> tuple[list[Any], Any, list[Any]]:  # fmt: skip
-    """The symbols, the cost and the rows of an interval on the ground or in the air."""
+    """Return the symbols, the cost and the rows of an interval on the ground or in the air."""
     import casadi as ca
 
     a, state = ca.SX.sym("a", coordinates.size), ca.SX.sym("h")
@@ -393,7 +395,7 @@ def _motor_rows(
 def _impact(
     model: SymbolicModel, coordinates: Coordinates, q: Any, v: Any, w: Mapping[str, Any]
 ) -> tuple[list[Any], Any, list[Any]]:
-    """The symbols, the cost and the rows of touchdown."""
+    """Return the symbols, the cost and the rows of touchdown."""
     import casadi as ca
 
     change, F = ca.SX.sym("dv", coordinates.size), ca.SX.sym("F", coordinates.forces)
@@ -408,14 +410,14 @@ def _impact(
 
 
 def _in_world(force: Any, w: Mapping[str, Any]) -> Any:
-    """A force along the ground's axes in the world."""
+    """Return a force along the ground's axes in the world."""
     import casadi as ca
 
     return ca.mtimes(ca.reshape(w["axes"], 3, 3), force) if "axes" in w else force
 
 
 def _motor_speeds(model: SymbolicModel, coordinates: Coordinates, velocity: Any) -> Any:
-    """The speeds of the motors of those joints that are computed."""
+    """Return the speeds of the motors of those joints that are computed."""
     import casadi as ca
 
     geared = model.robot.joint_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
@@ -424,7 +426,7 @@ def _motor_speeds(model: SymbolicModel, coordinates: Coordinates, velocity: Any)
 
 
 def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
-    """The friction pyramid's rows of every contact point."""
+    """Return the friction pyramid's rows of every contact point."""
     rows = []
     for c in coordinates.contacts:
         reach = friction * forces[3 * c + 2]
@@ -469,7 +471,7 @@ def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, cha
 
 
 def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> StageFunction:
-    """The functions of a piece with exact derivatives."""
+    """Return the functions of a piece with exact derivatives."""
     lifted = IntermediateExpressions()
     return derived(
         f"{coordinates.name}_{name}", *piece_expressions(model, coordinates, name, lifted), lifted
@@ -479,8 +481,9 @@ def make_piece(model: SymbolicModel, coordinates: Coordinates, name: str) -> Sta
 def derived(
     prefix: str, z: Any, w: Any, cost: Any, rows: Any, lifted: IntermediateExpressions | None = None
 ) -> StageFunction:
-    """A piece from its symbols ``z`` and ``w``, its cost and its rows, which may be written in
-    terms of what is ``lifted``."""
+    """Return a piece from its symbols ``z`` and ``w``, its cost and its rows, which may be written in terms of what is
+    ``lifted``.
+    """
     import casadi as ca
 
     lift = IntermediateExpressions() if lifted is None else lifted
@@ -524,9 +527,10 @@ def _contact_velocities(
     model: SymbolicModel, coordinates: Coordinates, q: Any, v: Any, w: Mapping[str, Any],
     errors: Any,
 ) -> Any:  # fmt: skip
-    """The velocities of the place errors, which die out at ``DRIFT_RATE``. Out of the sagittal plane those of a ball
-    along the ground are the velocities of its material where it touches: how far it has rolled follows from no
-    attitude then, and a leg that yaws while its knee stretches would slip by the difference."""
+    """Return the velocities of the place errors, which die out at ``DRIFT_RATE``. Out of the sagittal plane those of a
+    ball along the ground are the velocities of its material where it touches: how far it has rolled follows from no
+    attitude then, and a leg that yaws while its knee stretches would slip by the difference.
+    """
     import casadi as ca
 
     rates = ca.jtimes(errors, q, v)

@@ -87,7 +87,7 @@ class ContactRows:
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
-        """The rows of points that say what no row before them does, nor those of the others."""
+        """Return the rows of points that say what no row before them does, nor those of the others."""
         places = tuple(map(tuple, self._place.tolist()))
         found = _independent(self._foot, places, self._axes, frozenset(points), frozenset(others))
         return np.array(found, dtype=np.int64)
@@ -138,7 +138,7 @@ must be drawn up to the falling body first, and then stretched at once."""
 
 
 def _along_feet(stance: Stance) -> Array:
-    """The contact points of a stance in axes along its heading, across it and normal to the ground."""
+    """Return the contact points of a stance in axes along its heading, across it and normal to the ground."""
     return np.asarray(stance.points @ ground_axes(stance.slope, stance.heading))
 
 
@@ -146,7 +146,7 @@ class Structure:
     """The knots of a task's problem in those coordinates.
 
     Attributes:
-        problem_phases: the phases with their intervals; ``of_knot`` that of every interval.
+        stretches: the phases with their intervals; ``of_knot`` that of every interval.
         given: by knot the variables that are given there, their values and families.
         knots: all of them, the end included.
     """
@@ -259,7 +259,7 @@ class Structure:
             knot.fixed = tuple(i for i, _, _ in given)
 
     def idle(self, problem_phase: ProblemPhase) -> list[int]:
-        """The contact variables' points that are not on the ground in a stance."""
+        """Return the contact variables' points that are not on the ground in a stance."""
         if problem_phase.flies:
             return []
         on = reduced_contacts(self.coordinates, problem_phase.contacts)
@@ -305,8 +305,9 @@ class Structure:
         return np.concatenate([velocities, self.contact_rows.places(now, held)])
 
     def touchdown_speeds(self) -> list[float | None]:
-        """The most [m/s] that a point may move where it hits the ground: along the foot, across it
-        (not in the sagittal plane) and downwards."""
+        """Return the most [m/s] that a point may move where it hits the ground: along the foot, across it (not in the
+        sagittal plane) and downwards.
+        """
         margins, sideways = self.task.margins, len(self.coordinates.axes) - 1
         if margins is None:
             return [None] * (sideways + 1)
@@ -325,11 +326,11 @@ class Structure:
         return np.concatenate([np.arange(points), ahead, np.arange(2 * points, rows)])
 
     def phase_at(self, k: int) -> ProblemPhase:
-        """The phase of the interval that begins with a knot; at the end that of the last one."""
+        """Return the phase of the interval that begins with a knot; at the end that of the last one."""
         return self.of_knot[min(k, len(self.of_knot) - 1)]
 
     def hop_at(self, k: int) -> tuple[Hop, StanceLocation, float | None]:
-        """The jump under way at a knot, or the last one; where it began, and its step's edge."""
+        """Return the jump under way at a knot, or the last one; where it began, and its step's edge."""
         number = min(self.phase_at(k).place, len(self.hops) - 1)
         return self.hops[number], self.places[number], self._edges[number]
 
@@ -366,7 +367,7 @@ class Structure:
         return landed and not problem_phase.flies and not problem_phase.impact
 
     def step_under(self, k: int) -> tuple[float, float | None]:
-        """The step's height and its edge under a flight."""
+        """Return the step's height and its edge under a flight."""
         place = self.of_knot[k].place
         hop = self.hops[place]
         return step_of(hop, self.places[place]), self._edges[place]

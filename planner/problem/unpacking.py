@@ -74,7 +74,7 @@ def means_over(instants: Array, time: Array, values: Array) -> Array:
 
 
 def knot_times(problem: FullProblem, values: Array) -> Array:
-    """The time of every knot [s]."""
+    """Return the time of every knot [s]."""
     n, assembly = problem.coordinates.size, problem.assembly
     steps = problem.steps.copy()
     for problem_phase in problem.problem_phases:
@@ -86,7 +86,7 @@ def knot_times(problem: FullProblem, values: Array) -> Array:
 
 
 def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
-    """The arrays of a plan, and its lift-off and touchdown times."""
+    """Return the arrays of a plan, and its lift-off and touchdown times."""
     assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
     times = knot_times(problem, values)
@@ -257,7 +257,7 @@ class _Evaluator:
         self._buffer.set_res(0, self._found.data)
 
     def __call__(self, *given: Array) -> Array:
-        """The results (count, n) of rows (count, n) for each argument."""
+        """Return the results (count, n) of rows (count, n) for each argument."""
         for own, values in zip(self._given, given, strict=True):
             own[:] = values
         self._run()

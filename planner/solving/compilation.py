@@ -85,8 +85,7 @@ UNUSED = {"profiles", "profile", "sensors", "standing", "held", "points", "text"
 def content_hash(
     robot: RobotDescription, name: str, sources: tuple[str, ...] = SOURCES, more: object = None
 ) -> str:
-    """The name of a library: the same for the same content; ``more`` is anything else that decides
-    it."""
+    """Return the name of a library: the same for the same content; ``more`` is anything else that decides it."""
     need_planner()
     import casadi as ca
 
@@ -108,8 +107,7 @@ def load_pieces(
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, StageFunction]:
-    """The named pieces' functions, compiled where there is a compiler and ``compiled`` asks for
-    it."""
+    """Return the named pieces' functions, compiled where there is a compiler and ``compiled`` asks for it."""
     functions = FunctionSet(
         coordinates.name, names, SOURCES, lambda name: make_piece(model, coordinates, name)
     )
@@ -123,7 +121,7 @@ def load_functions(
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> dict[str, StageFunction]:
-    """The same for any set of pieces."""
+    """Return the same for any set of pieces."""
     key = content_hash(model.robot, functions.name, functions.sources, model.loads)
     held = _held.setdefault((key, compiled), {})
     missing = tuple(name for name in functions.pieces if name not in held)
@@ -203,7 +201,7 @@ def _external(library: Path, prefix: str) -> StageFunction:
 
 @lru_cache(maxsize=1)
 def find_compiler() -> str | None:
-    """The C compiler; ``None`` where there is none."""
+    """Return the C compiler; ``None`` where there is none."""
     return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 
 

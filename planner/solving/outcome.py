@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.program import SimpleProblem, joint_torques
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .solver import Solution
@@ -55,7 +55,7 @@ def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
 
 
 def failure(task: JumpTask, solution: Solution) -> PlanError:
-    """The error of a task without a solution, with what to do about it."""
+    """Return the error of a task without a solution, with what to do about it."""
     family = solution.family
     advice = ADVICE.get(family, "ask for a smaller jump, or change the durations")
     reason = (
@@ -79,7 +79,7 @@ def versions() -> dict[str, str]:
 def motion_arrays(
     problem: SimpleProblem, steps: Array, position: Array, velocity: Array, force: Array
 ) -> dict[str, Any]:
-    """The motion at the knots, with accelerations by differences and torques by exact dynamics.
+    """Return the motion at the knots, with accelerations by differences and torques by exact dynamics.
 
     Args:
         steps: the intervals' lengths [s], (knots - 1,).
@@ -106,7 +106,7 @@ def motion_arrays(
 
 
 def for_all_joints(plan: PlannedJump, part: WeldedRobot, robot: RobotDescription) -> PlannedJump:
-    """A plan of the welded robot as one of the whole robot.
+    """Return a plan of the welded robot as one of the whole robot.
 
     Held joints keep their angle. Their torques are what exact dynamics needs to keep them there.
     """
@@ -128,7 +128,7 @@ def for_all_joints(plan: PlannedJump, part: WeldedRobot, robot: RobotDescription
 
 
 def for_moving_joints(plan: PlannedJump, part: WeldedRobot) -> PlannedJump:
-    """A plan of the whole robot as one of the welded robot, to start a solver from."""
+    """Return a plan of the whole robot as one of the welded robot, to start a solver from."""
     if not part.held:
         return plan
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
@@ -14,6 +13,7 @@ from ..models.robot_model import model_of, stances_of
 from ..problem import paper_problem as stages
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import SimpleProblem
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions
@@ -32,7 +32,7 @@ def paper_problem(
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> SimpleProblem:
-    """The paper's problem of a task.
+    """Return the paper's problem of a task.
 
     Raises:
         PlanError: the task asks for what the paper's formulation has not.
@@ -47,7 +47,7 @@ def paper_problem(
 
 
 def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
-    """The plan of a task as the paper would make it; see ``solve_jump``.
+    """Return the plan of a task as the paper would make it; see ``solve_jump``.
 
     A ``warm_start`` is not used. IPOPT is tried first: the equations have index three, as the
     centre of mass is tied to the joints by position, and fatrop more often ends early.
@@ -70,8 +70,9 @@ def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) 
 
 
 def unpack(problem: SimpleProblem, values: Array, robot: RobotDescription) -> dict[str, Any]:
-    """The arrays of a plan. Centre of mass and momentum are the paper's variables r, rdot and h;
-    the torques follow from exact inverse dynamics and nothing limits them."""
+    """Return the arrays of a plan. Centre of mass and momentum are the paper's variables r, rdot and h; the torques
+    follow from exact inverse dynamics and nothing limits them.
+    """
     model, grid = problem.model, problem.grid
     n, nv, count = model.size + 1, model.size, problem.knots
     states = np.array([problem.state(values, k) for k in range(count)])

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
@@ -27,6 +26,7 @@ from ..problem import rigid_body_problem as stages
 from ..problem.program import SimpleProblem
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions
@@ -51,7 +51,7 @@ class FeetPath:
         self.blend = min(BLEND, 0.5 * (times[1] - times[0]))
 
     def at(self, time: float, com: Array) -> tuple[Array, float]:
-        """The points (n_contacts, 3) and the feet's heading when the centre of mass is at ``com``."""
+        """Return the points (n_contacts, 3) and the feet's heading when the centre of mass is at ``com``."""
         first, last = self.stances
         if time <= self.times[0]:
             return first.points, first.heading
@@ -71,12 +71,12 @@ class FeetPath:
         return np.asarray(self.stances[which].points.mean(axis=0) - self.com[which])
 
     def _shape(self) -> Array:
-        """The points from their middle, at heading zero."""
+        """Return the points from their middle, at heading zero."""
         first = self.stances[0]
         return np.asarray((first.points - first.points.mean(axis=0)) @ _turned(first.heading))
 
     def _coast(self, time: float) -> float:
-        """The way of a speed of one that dies out over the blend, 1 - 3 u^2 + 2 u^3 of it."""
+        """Return the way of a speed of one that dies out over the blend, 1 - 3 u^2 + 2 u^3 of it."""
         u = min(time / self.blend, 1.0)
         return self.blend * (u - u**3 + 0.5 * u**4)
 
@@ -110,7 +110,7 @@ class WholeBodyPose:
         )  # fmt: skip
 
     def find(self, q: Array, given: Array) -> Array:
-        """The pose near ``q`` that has its attitude.
+        """Return the pose near ``q`` that has its attitude.
 
         Raises:
             PlanError: the legs do not reach, or a joint would have to pass its limit.
@@ -136,7 +136,7 @@ class WholeBodyPose:
         return q
 
     def rates(self, q: Array, turning: Array, given: Array, given_rates: Array) -> Array:
-        """The coordinates' rates at that pose for the torso's rates of pitch, roll and yaw."""
+        """Return the coordinates' rates at that pose for the torso's rates of pitch, roll and yaw."""
         _, jacobian, slope = (np.array(x) for x in self._errors(q, given))
         known = jacobian[:, 3:6] @ turning + slope @ given_rates
         v = np.zeros(self.model.size)
@@ -186,7 +186,7 @@ def rigid_body_problem(
     compiled: bool = True,
     progress: Progress | None = None,
 ) -> tuple[SimpleProblem, RigidBody]:
-    """The single rigid body's problem of a task, and the body.
+    """Return the single rigid body's problem of a task, and the body.
 
     Raises:
         PlanError: the task asks for what the formulation has not.
@@ -203,7 +203,7 @@ def rigid_body_problem(
 
 
 def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
-    """The plan of a task for a single rigid body; see ``solve_jump``. A ``warm_start`` is not used.
+    """Return the plan of a task for a single rigid body; see ``solve_jump``. A ``warm_start`` is not used.
 
     Raises:
         PlanError: no motion was found, or the robot's legs cannot follow it.
@@ -226,8 +226,9 @@ def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOpti
 def unpack(
     problem: SimpleProblem, body: RigidBody, values: Array, robot: RobotDescription
 ) -> dict[str, Any]:
-    """The arrays of a plan. The angular momentum is the rigid body's, R I w; the robot's own, which
-    its legs change, follows from positions and velocities. Torques are by exact inverse dynamics."""
+    """Return the arrays of a plan. The angular momentum is the rigid body's, R I w; the robot's own, which its legs
+    change, follows from positions and velocities. Torques are by exact inverse dynamics.
+    """
     grid, count = problem.grid, problem.knots
     states = np.array([problem.state(values, k)[:STATES] for k in range(count)])
     steps = grid.steps.copy()

@@ -18,7 +18,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
@@ -38,6 +37,7 @@ from ..problem.stage_functions import PIECES, SLOPED, SLOPED_PIECES, make_coordi
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
 from ..task.files import JumpTaskError, PlanError, need_planner
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES, Hop
@@ -58,7 +58,7 @@ COLD_LIMIT, WARM_LIMIT = 250, 100
 
 
 def relaxed(problem: FullProblem, relaxation: float) -> FullProblem:
-    """The problem with motor limits ``relaxation`` times as high."""
+    """Return the problem with motor limits ``relaxation`` times as high."""
     motors = np.array([family.startswith("motor") for family in problem.families])
     scale = np.where(motors, relaxation, 1.0)
     return replace(
@@ -67,8 +67,7 @@ def relaxed(problem: FullProblem, relaxation: float) -> FullProblem:
 
 
 def tighten(problem: FullProblem, values: Array, relaxation: float) -> Solution | None:
-    """A solution of the problem, from one of the problem relaxed so much; ``None`` if none is
-    reached."""
+    """Return a solution of the problem, from one of the problem eased so much; ``None`` if none is reached."""
     step, found = FIRST_STEP, None
     iterations, cpu = 0, 0.0
     while relaxation > 1.0 or found is None:
@@ -85,7 +84,7 @@ def tighten(problem: FullProblem, values: Array, relaxation: float) -> Solution 
 
 
 def from_relaxed(problem: FullProblem, guess: Array) -> Solution | None:
-    """A solution of the problem from a rough guess, by way of relaxed ones."""
+    """Return a solution of the problem from a rough guess, by way of eased ones."""
     for relaxation in RELAXATIONS:
         first = solve(relaxed(problem, relaxation), guess, solver="fatrop", limit=COLD_LIMIT)
         if first.solved:
@@ -96,7 +95,7 @@ def from_relaxed(problem: FullProblem, guess: Array) -> Solution | None:
 
 
 def with_impacts(plan: PlannedJump) -> PlannedJump:
-    """A plan whose feet arrive at rest with an impact of no impulse after every flight."""
+    """Return a plan whose feet arrive at rest with an impact of no impulse after every flight."""
     flying = np.append(plan.phase[:-1] == 3, False)
     touchdowns = np.flatnonzero(flying[:-1] & ~flying[1:]) + 1
     arrays = {
@@ -147,7 +146,7 @@ def finer_knots(plan: PlannedJump) -> Knots:
 
 
 def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
-    """The task on those numbers of intervals; phases that name their own change in proportion."""
+    """Return the task on those numbers of intervals; phases that name their own change in proportion."""
     changed: dict[str, object] = {"knots": knots}
     if task.phases is not None and knots != task.knots:
         more = knots.total / task.knots.total
@@ -192,7 +191,7 @@ def solve_jump(
     knots: Knots | None = None,
     quick: bool = False,
 ) -> PlannedJump:
-    """The plan of a task, in the formulation that it names; ``SolveOptions`` explains the rest.
+    """Return the plan of a task, in the formulation that it names; ``SolveOptions`` explains the rest.
 
     Joints that the robot's description holds keep still. The result does not depend on the number
     of threads.
@@ -224,7 +223,7 @@ def solve_jump(
 
 
 def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
-    """The ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
+    """Return the ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = cpu_time()
     warm_start, solver = options.warm_start, options.solver
     knots = options.knots
@@ -307,7 +306,7 @@ def make_problem(
     progress: Progress | None = None,
     coordinates: str = "",
 ) -> FullProblem:
-    """The problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
+    """Return the problem of a task in the ``full`` formulation, in the sagittal plane where the task stays in it.
 
     Elsewhere times on the ground that are free are those of the same jumps straight ahead and
     without impacts: with all coordinates and such times fatrop does not come to an end.
@@ -374,7 +373,7 @@ def _builder(
 
 
 def _mirrors(task: JumpTask) -> tuple[str, ...]:
-    """The coordinates to try for a task, the smallest first, before all of the robot's."""
+    """Return the coordinates to try for a task, the smallest first, before all of the robot's."""
     # An impact leaves motors that keep still without an impulse, which a plane cannot tell.
     straight = all(not hop.distance_y and not hop.twist for hop in task.hops())
     return ("sagittal", "mirrored") if straight else ()
@@ -384,7 +383,7 @@ def _choose(
     model: SymbolicModel, names: tuple[str, ...], stances: tuple[Stance, ...],
     problem_phases: tuple[ProblemPhase, ...],
 ) -> Coordinates | None:  # fmt: skip
-    """The first of these coordinates that the stances and the contacts allow."""
+    """Return the first of these coordinates that the stances and the contacts allow."""
     every = np.array([stance.coordinates for stance in stances])
     for name in names:
         try:
@@ -401,8 +400,9 @@ def with_ground_times(
     task: JumpTask, robot: RobotDescription, *, compiled: bool = True,
     progress: Progress | None = None,
 ) -> JumpTask:  # fmt: skip
-    """The task with all times on the ground given: those that are free are found for the same
-    jumps straight ahead, or are usual ones where these cannot be planned."""
+    """Return the task with all times on the ground given: those that are free are found for the same jumps straight
+    ahead, or are usual ones where these cannot be planned.
+    """
     times = [USUAL_TIMES.get(PHASES[phase_spec.phase], 0.0) for phase_spec in task.phase_specs()]
     straight = straight_ahead(task).model_copy(update={"impact": False})
     usual = with_times(straight, times)
@@ -416,7 +416,7 @@ def with_ground_times(
 
 
 def with_times(task: JumpTask, times: list[float]) -> JumpTask:
-    """The task with those times [s] of its phases where they are free, except for flights."""
+    """Return the task with those times [s] of its phases where they are free, except for flights."""
     phases = tuple(
         phase_spec if phase_spec.phase == "flight" or phase_spec.time is not None
         else phase_spec.model_copy(update={"time": round(time, 6)})
@@ -426,8 +426,7 @@ def with_times(task: JumpTask, times: list[float]) -> JumpTask:
 
 
 def straight_ahead(task: JumpTask) -> JumpTask:
-    """The same jumps without their sideways displacements and twists, on ground that does not lean
-    sideways."""
+    """Return the same jumps without their sideways displacements and twists, on ground that does not lean sideways."""
 
     def changed(jump: JumpTask | Hop) -> dict[str, object]:
         slopes = {
@@ -442,7 +441,7 @@ def straight_ahead(task: JumpTask) -> JumpTask:
 
 
 def in_place(task: JumpTask) -> JumpTask:
-    """A row of as many jumps in place, if all of them are on level ground; else the row itself."""
+    """Return a row of as many jumps in place, if all of them are on level ground; else the row itself."""
     if task.leans or any(hop.landing_height or hop.gap for hop in task.hops()):
         return task
     still = {"distance_x": 0.0, "distance_y": 0.0, "twist": 0.0}
@@ -451,8 +450,9 @@ def in_place(task: JumpTask) -> JumpTask:
 
 
 def _barrier(problem: FullProblem) -> float:
-    """The barrier's parameter for starts from another plan. With all coordinates such a plan is further
-    from the solution, and a higher barrier takes a fifth fewer iterations."""
+    """Return the barrier's parameter for starts from another plan. With all coordinates such a plan is further from the
+    solution, and a higher barrier takes a fifth fewer iterations.
+    """
     return 1e-3 if problem.coordinates.name == "full" else NEAR
 
 
@@ -469,8 +469,9 @@ def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
 
 
 def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
-    """A guess from a simpler jump that can be solved: the same straight ahead, of the robot or of its mirrored twin;
-    or, where that needs all coordinates, too, one in place on level ground."""
+    """Return a guess from a simpler jump that can be solved: the same straight ahead, of the robot or of its mirrored
+    twin; or, where that needs all coordinates, too, one in place on level ground.
+    """
     if problem.coordinates.name != "full":
         return None
     straight, twin = straight_ahead(problem.task), twin_model_of(robot) is not None
@@ -490,7 +491,7 @@ def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
 
 
 def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Solution | None:
-    """A somersault by way of stronger motors; one with impacts also by way of one without."""
+    """Return a somersault by way of stronger motors; one with impacts also by way of one without."""
     found = from_relaxed(problem, guess)
     if found is not None or not problem.task.impact:
         return found

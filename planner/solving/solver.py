@@ -58,8 +58,8 @@ def solve(
     last: int = LIMIT,
     other_guess: Callable[[], Array | None] = lambda: None,
 ) -> Solution:
-    """The first solution found, or the least violated attempt: fatrop from the other guess, which is
-    nearer, fatrop from the guess, IPOPT from the guess.
+    """Return the first solution found, or the least violated attempt: fatrop from the other guess, which is nearer,
+    fatrop from the guess, IPOPT from the guess.
 
     ``warm`` says that the guess is near the solution, and ``barrier`` is the parameter of the logarithmic
     barrier to begin with near it; ``solver`` insists on one of them. ``limit`` is how many iterations each attempt
@@ -121,7 +121,7 @@ def time_limit(assembly: Assembly, limit: int) -> int:
 
 
 def violation_of(problem: NonlinearProgram, values: Array, constraint: Any) -> tuple[float, str]:
-    """The largest violation of a constraint or bound, and the family it belongs to."""
+    """Return the largest violation of a constraint or bound, and the family it belongs to."""
     if not np.isfinite(values).all():
         return np.inf, "dynamics"
     rows = np.array(constraint(values, problem.parameters)).ravel()
@@ -137,7 +137,7 @@ _solvers: OrderedDict[object, tuple[Any, Any, Any]] = OrderedDict()
 
 
 def _solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
-    """A solver for problems of this structure, with the functions of cost and constraints."""
+    """Return a solver for problems of this structure, with the functions of cost and constraints."""
     key = (assembly.signature, name, barrier, limit)
     if key in _solvers:
         _solvers.move_to_end(key)

@@ -27,8 +27,9 @@ PART_OF_KNOTS = 0.67
 
 
 def contact_points(robot: RobotDescription, words: str | Iterable[str]) -> tuple[int, ...]:
-    """The contact points that one of the words means: ``all``; else those whose names contain it; else, for
-    ``fore``, ``hind``, ``left`` and ``right``, those on that side of the standing robot. Empty where there is none."""
+    """Return the contact points that one of the words means: ``all``; else those whose names contain it; else, for
+    ``fore``, ``hind``, ``left`` and ``right``, those on that side of the standing robot. Empty where there is none.
+    """
     found = set[int]()
     for word in (words,) if isinstance(words, str) else words:
         named = {k for k, c in enumerate(robot.contacts) if word in (ALL, c.name) or word in c.name}
@@ -43,7 +44,8 @@ def contact_points(robot: RobotDescription, words: str | Iterable[str]) -> tuple
 def in_turn(
     whole: Mapping[str, Any], lifted: Mapping[str, float], knots: int, *, landing: bool
 ) -> list[dict[str, Any]]:
-    """A phase on the ground in parts, as keywords of ``PhaseSpec``: one on all contact points and one for each time.
+    """Return a phase on the ground in parts, as keywords of ``PhaseSpec``: one on all contact points and one for each
+    time.
 
     Args:
         whole: the keywords of the phase; its ``time`` [s] may be ``None``.

@@ -43,14 +43,14 @@ class _Edges:
     ranges: tuple[GroundRange, ...]
 
     def with_edge(self, at: float, forward: bool, place: StanceLocation) -> _Edges:
-        """The ground whose whole part beyond an edge is that of another place."""
+        """Return the ground whose whole part beyond an edge is that of another place."""
         low, high = (at, math.inf) if forward else (-math.inf, at)
         kept = [(a, min(b, at), z) if forward else (max(a, at), b, z)
                 for a, b, z in self.ranges if (a < at if forward else b > at)]  # fmt: skip
         return _Edges(self.axis, _sorted([*kept, (low, high, place)]))
 
     def with_gap(self, low: float, high: float, height: float) -> _Edges:
-        """The ground with another height between two places."""
+        """Return the ground with another height between two places."""
         kept = [(max(a, c), min(b, d), z) for a, b, z in self.ranges
                 for c, d in ((-math.inf, low), (high, math.inf))]  # fmt: skip
         found = [ground_range for ground_range in kept if ground_range[0] < ground_range[1]]
@@ -58,7 +58,7 @@ class _Edges:
         return _Edges(self.axis, _sorted([*found, (low, high, bottom)]))
 
     def height(self, x: float, y: float) -> float:
-        """The height of the ground there [m]."""
+        """Return the height of the ground there [m]."""
         at = (x, y)[self.axis]
         place = next(place for low, high, place in self.ranges if low <= at <= high)
         return float(place.height(x, y))
@@ -74,7 +74,7 @@ def _sorted(ranges: list[GroundRange]) -> tuple[GroundRange, ...]:
 
 
 def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
-    """The scene for the simulator (``hal.MujocoRobot``): ``flat``, or a floor with boxes.
+    """Return the scene for the simulator (``hal.MujocoRobot``): ``flat``, or a floor with boxes.
 
     Each jump that lands higher or lower puts an edge under its flight, at ``step_edge`` or midway:
     along x, or along y where it goes aside only. Boxes reach 1.5 m beyond an edge where no other
@@ -115,7 +115,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
 
 
 def _stairs(task: JumpTask, robot: RobotDescription) -> dict[str, Any]:
-    """The task's stairs as data; every foot stands on one of them."""
+    """Return the task's stairs as data; every foot stands on one of them."""
     stairs = task.stairs
     assert stairs is not None
     for number, place in enumerate(task.places()):
@@ -191,7 +191,7 @@ def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, 
 
 
 def _scene(ground: _Edges, places: tuple[StanceLocation, ...]) -> dict[str, Any]:
-    """The ground as data: what is higher than the lowest part is a box on the floor."""
+    """Return the ground as data: what is higher than the lowest part is a box on the floor."""
     floor = min(_round(place.z) for _, _, place in ground.ranges)
     boxes = [
         {"x": x, "y": y, "top": _round(place.z), "bottom": floor}
@@ -204,7 +204,7 @@ def _scene(ground: _Edges, places: tuple[StanceLocation, ...]) -> dict[str, Any]
 def _leaning_scene(
     robot: RobotDescription, ground: _Edges, places: tuple[StanceLocation, ...]
 ) -> dict[str, Any]:
-    """The ground as data where it leans. ``uneven`` is what the ground rises under the feet at the end."""
+    """Return the ground as data where it leans. ``uneven`` is what the ground rises under the feet at the end."""
     extents = list(_extents(ground, places))
     lowest = min(float(p.height(a, b)) for x, y, p in extents for a in x for b in y)
     floor = _round(lowest - GAP_DEPTH)
@@ -222,7 +222,7 @@ def _leaning_scene(
 def _extents(
     ground: _Edges, places: tuple[StanceLocation, ...]
 ) -> Iterator[tuple[list[float], list[float], StanceLocation]]:
-    """From where to where each of the ranges reaches along x and along y [m]."""
+    """From where to where each stretch reaches along x and along y [m]."""
     along = [(p.x, p.y)[ground.axis] for p in places]
     aside = [(p.y, p.x)[ground.axis] for p in places]
     side = [_round(min(aside) - WIDTH), _round(max(aside) + WIDTH)]

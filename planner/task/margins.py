@@ -73,12 +73,12 @@ class Margins(Parameters):
 
 
 def unknown_joints(margins: Margins, names: list[str]) -> list[str]:
-    """The keys of ``landing_limits`` that no joint has."""
+    """Return the keys of ``landing_limits`` that no joint has."""
     return [key for key in margins.landing_limits if not any(_means(key, name) for name in names)]
 
 
 def joint_bounds(robot: RobotDescription, margins: Margins, landed: bool) -> Array:
-    """The joints' limits in a plan [rad], (n_joints, 2)."""
+    """Return the joints' limits in a plan [rad], (n_joints, 2)."""
     bounds = robot.joint_limits + np.array([margins.joints, -margins.joints])
     if landed:
         for key, (low, high) in margins.landing_limits.items():

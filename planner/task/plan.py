@@ -125,11 +125,11 @@ class PlannedJump:
         return bool(self.report.get("valid", False))
 
     def knot_at(self, time: float) -> int:
-        """The last knot at or before ``time``, but for rounding."""
+        """Return the last knot at or before ``time``, but for rounding."""
         return max(0, int(np.searchsorted(self.time, time + 1e-9, side="right")) - 1)
 
     def with_report(self, report: Mapping[str, Any]) -> PlannedJump:
-        """The same plan with that validity report."""
+        """Return the same plan with that validity report."""
         return replace(self, report=dict(report))
 
 
@@ -152,7 +152,7 @@ _SCALARS = tuple(f.name for f in fields(PlannedJump) if f.name not in (*ARRAYS, 
 
 
 def plan_bytes(plan: PlannedJump, names: Mapping[str, list[str]] | None = None) -> bytes:
-    """The plan's file.
+    """Return the plan's file.
 
     The same task gives the same bytes, also from another process: no time of day, no processor
     time and no machine's name is in it.
@@ -175,7 +175,7 @@ def plan_bytes(plan: PlannedJump, names: Mapping[str, list[str]] | None = None) 
 
 
 def motor_load(time: Array, joint_torque: Array, robot: RobotDescription) -> dict[str, float]:
-    """The integral of the squared torque of every motor over a motion [N^2 m^2 s], by its name.
+    """Return the integral of the squared torque of every motor over a motion [N^2 m^2 s], by its name.
 
     Args:
         time: of the knots [s], (n,).
@@ -214,7 +214,7 @@ def task_of_header(header: Mapping[str, Any], where: str = "task") -> JumpTask:
 
 
 def read_plan(path: str | Path) -> PlannedJump:
-    """The plan in a file.
+    """Return the plan in a file.
 
     Raises:
         PlanFileError: there is no file, it is broken, or it is of another format.

@@ -32,7 +32,7 @@ from .task import JumpTask, make_task
 
 
 def read_task(path: str | Path) -> JumpTask:
-    """The task in a YAML file; its name is the file's where it has none.
+    """Return the task in a YAML file; its name is the file's where it has none.
 
     Raises:
         JumpTaskError: the file cannot be read, a value is wrong, or what is asked for contradicts
@@ -58,8 +58,8 @@ INSTEAD = ("rise", "take_off_speed")
 
 
 def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
-    """The task in a file with some of its parameters changed, also single ones inside ``margins``,
-    ``weights`` and ``knots``.
+    """Return the task in a file with some of its parameters changed, also single ones inside ``margins``, ``weights``
+    and ``knots``.
 
     Raises:
         JumpTaskError: the file cannot be read as a task, or a change is wrong, or they contradict each
@@ -89,7 +89,7 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def spoken_name(task: JumpTask) -> JumpTask:
-    """The task, called by what it asks for if it has no name: ``12 cm high, 20 cm ahead``."""
+    """Return the task, called by what it asks for if it has no name: ``12 cm high, 20 cm ahead``."""
     return task if task.name else task.model_copy(update={"name": describe_task(task)})
 
 
@@ -208,7 +208,7 @@ def _contact_phases(task: JumpTask, robot: RobotDescription) -> Iterator[Contrad
 
 
 def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, StanceLocation, StanceLocation]]:
-    """Every jump that is written down, with its path in the task and where it begins and ends."""
+    """Yield every jump that is written down, with its path in the task and where it begins and ends."""
     places = task.places()
     for number, hop in enumerate(task.hops()[: len(task.jumps or "1")]):
         path = f"jumps.{number}." if task.jumps else ""
@@ -248,7 +248,7 @@ def _fall(height: float) -> float:
 
 
 def leg_travel(robot: RobotDescription) -> tuple[float, float]:
-    """The least and the greatest height of the centre of mass on the ground, above standing [m]."""
+    """Return the least and the greatest height of the centre of mass on the ground, above standing [m]."""
     poses = link_poses(
         robot, np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)),
         np.array([robot.standing_position, np.zeros(len(robot.joints))]),
@@ -272,7 +272,7 @@ def _slopes(task: JumpTask) -> Iterator[Contradiction]:
 
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """A step's edge is under no foot, and nothing of the standing robot is in the step."""
+    """Yield a step's edge is under no foot, and nothing of the standing robot is in the step."""
     for path, hop, start, end in _jumps(task):
         edge = edge_of(hop, start)
         if edge is None or not robot.contacts:

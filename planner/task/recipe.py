@@ -126,7 +126,7 @@ class RecipeInputs(Protocol):
         ...
 
     def hops(self) -> tuple[Hop, ...]:
-        """The jumps in a row."""
+        """Return the jumps in a row."""
         ...
 
 
@@ -139,7 +139,7 @@ class Choice:
     why: str
 
     def as_json(self) -> dict[str, Any]:
-        """The choice as plain data."""
+        """Return the choice as plain data."""
         value = self.value
         if isinstance(value, Parameters):
             value = value.model_dump(mode="json")
@@ -163,7 +163,7 @@ def choices(task: RecipeInputs, robot: RobotDescription) -> tuple[Choice, ...]:
 
 
 def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, Any]:
-    """The task's fields with those choices."""
+    """Return the task's fields with those choices."""
     fields: dict[str, Any] = {}
     for choice in found:
         group, _, name = choice.parameter.partition(".")
@@ -237,7 +237,7 @@ def _toes(robot: RobotDescription) -> str:
 
 
 def _thrust(whole: float, late: float, toes: str) -> tuple[PhaseSpec, PhaseSpec]:
-    """A thrust [s], first on all contacts and at last on the toes."""
+    """Return a thrust [s], first on all contacts and at last on the toes."""
     return (
         PhaseSpec(phase="thrust", time=round(whole - late, 6)),
         PhaseSpec(phase="thrust", time=late, contacts=toes, knots=TOE_KNOTS),
@@ -245,7 +245,7 @@ def _thrust(whole: float, late: float, toes: str) -> tuple[PhaseSpec, PhaseSpec]
 
 
 def _landing(whole: float | None, early: float, toes: str) -> tuple[PhaseSpec, ...]:
-    """A landing [s], first on the toes."""
+    """Return a landing [s], first on the toes."""
     rest = None if whole is None else round(whole - early, 6)
     return (
         PhaseSpec(phase="landing", time=early, contacts=toes, knots=TOE_LANDING_KNOTS),

@@ -145,7 +145,7 @@ def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[floa
 
 @per_robot
 def least_distance_to_limits(robot: RobotDescription) -> float:
-    """The least distance [rad] of a joint of the standing robot from its limits."""
+    """Return the least distance [rad] of a joint of the standing robot from its limits."""
     angles, limits = robot.standing_position, robot.joint_limits
     moving = [k for k, joint in enumerate(robot.joints) if joint.name not in robot.held]
     return float(min((angles - limits[:, 0])[moving].min(), (limits[:, 1] - angles)[moving].min()))
@@ -154,8 +154,9 @@ def least_distance_to_limits(robot: RobotDescription) -> float:
 def _knee(
     robot: RobotDescription, link: str, sole: tuple[float, float, float]
 ) -> tuple[int, float] | None:
-    """The joint of a leg that changes its length most, and the angle [rad] nearest to zero at which
-    the leg is longest; ``None`` for a leg that no hinge bends."""
+    """Return the joint of a leg that changes its length most, and the angle [rad] nearest to zero at which the leg is
+    longest; ``None`` for a leg that no hinge bends.
+    """
     chain = [k for k in chain_to(robot, link) if robot.joints[k].kind == "hinge"]
     best, least = None, LEAST_CHANGE
     for k in chain:
@@ -232,14 +233,14 @@ class Size:
 
 @per_robot
 def size_of(robot: RobotDescription) -> Size:
-    """The size of a robot that stands on something."""
+    """Return the size of a robot that stands on something."""
     height = standing_height(robot)
     light = (MASS / robot.total_mass) ** 2 * len(robot.contacts) / POINTS
     return Size(height, float(np.sqrt(height / HEIGHT)), light)
 
 
 def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]:
-    """The parameters of a ``JumpTask`` that follow from the robot, where it does not say them."""
+    """Return the parameters of a ``JumpTask`` that follow from the robot, where it does not say them."""
     if not robot.contacts:
         return {}
     size = size_of(robot)
@@ -262,5 +263,5 @@ def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]
 
 
 def rounded(value: float) -> float:
-    """The value with a few significant digits."""
+    """Return the value with a few significant digits."""
     return float(f"{value:.{DIGITS}g}")

@@ -32,11 +32,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import model_validator
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .contact_groups import ALL, contact_points
+from .phase import Phase
 
 FREE = "free"
 Slope = tuple[float, float]
@@ -129,7 +129,7 @@ class PhaseSpec(FreeTimes):
     )
 
     def on_ground(self, robot: RobotDescription) -> tuple[int, ...]:
-        """The indices of the contact points that carry load."""
+        """Return the indices of the contact points that carry load."""
         if self.phase == "flight":
             return ()
         off = contact_points(robot, self.raised or ())
@@ -225,9 +225,10 @@ def on_slopes(hops: Sequence[Hop], slope: Slope) -> tuple[Hop, ...]:
 
 
 def edge_of(hop: Hop, start: StanceLocation) -> float | None:
-    """The x [m, world] at which the ground changes height under a jump that begins there; ``None``
-    if the ground goes on as it is, or if the robot lands where it stood, so that there can be no edge
-    and the ground is taken to move in flight."""
+    """Return the x [m, world] at which the ground changes height under a jump that begins there; ``None`` if the ground
+    goes on as it is, or if the robot lands where it stood, so that there can be no edge and the ground is taken to move
+    in flight.
+    """
     if not changes_ground(hop, start):
         return None
     if hop.step_edge is not None:
@@ -273,8 +274,9 @@ class KnownStairs(Parameters):
         return min(self.steps, max(0, math.floor((x - self.x) / self.run + 1.0 + 1e-9)))
 
     def under(self, hops: Sequence[Hop]) -> tuple[Hop, ...]:
-        """The jumps over these stairs. Of several edges under one jump the first one up, or the last
-        one down, counts for all of them, so that feet clear every one."""
+        """Return the jumps over these stairs. Of several edges under one jump the first one up, or the last one down,
+        counts for all of them, so that feet clear every one.
+        """
         found, x = list[Hop](), 0.0
         for hop in hops:
             ahead = hop.distance_x or 0.0
@@ -305,8 +307,9 @@ class RoughGround(Parameters):
     )  # fmt: skip
 
     def under(self, hops: Sequence[Hop]) -> tuple[Hop, ...]:
-        """The jumps over that ground: with its steps and gaps, longer by the gap and higher by the
-        step up, so that each clears its landing by as much as on level ground."""
+        """Return the jumps over that ground: with its steps and gaps, longer by the gap and higher by the step up, so
+        that each clears its landing by as much as on level ground.
+        """
         # Python's own generator, whose numbers are the same in every version and on every machine.
         draw, level, found = random.Random(self.seed), 0.0, list[Hop]()
         for hop in hops:

@@ -320,7 +320,7 @@ class JumpTask(FreeTimes):
         return any(place.slope != LEVEL for place in self.places())
 
     def phase_specs(self) -> tuple[PhaseSpec, ...]:
-        """The sequence of contacts, with all times that are given and numbers of knots."""
+        """Return the sequence of contacts, with all times that are given and numbers of knots."""
         hops, knots = self.hops(), self.knots
         if self.phases is None:
             half = None if self.contact_time is None else 0.5 * self.contact_time
@@ -345,7 +345,7 @@ class JumpTask(FreeTimes):
         return tuple(filled)
 
     def _in_turn(self, phase_specs: list[PhaseSpec]) -> list[PhaseSpec]:
-        """The phases with those before and behind a flight in parts, where feet leave or land in turn."""
+        """Return the phases with those before and behind a flight in parts, where feet leave or land in turn."""
         found = list[PhaseSpec]()
         for phase_spec in phase_specs:
             lifted = {"thrust": self.take_off, "landing": self.touchdown}.get(phase_spec.phase)
@@ -369,7 +369,7 @@ class JumpTask(FreeTimes):
         return _stance(robot, self.final, "final")
 
     def equipped(self, robot: RobotDescription) -> RobotDescription:
-        """The robot with the task's actuator profile in use, and the joints free that take part.
+        """Return the robot with the task's actuator profile in use, and the joints free that take part.
 
         Raises:
             JumpTaskError: the robot has no such profile or joint; the message names those that it has.
@@ -381,15 +381,16 @@ class JumpTask(FreeTimes):
         return self._freed(robot)
 
     def _freed(self, robot: RobotDescription) -> RobotDescription:
-        """The robot with the joints free that take part."""
+        """Return the robot with the joints free that take part."""
         try:
             return robot.freed(self.moving or ())
         except LookupError as error:
             raise JumpTaskError(f"moving: {error.args[0]}") from error
 
     def resolved(self, robot: RobotDescription) -> JumpTask:
-        """The task with all that it leaves unsaid: what the ``recipe`` chooses for task and robot,
-        times and weights that suit the robot's size (``scaling``), the actuator profile in use."""
+        """Return the task with all that it leaves unsaid: what the ``recipe`` chooses for task and robot, times and
+        weights that suit the robot's size (``scaling``), the actuator profile in use.
+        """
         robot = self._freed(robot)
         found = chosen_fields(self, choices(self, robot))
         changed = found | scaled_defaults(self.model_copy(update=found), robot)
@@ -404,7 +405,7 @@ class JumpTask(FreeTimes):
         return self.effort if most is None else most
 
     def content(self) -> dict[str, Any]:
-        """All that decides the plan, as plain data: everything but the name."""
+        """Return all that decides the plan, as plain data: everything but the name."""
         # What is not given is left out, so that a parameter added later changes no hash.
         # So is the weight of impulses where there are none, and how the rest was chosen.
         unused: dict[str, Any] = {} if self.impact else {"weights": {"impulse"}}
@@ -422,7 +423,7 @@ class JumpTask(FreeTimes):
 
 
 def content_name(content: object) -> str:
-    """A name for a file that follows from plain data: the same for the same data."""
+    """Return a name for a file that follows from plain data: the same for the same data."""
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
@@ -447,7 +448,7 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
 def make_task(
     values: Mapping[str, Any], *, where: str = "task", source: PlacedFile | None = None
 ) -> JumpTask:
-    """A task from plain values, quantities as numbers or text.
+    """Return a task from plain values, quantities as numbers or text.
 
     ``where`` is what messages call it; with ``source``, the file the values are from, they begin
     with the line and column instead.

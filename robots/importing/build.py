@@ -72,7 +72,7 @@ def tidy(values: Any, digits: int = 11) -> list[float]:
 
 
 def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -> LinkTree:
-    """The tree of links and joints.
+    """Return the tree of links and joints.
 
     Args:
         model: what the file holds.
@@ -143,7 +143,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
 
 
 def _holder(tree: LinkTree, name: str) -> str:
-    """The link that a body of the file became part of."""
+    """Return the link that a body of the file became part of."""
     return tree.frames[name].link if name in tree.frames else tree.base
 
 
@@ -188,7 +188,7 @@ def _complete_links(
 
 
 def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
-    """The base's name (``GROUND`` for the world), how it is held, and joints that say just that."""
+    """Return the base's name (``GROUND`` for the world), how it is held, and joints that say just that."""
     roots = [body for body in model.bodies.values() if body.parent == model.world]
     free = [body for body in roots if any(joint.kind == "free" for joint in body.joints)]
     others = [
@@ -219,7 +219,7 @@ def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
 
 
 def _is_planar(body: RawBody) -> bool:
-    """Whether a body is carried by slides along x and z and a hinge about y, without motors."""
+    """Check whether a body is carried by slides along x and z and a hinge about y, without motors."""
     kinds = sorted(
         (joint.kind, tuple(tidy(joint.axis)))
         for joint in body.joints
@@ -234,7 +234,7 @@ def _error(model: RawModel, message: str, expected: str = "", found: str = "") -
 
 
 def _axis(axis: Array) -> list[float]:
-    """A unit vector; what is nearly a coordinate axis is one."""
+    """Return a unit vector; what is nearly a coordinate axis is one."""
     straight = np.where(np.abs(axis - np.round(axis)) < 1e-10, np.round(axis), axis)
     return tidy(straight / np.linalg.norm(straight), 12)
 

@@ -20,7 +20,7 @@ SHORTEST = 4e-4
 
 @dataclass(frozen=True)
 class Capsule:
-    """From ``start`` to ``end`` [m], each (3,), of ``radius`` [m]."""
+    """Capsule from ``start`` to ``end`` [m], each (3,), of ``radius`` [m]."""
 
     start: Array
     end: Array
@@ -32,13 +32,13 @@ class Capsule:
         return np.array([self.start, self.end])
 
     def moved(self, rotation: Array, position: Array) -> Capsule:
-        """The capsule in another frame, in which its own frame has this rotation and position."""
+        """Return the capsule in another frame, in which its own frame has this rotation and position."""
         return Capsule(
             rotation @ self.start + position, rotation @ self.end + position, self.radius
         )
 
     def lowest(self, rotation: Array) -> float:
-        """The height of its lowest point [m] in a frame in which its own has this rotation."""
+        """Return the height of its lowest point [m] in a frame in which its own has this rotation."""
         return float(min((rotation @ self.start)[2], (rotation @ self.end)[2]) - self.radius)
 
 
@@ -52,26 +52,26 @@ def coarse(values: Array) -> list[float]:
 
 
 def along(axis: int, half_length: float, radius: float) -> Capsule:
-    """A capsule about the origin along coordinate axis ``axis``."""
+    """Return a capsule about the origin along coordinate axis ``axis``."""
     end = np.zeros(3)
     end[axis] = max(half_length, 0.5 * SHORTEST)
     return Capsule(-end, end, radius)
 
 
 def of_sphere(radius: float) -> list[Capsule]:
-    """The capsule for a sphere."""
+    """Return the capsule for a sphere."""
     return [along(2, 0.0, radius)]
 
 
 def of_cylinder(radius: float, half_length: float) -> list[Capsule]:
-    """The capsule for a cylinder about z; a disc's lies across it."""
+    """Return the capsule for a cylinder about z; a disc's lies across it."""
     if half_length >= radius:
         return [along(2, half_length - radius, radius)]
     return of_box(np.array([radius, radius, half_length]))
 
 
 def of_ellipsoid(sizes: Array) -> list[Capsule]:
-    """The capsule for an ellipsoid of these half axes (3,)."""
+    """Return the capsule for an ellipsoid of these half axes (3,)."""
     long, middle, short = np.argsort(-sizes, kind="stable")
     radius = float(np.sqrt(sizes[middle] * sizes[short]))
     return [along(int(long), float(sizes[long]) - radius, radius)]

@@ -39,7 +39,7 @@ _UP = np.array([0.0, 0.0, 1.0])
 RADIUS = 0.005
 """The radius of a contact point for which the YAML gives none [m]."""
 ROOM = 0.1
-"""How far from a limit joints stand that cannot be at zero [rad, m]."""
+"""Distance from a limit at which joints stand that cannot be at zero [rad, m]."""
 
 
 class Overlay:
@@ -55,7 +55,7 @@ class Overlay:
         self.faults.append(RobotFault(path, message, expected, found, fix))
 
     def mapping(self, key: str) -> Mapping[str, Any]:
-        """The mapping under a key; empty, and a fault, where it is something else."""
+        """Return the mapping under a key; empty, and a fault, where it is something else."""
         value = self.data.get(key)
         if value is None:
             return {}
@@ -76,7 +76,7 @@ class Overlay:
                          listing([*OWN_KEYS, *legal], 20), repr(key), fix)  # fmt: skip
 
     def welded(self, joints: list[str]) -> list[str]:
-        """The joints that ``weld`` names, by name or shell pattern."""
+        """Return the joints that ``weld`` names, by name or shell pattern."""
         found: list[str] = []
         given = self.data.get("weld", [])
         if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
@@ -106,7 +106,7 @@ class Overlay:
                 named[name].update(change)
 
     def profiles(self, rated: Mapping[str, Any]) -> dict[str, Any]:
-        """The profiles of the YAML, filled from the file's; the file's alone where it has none."""
+        """Return the profiles of the YAML, filled from the file's; the file's alone where it has none."""
         given = self.mapping("profiles")
         if not given:
             return {"rated": dict(rated)}
@@ -116,7 +116,7 @@ class Overlay:
         }
 
     def frame(self, path: tuple[str | int, ...], name: Any, built: LinkTree) -> BodyFrame | None:
-        """The body of the file with that name; ``None``, and a fault, if there is none."""
+        """Return the body of the file with that name; ``None``, and a fault, if there is none."""
         if isinstance(name, str) and name in built.frames:
             return built.frames[name]
         self.add(path, f"the file has no link {shown(name)}", listing(list(built.frames), 60),
@@ -143,7 +143,7 @@ class Overlay:
     def _foot(
         self, path: tuple[str | int, ...], foot: Mapping[str, Any], built: LinkTree
     ) -> tuple[dict[str, Any], list[dict[str, Any]]] | None:
-        """A foot given in the frame ``at`` of the file: a ball, or the points of a sole."""
+        """Return a foot given in the frame ``at`` of the file: a ball, or the points of a sole."""
         legal = ("name", "at", "ball", "points", "radius")
         for key in foot:
             if key not in legal:
@@ -238,7 +238,7 @@ class Overlay:
 
 
 def _filled(profile: Mapping[str, Any], rated: Mapping[str, Any]) -> dict[str, Any]:
-    """A profile with the file's values where it has none.
+    """Return a profile with the file's values where it has none.
 
     A value that it gives for all motors counts for all, also where the file has different ones.
     """
@@ -275,7 +275,7 @@ KEYS = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque", "ro
 def rated_profile(
     joints: Mapping[str, RawJoint], is_urdf: bool, notes: list[str], *, estimate: bool = True
 ) -> dict[str, Any]:
-    """The profile as plain data; joints that differ from most have an entry under ``motors``.
+    """Return the profile as plain data; joints that differ from most have an entry under ``motors``.
 
     With ``estimate`` the inertia of rotors follows from their ratings, where the file tells of no rotor.
     """
@@ -342,7 +342,7 @@ def _estimate_rotors(
 
 
 def _tells_rotors(profiles: Any) -> bool:
-    """Whether a YAML's profiles say the inertia of any rotor."""
+    """Check whether a YAML's profiles give the inertia of any rotor."""
     ratings = list(profiles.values()) if isinstance(profiles, Mapping) else []
     for profile in list(ratings):
         motors = profile.get("motors") if isinstance(profile, Mapping) else None
@@ -355,7 +355,7 @@ TAGS = {"links": ("link", "body"), "joints": ("joint", "joint")}
 
 
 def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
-    """The path of a fault as a short YAML has it: links and joints by name, contacts by foot."""
+    """Return the path of a fault as a short YAML has it: links and joints by name, contacts by foot."""
     path = fault.path
     if len(path) > 1 and path[0] == "contacts" and isinstance(path[1], int):
         # Contact points of a short YAML are in its feet.
@@ -368,7 +368,7 @@ def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int,
 
 
 def placed_in_model(fault: RobotFault, data: Mapping[str, Any], model: RawModel) -> RobotFault:
-    """The fault with the line of the link or joint in the URDF or MJCF file, if it is one's."""
+    """Return the fault with the line of the link or joint in the URDF or MJCF file, if it is one's."""
     path = written_path(fault, data)
     line = column = 0
     if len(path) > 1 and path[0] in TAGS:
@@ -379,8 +379,9 @@ def placed_in_model(fault: RobotFault, data: Mapping[str, Any], model: RawModel)
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import gives: the description's ``data``, the ``faults`` of the YAML, what the file
-    lacks or what is approximated in ``notes``, and the ``model`` and tree it was made from."""
+    """Result of an import: the description's ``data``, the ``faults`` of the YAML, what the file lacks or what is
+    approximated in ``notes``, and the ``model`` and tree it was made from.
+    """
 
     data: dict[str, Any]
     faults: list[RobotFault]
@@ -390,7 +391,7 @@ class Imported:
 
 
 def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
-    """The description that a URDF or MJCF file and a YAML's content make together.
+    """Return the description that a URDF or MJCF file and a YAML's content make together.
 
     Raises:
         RobotError: the file cannot be read at all.
@@ -441,7 +442,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
 
 
 def _stand_within_limits(data: dict[str, Any]) -> None:
-    """Let joints that cannot be at zero, and that nobody says more of, stand near that limit."""
+    """Let joints that cannot be at zero, and of which nothing else is given, stand near that limit."""
     standing, held = data["standing"], data.get("held") or {}
     if not isinstance(standing, Mapping) or not isinstance(held, Mapping):
         return
@@ -459,7 +460,7 @@ def _stand_within_limits(data: dict[str, Any]) -> None:
 
 
 def own_motors(joints: list[str]) -> dict[str, Any]:
-    """The transmission of a robot in which every joint has a motor of its own, called as it is."""
+    """Return the transmission of a robot in which every joint has a motor of its own, called as it is."""
     size = range(len(joints))
     return {
         "motors": list(joints),

@@ -30,7 +30,7 @@ GAZEBO_BUILT_IN = ("contact",)
 
 
 def file_sensors(model: Any, file: XmlFile) -> dict[str, RawSensor]:
-    """The file's sensors by name, each a word that may name an output."""
+    """Return the file's sensors by name, each a word that may name an output."""
     found: dict[str, RawSensor] = {}
     for written, sensor in _of_urdf(file) if file.is_urdf else _of_mjcf(model):
         name = re.sub(r"\W", "_", written)
@@ -43,7 +43,7 @@ def file_sensors(model: Any, file: XmlFile) -> dict[str, RawSensor]:
 
 
 def unknown_sensors(model: Any, file: XmlFile) -> Iterator[str]:
-    """A sentence that names the sensors of which a description has no kind; none where there are none."""
+    """Yield a sentence that names the sensors of which a description has no kind; none where there are none."""
     found: dict[str, list[str]] = defaultdict(list)
     for kind, name in _unknown_of_urdf(file) if file.is_urdf else _unknown_of_mjcf(model):
         found[kind].append(name)
@@ -98,7 +98,7 @@ def _unknown_of_mjcf(model: Any) -> Iterator[tuple[str, str]]:
 
 
 def _gazebo(file: XmlFile) -> Iterator[tuple[str, str, Any]]:
-    """Every sensor told to Gazebo: what it refers to, its type and its element."""
+    """Yield every sensor declared for Gazebo: its reference, type and element."""
     for gazebo in file.root.findall("gazebo"):
         for sensor in gazebo.findall("sensor"):
             yield gazebo.get("reference", ""), sensor.get("type", ""), sensor
@@ -127,7 +127,7 @@ def _unknown_of_urdf(file: XmlFile) -> Iterator[tuple[str, str]]:
 
 
 def _of_angles(angles: Array) -> Array:
-    """The rotation (3, 3) of roll, pitch and yaw [rad], as SDF and URDF have them."""
+    """Return the rotation (3, 3) of roll, pitch and yaw [rad], as SDF and URDF have them."""
     quaternion = np.empty(4)
     from_euler(angles, quaternion)
     return matrices_of_quaternions(quaternion)

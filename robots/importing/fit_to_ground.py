@@ -41,7 +41,7 @@ second, as a fork that holds the ball would touch beside it when the leg leans."
 def fit_to_ground(
     robot: RobotDescription, standing_given: bool, start: Mapping[str, float]
 ) -> tuple[RobotDescription, list[str]]:
-    """The robot with a standing pose and without shapes that reach the ground in it, and notes.
+    """Return the robot with a standing pose and without shapes that reach the ground in it, and notes.
 
     A file's own shapes of the feet are where the contact points are: what touches the ground there
     is the contact point, and any other shape that touches it counts as a fall.
@@ -91,8 +91,9 @@ def _without_low_shapes(robot: RobotDescription, notes: list[str]) -> RobotDescr
 
 
 def _without_ball(shape: Shape, ball: BallFoot) -> Shape | None:
-    """A shape of a leg's last link without what the ball that it ends in stands for, which touches the ground at whatever
-    angle the leg leans: none if that is all of it, else a hull that ends inside the ball."""
+    """Return a shape of a leg's last link without what the ball that it ends in stands for, which touches the ground at
+    whatever angle the leg leans: none if that is all of it, else a hull that ends inside the ball.
+    """
     away = np.array(shape.corners) - ball.centre
     far = np.linalg.norm(away, axis=1)
     if far.max() + shape.radius <= ABOUT_BALL * ball.radius:
@@ -106,7 +107,9 @@ def _without_ball(shape: Shape, ball: BallFoot) -> Shape | None:
 
 
 def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
-    """The shape, cut off where it is not above ``room`` [m] when the link is turned so; None where that leaves nothing."""
+    """Return the shape, cut off where it is not above ``room`` [m] when the link is turned so; None where that leaves
+    nothing.
+    """
     return (
         _shortened(shape, rotation, room)
         if isinstance(shape, Capsule)
@@ -115,7 +118,7 @@ def _above(shape: Shape, rotation: Array, room: float) -> Shape | None:
 
 
 def _cut(hull: Hull, rotation: Array, room: float) -> Hull | None:
-    """What of the hull is above: its corners there, and where its edges pass through that height."""
+    """Return the part of the hull that is above: its corners there, and where its edges pass through that height."""
     corners = np.array(hull.corners)
     heights = corners @ rotation[2] - room
     if heights.min() > 0.0:
@@ -131,7 +134,7 @@ def _cut(hull: Hull, rotation: Array, room: float) -> Hull | None:
 
 
 def _shortened(shape: Capsule, rotation: Array, room: float) -> Capsule | None:
-    """The capsule with its lower end at that height."""
+    """Return the capsule with its lower end at that height."""
     ends = np.array([shape.start, shape.end])
     heights = ends @ rotation[2] - shape.radius
     low, high = int(np.argmin(heights)), int(np.argmax(heights))
@@ -155,9 +158,9 @@ PULL = 1e-3
 PLACE = 1e-2
 """Weight of the feet's places and of the height."""
 WIDEST = 1.6
-"""How far from zero a joint starts at most [rad], where its limits' middle is farther."""
+"""Largest start angle of a joint [rad], where its limits' middle is farther from zero."""
 BENT = (0.4, -0.8, 0.4)
-"""Where the pitch joints of a straight leg start, from the hip down [rad]."""
+"""Start angles of a straight leg's pitch joints, from the hip down [rad]."""
 SHARPEST = 1e-4
 """The tolerance of the conditions that must hold [m, rad]."""
 MARGIN = 0.02
@@ -176,14 +179,14 @@ class StandingPose:
 
     @property
     def holds(self) -> bool:
-        """Whether the robot stands in it."""
+        """True if the robot stands in it."""
         return max(self.level, self.flatness, self.balance) < SHARPEST
 
 
 def find_standing_pose(
     robot: RobotDescription, start: Mapping[str, float] | None = None, height: float = 0.85
 ) -> StandingPose:
-    """A pose in which the robot stands.
+    """Return a pose in which the robot stands.
 
     Args:
         robot: with at least one foot; ``held`` joints stay where they are held.
@@ -260,7 +263,7 @@ class _GroundFit:
                 self.start[index] = angle * np.sign(self.robot.joints[index].axis[1])
 
     def _is_flat(self, foot: int) -> bool:
-        """Whether a foot has three contact points that are not in a line."""
+        """Check whether a foot has three contact points that are not in a line."""
         points = np.array([
             contact.position
             for contact in self.robot.contacts
@@ -274,8 +277,9 @@ class _GroundFit:
         return link_poses(self.robot, np.zeros((count, 3)), upright, angles)
 
     def _points(self, poses: LinkPoses) -> tuple[Array, Array]:
-        """The height of each contact's lowest point (n, n_contacts), each sole (n, n_feet, 3);
-        that of a ball is its centre."""
+        """Return the height of each contact's lowest point (n, n_contacts), each sole (n, n_feet, 3); that of a ball is
+        its centre.
+        """
         heights, balls = [], {}
         for foot, centre, contact in zip(
             self.foot_of_point, self.centres, self.robot.contacts, strict=True
@@ -293,8 +297,9 @@ class _GroundFit:
         return np.array(heights).T, np.moveaxis(np.array(soles), 0, 1)
 
     def parts(self, angles: Array) -> tuple[Array, Array, Array, Array]:
-        """Of many poses (n, n_joints): heights, flatness and balance, which must be zero, and
-        what is only wanted, each (n, some)."""
+        """Return the residuals of many poses (n, n_joints): heights, flatness and balance, which must be zero, and what
+        is only wanted, each (n, some).
+        """
         poses = self._poses(angles)
         heights, soles = self._points(poses)
         level = heights - heights.mean(axis=1, keepdims=True)
@@ -312,19 +317,19 @@ class _GroundFit:
         return level, flatness, balance, wanted
 
     def residuals(self, angles: Array) -> Array:
-        """All weighted residuals, whose squares are minimised, (n, some)."""
+        """Return all weighted residuals, whose squares are minimised, (n, some)."""
         level, flatness, balance, wanted = self.parts(angles)
         pull = PULL * (angles - self.start)[:, self.free]
         return np.concatenate([level, flatness, balance, PLACE * wanted, pull], axis=1)
 
     def failure(self, angles: Array) -> tuple[float, float, float]:
-        """The largest residual of the conditions that must hold."""
+        """Return the largest residual of the conditions that must hold."""
         level, flatness, balance, _ = self.parts(angles[None])
         largest = [float(np.abs(part).max()) for part in (level, flatness, balance)]
         return largest[0], largest[1], largest[2]
 
     def run(self) -> Array:
-        """The pose near the start that minimises the sum of the squared residuals."""
+        """Return the pose near the start that minimises the sum of the squared residuals."""
         angles, damping = self.start.copy(), 1e-3
         angles[self.free] = np.clip(angles[self.free], self.lower[self.free], self.upper[self.free])
         cost = float(np.square(self.residuals(angles[None])).sum())
@@ -351,7 +356,7 @@ class _GroundFit:
         return self._settled(angles)
 
     def _settled(self, angles: Array) -> Array:
-        """The nearest angles at which the conditions hold exactly, if the limits allow it."""
+        """Return the nearest angles at which the conditions hold exactly, if the limits allow it."""
         for _ in range(5):
             values, jacobian = self._linearised(angles, self._must)
             move = np.linalg.lstsq(jacobian, -values, rcond=1e-8)[0]
@@ -368,7 +373,7 @@ class _GroundFit:
         return np.concatenate(self.parts(angles)[:3], axis=1)
 
     def _linearised(self, angles: Array, function: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """A function's values and its Jacobian by the free joints, by central differences."""
+        """Return a function's values and its Jacobian by the free joints, by central differences."""
         step, count = 1e-6, len(self.free)
         trials = np.tile(angles, (2 * count + 1, 1))
         for k, joint in enumerate(self.free):

@@ -24,7 +24,7 @@ INSIDE = 0.01
 TIED = 1e-6
 """m; how nearly alike two directions lack reach, to be served together, so that mirrored meshes have mirrored hulls."""
 UNEVEN = 1e-4
-"""How much a mesh's spread is made uneven, as a share, so that round ones have directions too."""
+"""Share by which a mesh's spread is made uneven, so that round ones have directions too."""
 AT_ONCE = 16
 """Directions looked along together: a mesh may have a hundred thousand corners."""
 
@@ -50,11 +50,11 @@ class Hull:
     corners: Array
 
     def moved(self, rotation: Array, position: Array) -> Hull:
-        """The hull in another frame, in which its own frame has this rotation and position."""
+        """Return the hull in another frame, in which its own frame has this rotation and position."""
         return Hull(self.corners @ rotation.T + position)
 
     def lowest(self, rotation: Array) -> float:
-        """The height of its lowest point [m] in a frame in which its own has this rotation."""
+        """Return the height of its lowest point [m] in a frame in which its own has this rotation."""
         return float((self.corners @ rotation[2]).min())
 
 
@@ -62,7 +62,7 @@ RawShape = Capsule | Hull
 
 
 def of_points(points: Array) -> list[RawShape]:
-    """The shapes for a mesh with these corners (n, 3): capsules, or one hull where they would overstate it."""
+    """Return the shapes for a mesh with these corners (n, 3): capsules, or one hull where they would overstate it."""
     corners = _once(points)
     capsules = _in_box(corners)
     most = np.concatenate([
@@ -77,7 +77,9 @@ def of_points(points: Array) -> list[RawShape]:
 
 
 def _some_corners(corners: Array, most: Array) -> Array:
-    """As few of the corners as reach nearly as far as ``most`` [m] in each direction, those first that add most."""
+    """Return as few of the corners as reach nearly as far as ``most`` [m] in each direction, those first that add
+    most.
+    """
     found = corners[:0]
     ahead = DIRECTIONS[:8]
     while True:
@@ -89,7 +91,7 @@ def _some_corners(corners: Array, most: Array) -> Array:
 
 
 def _in_box(corners: Array) -> list[Capsule]:
-    """The capsules of the box about a mesh along its principal directions."""
+    """Return the capsules of the box about a mesh along its principal directions."""
     spreads = np.cov((corners - corners.mean(axis=0)).T)
     # Every machine must find the same directions, also where all across a mesh are alike.
     spreads += UNEVEN * np.trace(spreads) * np.diag([0.0, 0.5, 1.0])
@@ -102,7 +104,7 @@ def _in_box(corners: Array) -> list[Capsule]:
 
 
 def _once(points: Array) -> Array:
-    """The points (n, 3) without those that stand there again, as corners of triangles do.
+    """Return the points (n, 3) without those that stand there again, as corners of triangles do.
 
     They are told apart by a number made of their bits, which is much faster to sort than rows.
     """

@@ -1,5 +1,5 @@
-"""What an MJCF file says and a description has no place for, one sentence each, with where it may be written instead.
-Of URDFs ``left_out_urdf`` tells.
+"""Content of an MJCF file that a description has no place for, one sentence each, with where it may be written instead.
+``left_out_urdf`` does the same for URDFs.
 
 A description holds what a robot is. Friction and softness of contacts belong to the simulated ground, gains to the
 controller, and gravity to the world: what a file says of them is reported and not taken over. What is as MuJoCo
@@ -25,7 +25,7 @@ MOST = 4
 
 
 def left_out(model: Any, spec: Any) -> Iterator[str]:
-    """The sentences for a compiled MJCF model and what it was compiled from."""
+    """Yield the sentences for a compiled MJCF model and what it was compiled from."""
     yield from _contacts(model)
     yield from _joints(model)
     yield from _servos(model)
@@ -127,7 +127,7 @@ def _servos(model: Any) -> Iterator[str]:
 
 
 def _tied(model: Any, spec: Any) -> Iterator[str]:
-    """What ties or sets apart bodies and joints beside the tree."""
+    """Yield sentences on what ties or sets apart bodies and joints beside the tree."""
     import mujoco
 
     if model.ntendon:
@@ -150,7 +150,7 @@ def _tied(model: Any, spec: Any) -> Iterator[str]:
 
 
 def by_value(rows: list[str], names: list[str], usual: str) -> str:
-    """Each value that is not the usual one, with the names that have it; empty where all are usual."""
+    """Return each value that is not the usual one, with the names that have it; empty where all are usual."""
     found: dict[str, dict[str, None]] = {}
     for row, name in zip(rows, names, strict=True):
         if row != usual:

@@ -1,4 +1,4 @@
-"""What a URDF says and a description has no place for, one sentence each, with where it may be written instead.
+"""Content of a URDF that a description has no place for, one sentence each, with where it may be written instead.
 
 A URDF itself knows neither friction nor softness of contacts. Files give them to Gazebo, under ``<gazebo reference=...>``,
 or to Bullet, under ``<contact>`` of a link. Of what only says how a simulator runs, such as plugins, nothing is told.
@@ -15,7 +15,7 @@ from .left_out import MOST, by_value
 from .urdf_text import XmlFile
 
 Said = tuple[str, Any]
-"""The link or joint that something is said of, and the element that says it."""
+"""Name of a link or joint, and an element that describes it."""
 FRICTION = {"mu1": "mu1", "mu2": "mu2", "mu": "mu1", "lateral_friction": "mu1"}
 TWIST = ("rolling_friction", "spinning_friction")
 SOFT = (
@@ -32,12 +32,12 @@ SOFT = (
 )
 BOUNCE = ("restitution", "restitution_coefficient")
 SPRINGS = ("springStiffness", "springReference")
-"""What Gazebo, SDF and Bullet call them."""
+"""Names of springs in Gazebo, SDF and Bullet."""
 TRUE = ("1", "true", "True")
 
 
 def left_out_of_urdf(file: XmlFile) -> Iterator[str]:
-    """The sentences for a URDF."""
+    """Yield the sentences for a URDF."""
     links = [*_said(file, "link", ("contact", "surface"))]
     yield from _contacts(links)
     yield from _joints(file)
@@ -61,8 +61,9 @@ def left_out_of_urdf(file: XmlFile) -> Iterator[str]:
 
 
 def _said(file: XmlFile, tag: str, inside: tuple[str, ...]) -> Iterator[Said]:
-    """What is said of a link or joint to a simulator: the elements of its ``<gazebo>``, and of its own ones that
-    stand ``inside`` it or its collision shapes."""
+    """Yield what a simulator reads of a link or joint: the elements of its ``<gazebo>``, and of its own ones that stand
+    ``inside`` it or its collision shapes.
+    """
     for part in file.root.findall(tag):
         name = part.get("name", "")
         for owner in (part, *part.findall("collision")):
@@ -129,7 +130,7 @@ def _soft_limits(file: XmlFile) -> Iterator[str]:
 
 
 def _values(said: Iterable[Said], words: Iterable[str], called: Any = None) -> str:
-    """The values that elements of these names have, with the links or joints that have them; zeros are none."""
+    """Return the values that elements of these names have, with the links or joints that have them; zeros are none."""
     found: dict[str, dict[str, str]] = {}
     for name, each in said:
         if each.tag in words and _text(each) and _differ(_text(each), "0"):
@@ -143,7 +144,7 @@ def _values(said: Iterable[Said], words: Iterable[str], called: Any = None) -> s
 
 
 def _text(element: Any) -> str:
-    """What an element says, as its text or its ``value``; numbers without zeros at their end."""
+    """Return an element's content, its text or its ``value``; numbers without zeros at their end."""
     text = str(element.get("value") or element.text or "").strip()
     number = _number(text)
     return text if math.isnan(number) else f"{number:g}"
@@ -161,7 +162,7 @@ def _differ(one: str, other: str | None) -> bool:
 
 
 def _closes(element: Any) -> bool:
-    """Whether an element of ``<gazebo>`` ties two links together: a joint of SDF, or of its first versions."""
+    """Check whether an element of ``<gazebo>`` ties two links together: a joint of SDF, or of its first versions."""
     ends = {str(inner.tag) for inner in element}
     return {"parent", "child"} <= ends or {"body1", "body2"} <= ends
 

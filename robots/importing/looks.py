@@ -1,4 +1,4 @@
-"""What the links of a URDF or MJCF file look like: the meshes that it draws them as."""
+"""Appearance of the links of a URDF or MJCF file: the meshes that it draws them as."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RawMesh:
 
 @dataclass(frozen=True)
 class RawLook:
-    """What a body is drawn as: meshes, and capsules for simple shapes."""
+    """Appearance of a body: meshes, and capsules for simple shapes."""
 
     meshes: Sequence[RawMesh] = ()
     capsules: Sequence[fit.Capsule] = ()
@@ -45,14 +45,14 @@ NOTHING_SEEN = RawLook()
 
 @dataclass
 class LinkLook:
-    """What is drawn for one link of a description, as plain data."""
+    """Appearance of one link of a description, as plain data."""
 
     meshes: list[dict[str, Any]] = field(default_factory=list)
     shapes: list[dict[str, Any]] = field(default_factory=list)
 
 
 def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
-    """What each link of a URDF is drawn as, by name; what cannot be read is left out."""
+    """Return the appearance of each link of a URDF, by name; what cannot be read is left out."""
     found = {}
     named = {
         material.get("name", ""): color
@@ -83,7 +83,7 @@ def urdf_looks(file: XmlFile) -> dict[str, RawLook]:
 
 
 def _material_color(material: ElementTree.Element) -> str | None:
-    """The color of a URDF's material; None where it has a texture or no color."""
+    """Return the color of a URDF's material; None where it has a texture or no color."""
     color = material.find("color")
     if color is None or material.find("texture") is not None:
         return None
@@ -110,7 +110,7 @@ def _simple(shape: ElementTree.Element) -> list[fit.Capsule]:
 
 
 def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
-    """The rotation and position of an ``origin``: about fixed x, then y, then z."""
+    """Return the rotation and position of an ``origin``: about fixed x, then y, then z."""
     zero = (0.0, 0.0, 0.0)
     if element is None:
         return np.eye(3), np.zeros(3)
@@ -121,7 +121,7 @@ def _origin(element: ElementTree.Element | None) -> tuple[Array, Array]:
 
 
 def numbers(text: str | None, usual: Sequence[float]) -> Array:
-    """The numbers of an attribute, as many as usual; the usual ones where it has not those."""
+    """Return the numbers of an attribute, as many as usual; the usual ones where it has not those."""
     try:
         values = np.array([float(part) for part in (text or "").split()])
     except ValueError:
@@ -131,7 +131,7 @@ def numbers(text: str | None, usual: Sequence[float]) -> Array:
 
 
 def located(name: str, folder: Path) -> str:
-    """How a description names a mesh, so that it is found from any folder.
+    """Return a mesh's name in a description, by which it is found from any folder.
 
     A package that Python has installed keeps its name, which serves other machines too.
     """
@@ -146,8 +146,8 @@ def located(name: str, folder: Path) -> str:
 def link_looks(
     looks: Mapping[str, RawLook], frames: Mapping[str, Any], folder: Path
 ) -> dict[str, dict[str, Any]]:
-    """What the links of a description are drawn as, as plain data, from the looks of the bodies of a
-    file and the ``frames`` in which they are put together (``build.Frame``).
+    """Return the appearance of a description's links, as plain data, from the looks of the bodies of a file and the
+    ``frames`` in which they are put together (``build.Frame``).
 
     Links without a mesh are left out: their collision shapes look better than nothing.
     """

@@ -26,13 +26,13 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("ext
 FINEST = 5000.0
 """Cells along the longest side of a mesh at first, which joins corners at nearly the same place."""
 COARSER = 1.15
-"""How much larger the cells become from one try to the next, at least."""
+"""Least factor by which the cells grow from one try to the next."""
 _PLACES = np.array([1 << 40, 1 << 20, 1])
 """Makes one number of the three of a cell."""
 
 
 def mesh_triangles(path: Path) -> Array:
-    """The triangles of an STL, OBJ or COLLADA file [m, as it says or else as it is], (n, 3, 3).
+    """Return the triangles of an STL, OBJ or COLLADA file [m, or the unit that it declares], (n, 3, 3).
 
     Raises:
         OSError: the file cannot be read.
@@ -56,7 +56,7 @@ def mesh_triangles(path: Path) -> Array:
 
 
 def _obj_triangles(text: str) -> Array:
-    """The faces of a Wavefront file; those with more corners become fans of triangles."""
+    """Return the faces of a Wavefront file; those with more corners become fans of triangles."""
     corners: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
     for line in text.splitlines():
@@ -99,7 +99,7 @@ def simplified(triangles: Array, most: int) -> tuple[Array, Indices]:
 
 
 def _distinct(faces: Indices) -> Indices:
-    """The triangles that have three corners, each once, beginning at its smallest corner."""
+    """Return the triangles that have three corners, each once, beginning at its smallest corner."""
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     turn = faces.argmin(axis=1)[:, None]
@@ -109,7 +109,7 @@ def _distinct(faces: Indices) -> Indices:
 
 
 def stl_corners(content: bytes) -> Array:
-    """The corners in binary STL (header, count, 50 bytes a triangle), or in its text form."""
+    """Return the corners in binary STL (header, count, 50 bytes a triangle), or in its text form."""
     count = int(np.frombuffer(content[80:84], "<u4")[0]) if len(content) >= 84 else 0
     if len(content) == 84 + 50 * count:
         triangles = np.frombuffer(content, STL_TRIANGLE, count, 84)
@@ -125,7 +125,7 @@ DEEPEST = 32
 
 
 def collada_triangles(content: bytes) -> Array:
-    """The triangles of a file's content, (n, 3, 3).
+    """Return the triangles of a file's content, (n, 3, 3).
 
     Raises:
         ValueError: this is no COLLADA file, or it is not as the standard has it.
@@ -153,7 +153,7 @@ def collada_triangles(content: bytes) -> Array:
 def _of_node(
     node: Element, above: Array, named: dict[str, Element], shapes: dict[str, Array], depth: int
 ) -> Iterator[Array]:
-    """The triangles of a node and those within, in the scene's frame; ``above`` (4, 4) leads there."""
+    """Yield the triangles of a node and those within, in the scene's frame; ``above`` (4, 4) leads there."""
     if depth > DEEPEST:
         raise ValueError("nodes are too deep in one another")
     pose = above.copy()
@@ -172,7 +172,7 @@ def _of_node(
 
 
 def _transform(element: Element) -> Array:
-    """The matrix (4, 4) of a transform of a node; the identity for anything else."""
+    """Return the matrix (4, 4) of a transform of a node; the identity for anything else."""
     pose, tag = np.eye(4), _tag(element)
     if tag not in ("matrix", "translate", "rotate", "scale"):
         return pose
@@ -192,7 +192,7 @@ def _transform(element: Element) -> Array:
 
 
 def _of_geometry(geometry: Element, named: dict[str, Element]) -> Array:
-    """The triangles of a geometry, (n, 3, 3), in its own frame."""
+    """Return the triangles of a geometry, (n, 3, 3), in its own frame."""
     found = [np.zeros((0, 3, 3))]
     for kind in ("triangles", "polylist", "polygons"):
         for element in geometry.iter():
@@ -224,7 +224,7 @@ def _of_primitive(element: Element, kind: str, named: dict[str, Element]) -> Arr
 
 
 def _fans(index: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles (n, 3) of polygons whose corners follow one another in ``index``."""
+    """Return the triangles (n, 3) of polygons whose corners follow one another in ``index``."""
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     if counts.sum() > len(index):
         raise ValueError("polygons have more corners than there are")
@@ -237,7 +237,7 @@ def _fans(index: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int
 
 
 def _positions(element: Element, named: dict[str, Element]) -> Array:
-    """The corners (n, 3) that a source or the vertices of a mesh have."""
+    """Return the corners (n, 3) that a source or the vertices of a mesh have."""
     if _tag(element) == "vertices":
         source = next(e for e in _children(element, "input") if e.get("semantic") == "POSITION")
         element = named[source.get("source", "").removeprefix("#")]
@@ -252,7 +252,7 @@ def _floats(element: Element) -> Array:
 
 
 def _tag(element: Element) -> str:
-    """The name of an element without its namespace."""
+    """Return the name of an element without its namespace."""
     return str(element.tag).rpartition("}")[2]
 
 

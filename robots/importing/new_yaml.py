@@ -30,7 +30,7 @@ from .raw_model import RawModel
 
 
 def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
-    """The text of the YAML to be written to ``target``, and what the file lacks.
+    """Return the text of the YAML to be written to ``target``, and what the file lacks.
 
     Raises:
         RobotError: the file describes no robot.
@@ -51,7 +51,7 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
 
 
 def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
-    """The keys ``feet`` and ``held`` of a short YAML for a file that was read without one, and notes.
+    """Return the keys ``feet`` and ``held`` of a short YAML for a file that was read without one, and notes.
 
     Joints are held that move no foot, such as those of arms, or several feet, such as a spine's.
     """
@@ -85,7 +85,7 @@ def _placed(imported: Imported, faults: Any) -> list[Any]:
 SAME_DIRECTION = 1e-6
 """Sensors turned by about half of that [rad] or less are parallel to their link."""
 REACH = 0.1
-"""By how much less than the farthest limb a foot reaches down, as a share."""
+"""Share by which a foot reaches down less than the farthest limb, at most."""
 LEVEL = 0.01
 """Contact points lie within this height [m]."""
 JOINTS_WITH_ANKLE, NARROW, SOLE_RADIUS = 5, 0.03, 0.005
@@ -95,8 +95,9 @@ RADIUS = 0.02
 
 
 def guess_feet(model: RawModel, built: LinkTree) -> list[dict[str, Any]]:
-    """The feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``; none of
-    a robot that does not float."""
+    """Return the feet as a short YAML has them: ``name``, ``at``, ``ball`` or ``points``, ``radius``; none of a robot
+    that does not float.
+    """
     if built.base_joint != "floating":
         return []
     heights = {link: _lowest(model, built, link) for link in _limb_ends(built)}
@@ -115,7 +116,7 @@ def _limb_ends(built: LinkTree) -> list[str]:
 
 
 def _origins(built: LinkTree) -> dict[str, Any]:
-    """Where every link is at the zero of all joints [m, base frame]."""
+    """Return the origin of every link at the zero of all joints [m, base frame]."""
     places = {built.base: np.zeros(3)}
     for joint in built.joints:
         places[joint["child"]] = places[joint["parent"]] + np.array(joint["origin"])
@@ -127,7 +128,7 @@ def _bodies(built: LinkTree, link: str) -> dict[str, BodyFrame]:
 
 
 def _lowest(model: RawModel, built: LinkTree, link: str) -> float:
-    """The lowest height of a link, with all that is fixed to it, at the zero of all joints [m]."""
+    """Return the lowest height of a link, with all that is fixed to it, at the zero of all joints [m]."""
     height = _origins(built)[link][2]
     found = [height]
     for name, frame in _bodies(built, link).items():
@@ -199,7 +200,7 @@ def yaml_text(
     file: str, robot: RobotDescription, feet: list[dict[str, Any]], held: Mapping[str, float],
     notes: list[str], estimated: bool, sensors: list[str],
 ) -> str:  # fmt: skip
-    """The YAML's text.
+    """Return the YAML's text.
 
     Args:
         file: what the YAML's key ``file`` says.

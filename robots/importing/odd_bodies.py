@@ -28,7 +28,7 @@ MIRROR = np.array([1.0, -1.0, 1.0])
 
 
 def odd_bodies(model: RawModel) -> Iterator[str]:
-    """What seems odd, one sentence each."""
+    """Yield what seems odd, one sentence each."""
     pairs = [*_pairs(model)]
     moved = {name: _movers(body) for name, body in model.bodies.items()}
     lost = [
@@ -66,7 +66,7 @@ def _how_many(joints: list[str]) -> str:
 
 
 def _pairs(model: RawModel) -> Iterator[tuple[RawBody, RawBody]]:
-    """The pairs of bodies that are mirror images by place, as are those that carry them."""
+    """Yield the pairs of bodies that are mirror images by place, as are those that carry them."""
     children: dict[str, list[RawBody]] = {}
     for body in model.bodies.values():
         children.setdefault(body.parent, []).append(body)
@@ -90,14 +90,14 @@ def _pairs(model: RawModel) -> Iterator[tuple[RawBody, RawBody]]:
 
 
 def _place(body: RawBody, frame: tuple[Array, Array]) -> Array:
-    """Where a body is in the frame of the root [m]."""
+    """Return the place of a body in the frame of the root [m]."""
     rotation, position = frame
     place: Array = rotation.T @ (body.position - position)
     return place
 
 
 def _image(body: RawBody, others: list[RawBody], frame: tuple[Array, Array]) -> RawBody | None:
-    """The body at the mirrored place; of several the one of the most alike mass and joints."""
+    """Return the body at the mirrored place; of several the one of the most alike mass and joints."""
     wanted = MIRROR * _place(body, frame)
     near = [
         each for each in others

@@ -15,7 +15,7 @@ SCHEME = "package://"
 
 
 def find_file(name: str, folder: Path) -> Path | None:
-    """The file called ``name`` in a description that stands in ``folder``; None if there is none.
+    """Return the file called ``name`` in a description that stands in ``folder``; None if there is none.
 
     A path is relative to the folder. ``package://NAME/PATH`` is looked for in the folder and every
     folder above it, where such a folder is called ``NAME`` or holds one; then among the shared
@@ -30,12 +30,12 @@ def find_file(name: str, folder: Path) -> Path | None:
 
 
 def find_package(package: str, folder: Path) -> Path | None:
-    """The folder of a package that a description in ``folder`` names; None if there is none."""
+    """Return the folder of a package that a description in ``folder`` names; None if there is none."""
     return next((root for root in _roots(package, folder) if root.is_dir()), None)
 
 
 def _roots(package: str, folder: Path) -> Iterator[Path]:
-    """Where a package may be, the nearest first."""
+    """Yield the folders in which a package may be, the nearest first."""
     here = folder.resolve()
     for above in (here, *here.parents):
         yield from (root for root in (above, above / package) if root.name == package)
@@ -43,14 +43,16 @@ def _roots(package: str, folder: Path) -> Iterator[Path]:
 
 
 def package_of(name: str) -> str:
-    """The package that a ``package://`` name asks for; empty for a plain path."""
+    """Return the package that a ``package://`` name asks for; empty for a plain path."""
     if not name.startswith(SCHEME):
         return ""
     return name.removeprefix(SCHEME).partition("/")[0]
 
 
 def _shared() -> list[Path]:
-    """Where installed packages keep shared files: ``share`` folders, then the packages themselves."""
+    """Return the folders in which installed packages keep shared files: ``share`` folders, then the packages
+    themselves.
+    """
     sites = [Path(sysconfig.get_path(kind)) for kind in ("purelib", "platlib")]
     shares = [site / "cmeel.prefix" / "share" for site in sites]
     return list(dict.fromkeys([*shares, Path(sys.prefix) / "share", *sites]))

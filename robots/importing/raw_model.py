@@ -22,14 +22,14 @@ class Inertial:
     inertia: Array
 
     def moved(self, rotation: Array, position: Array) -> Inertial:
-        """The body in another frame, in which its own frame has this rotation and position."""
+        """Return the body in another frame, in which its own frame has this rotation and position."""
         if np.array_equal(rotation, np.eye(3)):
             return Inertial(self.mass, self.com + position, self.inertia)
         inertia = rotation @ self.inertia @ rotation.T
         return Inertial(self.mass, rotation @ self.com + position, 0.5 * (inertia + inertia.T))
 
     def scaled(self, share: float) -> Inertial:
-        """A body of the same distribution with a ``share`` of the mass."""
+        """Return a body of the same distribution with a ``share`` of the mass."""
         return Inertial(self.mass * share, self.com, self.inertia * share)
 
 
@@ -53,7 +53,7 @@ def joined(bodies: list[Inertial]) -> Inertial:
 
 
 def full_tensor(values: Array) -> Array:
-    """The tensor (3, 3) of xx, yy, zz, xy, xz, yz."""
+    """Return the tensor (3, 3) of xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = values
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -121,7 +121,7 @@ class RawBody:
 
 @dataclass(frozen=True)
 class RawModel:
-    """All bodies of a file but the world, each behind its parent, branch by branch.
+    """Bodies of a file but the world, each behind its parent, branch by branch.
 
     Attributes:
         name: what the file calls the robot.

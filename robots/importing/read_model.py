@@ -41,7 +41,7 @@ class TakenMesh(NamedTuple):
 
 
 def read_model(path: Path) -> RawModel:
-    """What the file holds.
+    """Return the content of the file.
 
     Raises:
         RobotError: it is no URDF and no MJCF, or MuJoCo cannot make sense of it.
@@ -291,7 +291,7 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
 
 
 def _actuators_on(model: Any, j: int) -> list[int]:
-    """The MJCF actuators that drive a joint."""
+    """Return the MJCF actuators that drive a joint."""
     import mujoco
 
     on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -303,7 +303,7 @@ def _actuators_on(model: Any, j: int) -> list[int]:
 
 
 def _geared(model: Any, j: int, what: str) -> float:
-    """What the ``armature`` or ``damping`` of actuators, at their side of the gear, is at the joint."""
+    """Return the ``armature`` or ``damping`` of actuators, given at their side of the gear, at the joint."""
     values = getattr(model, f"actuator_{what}")
     return sum(
         float(values[k]) * float(model.actuator_gear[k][0]) ** 2 for k in _actuators_on(model, j)
@@ -311,7 +311,7 @@ def _geared(model: Any, j: int, what: str) -> float:
 
 
 def _servo_speed(model: Any, j: int) -> float:
-    """The largest speed [rad/s] that a velocity servo on a joint is commanded to; NaN without one."""
+    """Return the largest speed [rad/s] that a velocity servo on a joint is commanded to; NaN without one."""
     import mujoco
 
     found = math.nan
@@ -330,7 +330,7 @@ def _servo_speed(model: Any, j: int) -> float:
 
 
 def _motor_torque(model: Any, j: int) -> float:
-    """The largest torque [N m] of the MJCF actuators on a joint; 0 without one, NaN if unlimited."""
+    """Return the largest torque [N m] of the MJCF actuators on a joint; 0 without one, NaN if unlimited."""
     import mujoco
 
     found = 0.0
@@ -350,7 +350,7 @@ def _motor_torque(model: Any, j: int) -> float:
 
 
 def _thrusters(model: Any, notes: list[str]) -> dict[str, RawThruster]:
-    """The MJCF actuators on sites that push along a direction, with a moment about it."""
+    """Return the MJCF actuators on sites that push along a direction, with a moment about it."""
     import mujoco
 
     found = {}
@@ -397,7 +397,7 @@ def _thrusters(model: Any, notes: list[str]) -> dict[str, RawThruster]:
 
 
 def _shapes(model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]) -> list[RawShape]:
-    """The shapes of a body, in its own frame; shapes that touch nothing are left out."""
+    """Return the shapes of a body, in its own frame; shapes that touch nothing are left out."""
     import mujoco
 
     kinds = mujoco.mjtGeom
@@ -443,7 +443,7 @@ def _shapes(model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]) 
 
 
 def _look(model: Any, k: int, meshes: dict[str, TakenMesh]) -> RawLook:
-    """The meshes that an MJCF body is drawn as: those that touch nothing, if it has such."""
+    """Return the meshes that an MJCF body is drawn as: those that touch nothing, if it has such."""
     import mujoco
 
     found: dict[bool, list[RawMesh]] = {True: [], False: []}

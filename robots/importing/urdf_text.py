@@ -17,7 +17,7 @@ from .xacro_text import XACRO, expand_xacro
 HINGES = ("revolute", "continuous")
 KINDS = (*HINGES, "prismatic", "fixed", "floating", "planar")
 DECLARED = re.compile(r"\s*<\?xml[^>]*?\sencoding\s*=\s*[\"']([^\"']*)[\"']")
-"""The encoding that a file says it is in."""
+"""Pattern of the encoding that a file declares."""
 
 
 @dataclass(frozen=True)
@@ -81,15 +81,15 @@ class XmlFile:
 
     @property
     def is_urdf(self) -> bool:
-        """Whether it is a URDF, else it is MJCF."""
+        """True for a URDF, false for MJCF."""
         return bool(self.root.tag == "robot")
 
     def error(self, message: str, expected: str = "", found: str = "", fix: str = "") -> RobotError:
-        """An error of the file as a whole."""
+        """Return an error of the file as a whole."""
         return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
 
     def has(self, tag: str, name: str) -> bool:
-        """Whether the root has an element with this tag and name."""
+        """Check whether the root has an element with this tag and name."""
         return any(element.get("name") == name for element in self.root.findall(tag))
 
     def place(self, tag: str, name: str) -> tuple[int, int]:
@@ -107,7 +107,7 @@ def _blanked(comment: re.Match[str]) -> str:
 
 
 def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
-    """Every joint's effort, speed and mimic by name."""
+    """Return every joint's effort, speed and mimic by name."""
     found = {}
     for joint in file.root.findall("joint"):
         limit, mimic = joint.find("limit"), joint.find("mimic")
@@ -121,7 +121,7 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
 
 
 def _range(joint: ElementTree.Element) -> str:
-    """The ``range`` of a ``UrdfJoint``."""
+    """Return the ``range`` of a ``UrdfJoint``."""
     limit = joint.find("limit")
     if limit is None or joint.get("type") not in ("revolute", "prismatic"):
         return ""

@@ -18,7 +18,7 @@ NEAR = 0.8
 LEAST_INERTIA = -1e-12
 """Rounding of what wrote the file [kg m^2]."""
 PRODUCTS = ("ixy", "ixz", "iyz")
-"""What may be negative of an inertia."""
+"""Elements of an inertia that may be negative."""
 CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
@@ -50,7 +50,7 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
 
 
 def misspelt(part: ElementTree.Element) -> Iterator[tuple[str, str]]:
-    """The words of an element and of all in it that are nearly a URDF's, as they are and as they should be."""
+    """Yield the words of an element and of all in it that are nearly a URDF's, as they are and as they should be."""
     known = ATTRIBUTES.get(part.tag, ())
     for word in part.attrib:
         near = _near(word, known)
@@ -65,7 +65,7 @@ def misspelt(part: ElementTree.Element) -> Iterator[tuple[str, str]]:
 
 
 def _near(word: str, known: tuple[str, ...]) -> str:
-    """The known word that ``word`` nearly is; empty if it is one, or far from all."""
+    """Return the known word that ``word`` nearly is; empty if it is one, or far from all."""
     if word in known:
         return ""
     swapped = [each for each in known if sorted(each) == sorted(word)]
@@ -73,8 +73,8 @@ def _near(word: str, known: tuple[str, ...]) -> str:
 
 
 def wrong_inertia(link: ElementTree.Element) -> str:
-    """The mass of a link and the numbers of its inertia that no body has, as they are written; empty where
-    there are none.
+    """Return the mass of a link and the numbers of its inertia that no body has, as they are written; empty where there
+    are none.
 
     MuJoCo does not look at those of a link that a fixed joint holds.
     """

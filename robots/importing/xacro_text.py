@@ -22,7 +22,7 @@ class _NoPackage(Exception):
 
 
 def expand_xacro(path: Path) -> str:
-    """The URDF that the file stands for.
+    """Return the URDF that the file stands for.
 
     Raises:
         RobotError: the library is not installed, a package is not found, or xacro cannot expand the file.
@@ -66,7 +66,7 @@ def expand_xacro(path: Path) -> str:
 
 
 def _missing(error: BaseException | None) -> str:
-    """The package that was not found, if this is why it failed."""
+    """Return the package that was not found, if this is why it failed."""
     while error is not None:
         if isinstance(error, _NoPackage):
             return str(error)

@@ -1,4 +1,4 @@
-"""Whether data describes a robot that can exist: every fault at once, each with its place."""
+"""Validation of data as a robot that can exist: every fault at once, each with its place."""
 
 from .faults import RobotError, RobotFault
 from .find_faults import find_faults

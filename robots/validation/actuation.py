@@ -44,7 +44,7 @@ def check_actuation(draft: Draft) -> None:
 
 
 def _sliding_motors(draft: Draft, transmission: Transmission) -> frozenset[str]:
-    """The motors that move slides only, whose torques are forces."""
+    """Return the motors that move slides only, whose torques are forces."""
     kinds = [
         joint.get("kind") for joint in draft.data.get("joints") or () if isinstance(joint, Mapping)
     ]
@@ -125,7 +125,7 @@ def _check_profile(
 
 
 def _units(motors: Sequence[str], slides: frozenset[str]) -> Mapping[str, str]:
-    """The units of torque and speed of these motors, by those of one that turns its joints."""
+    """Return the units of torque and speed of these motors, by those of one that turns its joints."""
     found = {}
     for hinge in ("N m", "rad/s"):
         slide = SLIDE_UNITS[hinge]

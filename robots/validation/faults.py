@@ -1,4 +1,4 @@
-"""What is wrong with a robot's description, the error that carries all of it, and the description while it is checked."""
+"""Faults of a robot's description, the error that carries all of them, and the description while it is checked."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class RobotFault:
     file: str = ""
 
     def lines(self) -> list[tuple[str, str]]:
-        """The details under the message, as (label, text)."""
+        """Return the details under the message, as (label, text)."""
         rows = [("expected", self.expected), ("found", self.found), ("fix", self.fix)]
         return [(label, text) for label, text in rows if text]
 
     def text(self, file: str) -> str:
-        """The fault as plain text of several lines, beginning with its place in the file."""
+        """Return the fault as plain text of several lines, beginning with its place in the file."""
         file = self.file or file
         place = f"{file}:{self.line}:{self.column}" if self.line else file
         head = f"{place}: {self.message}"
@@ -73,17 +73,17 @@ class RobotError(ValueError):
 
 
 def nearest(name: str, legal: Iterable[str]) -> str:
-    """The legal name most like ``name``; empty when none is alike."""
+    """Return the legal name most like ``name``; empty when none is alike."""
     return next(iter(problems.nearest(name, legal, 1)), "")
 
 
 def number(value: float) -> str:
-    """A number as it would be written in the file."""
+    """Return a number as it would be written in the file."""
     return f"{value:.6g}"
 
 
 def vector(values: Iterable[float]) -> str:
-    """A list of numbers as it would be written in the file."""
+    """Return a list of numbers as it would be written in the file."""
     return f"[{', '.join(number(value) for value in values)}]"
 
 
@@ -117,7 +117,7 @@ class Draft:
         )  # fmt: skip
 
     def parts(self, key: str, kind: type[Part]) -> list[tuple[int, Part]]:
-        """The readable elements of the list under ``key``, each with its index."""
+        """Return the readable elements of the list under ``key``, each with its index."""
         found = self.data.get(key)
         if not isinstance(found, Sequence) or isinstance(found, str):
             return []
@@ -125,13 +125,13 @@ class Draft:
         return [(k, part) for k, part in parts if part is not None]
 
     def entries(self, key: str) -> Iterator[tuple[str, Any]]:
-        """The entries of the mapping under ``key`` whose keys are text."""
+        """Yield the entries of the mapping under ``key`` whose keys are text."""
         found = self.data.get(key)
         if isinstance(found, Mapping):
             yield from ((name, value) for name, value in found.items() if isinstance(name, str))
 
     def names(self, key: str) -> list[str]:
-        """The names in the list under ``key``, also of elements that are unreadable otherwise."""
+        """Return the names in the list under ``key``, also of elements that are unreadable otherwise."""
         found = self.data.get(key)
         if not isinstance(found, Sequence) or isinstance(found, str):
             return []
@@ -140,7 +140,7 @@ class Draft:
 
 
 def read(kind: type[Part], value: Any) -> Part | None:
-    """The value as that part of a description; None where it cannot be read."""
+    """Return the value as that part of a description; None where it cannot be read."""
     try:
         return kind.model_validate(value)
     except ValidationError:

@@ -1,4 +1,4 @@
-"""All checks of a description, one after the other; first whether every key is known and holds a value of the right type."""
+"""Checks of a description, one after the other; first that every key is known and holds a value of the right type."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .structure import check_bodies, check_joints, check_looks, check_names, che
 
 
 def find_faults(data: Any) -> tuple[RobotFault, ...]:
-    """Every fault of a description, given as plain data: mappings, lists, numbers and text.
+    """Return every fault of a description, given as plain data: mappings, lists, numbers and text.
 
     A value of a wrong type is reported and otherwise passed over, so that it hides nothing else.
     Data without a fault can be read by ``RobotDescription.model_validate``.
@@ -80,7 +80,7 @@ def _report(draft: Draft, kind: type[BaseModel], error: Mapping[str, Any]) -> No
 
 
 def _in_data(location: Path) -> Path:
-    """Where an error stands in the data: pydantic also names the kind of a shape, which is no key."""
+    """Return the place of an error in the data: pydantic also names the kind of a shape, which is no key."""
     return tuple(
         key
         for depth, key in enumerate(location)
@@ -89,7 +89,7 @@ def _in_data(location: Path) -> Path:
 
 
 def shown(value: Any) -> str:
-    """A value as it would be written in the file, cut off where it is long."""
+    """Return a value as it would be written in the file, cut off where it is long."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -99,7 +99,7 @@ def shown(value: Any) -> str:
 
 
 def where(data: Any, path: Path) -> str:
-    """What stands at a path, in words: ``link shank``, ``profile koala``, ``the robot``."""
+    """Return a path's element in words: ``link shank``, ``profile koala``, ``the robot``."""
     words: list[str] = []
     singular = {"links": "link", "joints": "joint", "feet": "foot", "contacts": "contact",
                 "shapes": "shape", "profiles": "profile", "thrusters": "thruster"}  # fmt: skip

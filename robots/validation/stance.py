@@ -9,7 +9,7 @@ from ..robot_description import ContactPoint, Foot, Joint
 from .faults import Draft, Path, number, vector
 
 MARGIN = 1e-9
-"""By how much a pose may exceed a joint's limit [rad, m]: rounding."""
+"""Tolerance of a pose at a joint's limit [rad, m]: rounding."""
 
 
 def check_feet(draft: Draft) -> None:

@@ -117,7 +117,7 @@ def _check_connection(draft: Draft, links: list[str], base: str, carrier: dict[s
 
 
 def _unread_joint(draft: Draft) -> bool:
-    """Whether some joint could not be read, so that links may seem to hang on nothing."""
+    """Check whether some joint could not be read, so that links may seem to hang on nothing."""
     found = draft.data.get("joints")
     return not isinstance(found, (list, tuple)) or len(draft.parts("joints", Joint)) < len(found)
 
@@ -155,7 +155,7 @@ __all__ = ["check_tree", "nearest"]
 
 
 UNIT = 1e-6
-"""How far an axis' length may be from one: six digits in a file are enough."""
+"""Tolerance of an axis' length about one: six digits in a file are enough."""
 
 
 def check_joints(draft: Draft) -> None:
@@ -208,8 +208,9 @@ def _check_limits(draft: Draft, path: Path, name: str, lower: float, upper: floa
 
 
 TRIANGLE = 1e-6
-"""By how much, relative to the largest, principal moments may break the triangle inequality:
-so much is rounding in published files."""
+"""Tolerance of the triangle inequality of principal moments, relative to the largest: so much is rounding in published
+files.
+"""
 
 
 def check_bodies(draft: Draft) -> None:

@@ -21,7 +21,7 @@ _ROUNDS = 2
 _BELOW = "<below>"
 """The place of the lanes that lead back."""
 FEW = 300
-"""With no more places in all the best order is sought, else a good one."""
+"""Largest number of places for which the best order is sought; beyond it, a good one."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Layers:
 
 
 def arrange(diagram: Diagram) -> Layers:
-    """The columns of a diagram, in an order that is the same for the same diagram.
+    """Arrange a diagram in columns, in an order that is the same for the same diagram.
 
     The ports of its blocks are put into the order in which their wires come and go.
     """
@@ -69,7 +69,7 @@ def arrange(diagram: Diagram) -> Layers:
 
 
 def _ranks(diagram: Diagram) -> dict[str, float]:
-    """Where a node stands in the order of execution.
+    """Return the rank of each node in the order of execution.
 
     A block whose outputs follow from its state writes before all others and reads after them; it stands
     where the fewest of its wires lead back.
@@ -102,7 +102,7 @@ def _ranks(diagram: Diagram) -> dict[str, float]:
 def _longest_paths(
     diagram: Diagram, forward: Sequence[DiagramWire], rank: dict[str, float]
 ) -> dict[str, int]:
-    """The column of every node: behind all its sources, and not further left than need be."""
+    """Return the column of every node: behind all its sources, and no further right than necessary."""
     layer = dict.fromkeys(diagram.nodes, 0)
     sources: dict[str, list[str]] = {path: [] for path in diagram.nodes}
     targets: dict[str, list[str]] = {path: [] for path in diagram.nodes}
@@ -121,7 +121,7 @@ def _longest_paths(
 
 
 def _add_passages(layers: Layers) -> None:
-    """A place in every column that a net passes, shared by all its readers."""
+    """Add a place in every column that a net passes, shared by all its readers."""
     reach: dict[tuple[str, str], int] = {}
     for wire in layers.forward:
         reach[wire.source] = max(reach.get(wire.source, 0), layers.layer[wire.target[0]])
@@ -144,7 +144,7 @@ def _add_passages(layers: Layers) -> None:
 
 
 End = tuple[Place, float]
-"""Where a net arrives: the place, and how far down in it."""
+"""End of a net: the place, and its share of the place's height from the top."""
 
 
 @dataclass
@@ -237,7 +237,7 @@ def _reduce_crossings(layers: Layers, diagram: Diagram) -> None:
 
 
 def _all_pairs(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> int:
-    """How often nets must cross in all gaps."""
+    """Count the unavoidable crossings of nets in all gaps."""
     return sum(
         _pair(one, other, where)
         for gap in gaps
@@ -278,12 +278,12 @@ def _sort_ports(layers: Layers, diagram: Diagram) -> None:
 
 
 def _shares(ports: Sequence[str]) -> dict[str, float]:
-    """How far down in its block each port is."""
+    """Return the height of each port in its block, as a share from the top."""
     return {port: (k + 1) / (len(ports) + 1) for k, port in enumerate(ports)}
 
 
 def _crossings(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> int:
-    """How many pairs of wires between neighbouring columns cross."""
+    """Count the crossing pairs of wires between neighbouring columns."""
     total = 0
     for gap in gaps:
         wires = sorted(
@@ -357,7 +357,7 @@ def _move(
 
 
 def _pair(one: _NetInGap, other: _NetInGap, where: dict[Place, int]) -> int:
-    """How often two nets must cross in a gap."""
+    """Count the unavoidable crossings of two nets in a gap."""
     if where[one.start[0]] + one.start[1] > where[other.start[0]] + other.start[1]:
         one, other = other, one
     upper = [where[p] + s for p, s in one.ends]

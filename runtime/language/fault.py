@@ -26,7 +26,7 @@ FaultKind = Literal[
     "stuck", "lost", "delayed", "biased", "drifting", "noisy", "scaled", "flipped", "chirp",
 ]  # fmt: skip
 FOLDER = "faults/"
-"""What the paths of faults begin with."""
+"""Prefix of the paths of faults."""
 HOLDING: tuple[FaultKind, ...] = ("stuck", "lost", "delayed")
 """The kinds that give an earlier value, of any type; those beside ``flipped`` compute with numbers."""
 OPTIONS: dict[FaultKind, dict[str, bool]] = {
@@ -44,7 +44,7 @@ OPTIONS: dict[FaultKind, dict[str, bool]] = {
 
 
 class FaultParameters(Parameters):
-    """What goes wrong, and when."""
+    """Kind, size and time of a fault."""
 
     kind: FaultKind = parameter(text="what goes wrong")
     start: float = parameter(
@@ -75,14 +75,14 @@ class FaultParameters(Parameters):
 
 
 class FaultState(Signal):
-    """Whether a fault is there."""
+    """State of a fault: present or not."""
 
     active = Field(dtype="bool", text="whether it is there in this run")
     age = Field(unit="s", text="since when; zero before")
 
 
 class FaultMemory(Signal):
-    """How far a fault is."""
+    """Progress of a fault."""
 
     runs = Field(dtype="int64", text="runs since its event, or since the start; -1 before")
     happened = Field(dtype="bool", text="whether its event was")
@@ -91,7 +91,7 @@ class FaultMemory(Signal):
 
 
 class FaultTiming(NamedTuple):
-    """When a fault is there: from ``start`` to ``end`` [s], in a ``share`` of the runs, which take
+    """Time of a fault: from ``start`` to ``end`` [s], in a ``share`` of the runs, which take
     ``period`` [s] each. With an ``event`` the time counts from when ``compared`` holds first."""
 
     start: float
@@ -116,7 +116,7 @@ CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<val
 
 @kernel
 def notice_event(value: Array, condition: Comparison, happened: Flags) -> None:
-    """Whether the condition holds for a value of any type (1,) now, or did before."""
+    """Set ``happened`` if the condition holds for a value of any type (1,), now or before."""
     number, wanted = float(value[0]), condition.number
     holds = (
         (condition.sign == 0 and number == wanted)
@@ -134,7 +134,8 @@ def time_fault(
     timing: FaultTiming, tick: Indices, happened: Flags, draw: Array, runs: Indices, began: Indices,
     active: Flags, age: Array, acts: Flags,
 ) -> None:  # fmt: skip
-    """Whether a fault is there, since when, and whether it acts in this run; ``draw`` is between 0 and 1."""
+    """Decide whether a fault is present, since when, and whether it acts in this run; ``draw`` is
+    between 0 and 1."""
     if runs[()] >= 0 or happened[0] or not timing.event:
         runs[()] = runs[()] + 1
     elapsed = timing.period * runs[()]
@@ -148,7 +149,8 @@ def time_fault(
 
 @kernel
 def fill_ring(values: Octets, ring: Octets, filled: Flags) -> None:
-    """In the first run: the entries (k, n) before it were as the ``values`` (1, n) are now."""
+    """Fill the ring in the first run: the entries (k, n) before it equal the ``values`` (1, n) of
+    now."""
     if not filled[()]:
         for entry in range(ring.shape[0]):
             for i in range(ring.shape[1]):
@@ -202,7 +204,8 @@ LINES = 40
 
 
 def chirp_lines(low: float, high: float, period: float) -> Array:
-    """The frequencies of a chirp [Hz]: multiples of 1 / period from low to high, evenly in their logarithm."""
+    """Return the frequencies of a chirp [Hz]: multiples of 1 / period from low to high, evenly in
+    their logarithm."""
     first, last = math.ceil(low * period - 1e-9), math.floor(high * period + 1e-9)
     if last < first:
         return np.zeros(0)
@@ -254,7 +257,7 @@ class Fault(Block):
     Params = FaultParameters
     params: FaultParameters
     target: ClassVar[str] = ""
-    """Where it is, as the graph says it."""
+    """Target of the fault, as written in the graph."""
     elements: ClassVar[dict[str, NDArray[np.int64]]] = {}
     """The places that it changes, by field."""
     compared: ClassVar[Comparison | None] = None
@@ -267,7 +270,7 @@ class Fault(Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """A fault changes values and no units."""
+        """Keep the units: a fault changes values only."""
         fields = cls.outputs["y"].signal.fields
         return {
             f"y.{name}": inputs[f"u.{name}"] for name, field in fields.items() if field.inferred
@@ -329,7 +332,7 @@ class Fault(Block):
     def _changes(
         self, name: str, places: NDArray[np.int64], source: NDArray[Any], target: NDArray[Any]
     ) -> list[KernelCall]:
-        """The calls that change one field."""
+        """Return the calls that change one field."""
         params, kind, size = self.params, self.params.kind, target.dtype.itemsize
         out, value = target.reshape(-1), 0.0 if params.value is None else params.value
         if "past" in self.states:
@@ -372,7 +375,7 @@ class Fault(Block):
         ]
 
     def metrics(self) -> Mapping[str, Metric]:
-        """When the fault was there first, if it was."""
+        """Return the time at which the fault first appeared, if it did."""
         began = int(self.memory.began)
         return {} if began < 0 else {"fault_time_s": began * self.context.clock.base_period}
 
@@ -393,7 +396,7 @@ def fault_block_type(
     *,
     reads_truth: bool = False,
 ) -> type[Fault]:
-    """The block type that puts a fault on ``signal``: input ``u``, output ``y``.
+    """Return the block type that puts a fault on ``signal``: input ``u``, output ``y``.
 
     Args:
         signal: of the wire.

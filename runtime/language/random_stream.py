@@ -88,7 +88,7 @@ def load_generator(bits: np.random.BitGenerator, words: NDArray[np.int64]) -> No
 
 
 def _signed(word: int) -> int:
-    """The 64 bits of a whole number as a signed one, which an array of integers holds."""
+    """Return the 64 bits of a whole number as a signed one, which an array of integers holds."""
     return word - (1 << 64) if word >= 1 << 63 else word
 
 
@@ -113,15 +113,16 @@ def uniform_call(generator: np.random.Generator, out: Array) -> tuple[LibraryCal
 
 
 def _bits(generator: np.random.Generator) -> int:
-    """The address of what NumPy's functions draw from; it is the generator's for all its life."""
+    """Return the address of the state that NumPy's functions draw from, which lasts as long as the
+    generator."""
     interface = generator.bit_generator.ctypes
     return int(interface.bit_generator.value or 0)
 
 
 @cache
 def _addresses() -> tuple[int, int]:
-    """The addresses of the functions behind ``standard_normal`` and ``random``; zeros where NumPy does
-    not give them away, and then Python calls these."""
+    """Return the addresses of the functions behind ``standard_normal`` and ``random``; zeros where
+    NumPy does not export them, so that Python calls them instead."""
     from numpy.random import _generator
 
     try:

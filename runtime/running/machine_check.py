@@ -163,7 +163,7 @@ LIBRARIES = {
 }
 """The packages of a run that hold machine code, and the names they are imported by."""
 
-IN_EXTRAS = frozenset({"casadi", "eclipse-zenoh"})
+IN_EXTRAS = frozenset({"casadi"})
 """Those that only extras bring, so that they may be missing."""
 
 SYSTEM_PACKAGES = {"libgomp.so.1": "libgomp1", "libstdc++.so.6": "libstdc++6"}

@@ -60,11 +60,6 @@ class NetworkTransport(Transport, Protocol):
         """
 
     @classmethod
-    def host_fault(cls, host: str) -> str:
-        """Why no machine can listen at ``host``, or an empty text."""
-        return ""
-
-    @classmethod
     def needs_keys(cls, placed: PlacedGraph) -> bool:
         """Whether only who has keys can connect to the machines of this graph."""
         return False
@@ -81,10 +76,10 @@ class NetworkTransport(Transport, Protocol):
         """
 
 
-def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> list[int]:
+def free_ports(count: int) -> list[int]:
     """Free ports of the loopback."""
     with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket(type=kind)) for _ in range(count)]
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for made in sockets:
             made.bind(("127.0.0.1", 0))
         return [made.getsockname()[1] for made in sockets]

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
-from ..language.errors import AloftError, need_extra
+from ..language.errors import AloftError
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .keys import check_endpoints, secured
@@ -78,7 +78,6 @@ class ZenohTransport(NetworkTransport):
 
     def observe(self) -> None:
         """Open a session that connects to all machines and listens nowhere."""
-        need_extra("zenoh", "machines", "a link between machines")
         import zenoh
 
         endpoints = [spec.endpoint for spec in self._machines]
@@ -89,7 +88,6 @@ class ZenohTransport(NetworkTransport):
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Open the session and say that the machine is there."""
-        need_extra("zenoh", "machines", "a link between machines")
         import zenoh
 
         names = [spec.name for spec in self._machines]

@@ -39,7 +39,7 @@ def resolve_composite_wires(
     robot: RobotDescription | None,
     problems: Problems,
 ) -> dict[str, BlockDraft]:
-    """The drafts with an inserted block in front of every input that is put together."""
+    """Return the drafts with an inserted block in front of every input that is put together."""
     found: dict[str, BlockDraft] = {}
     check = WireCheck(graph, drafts, problems)
     names = robot.element_names if robot is not None else {}
@@ -88,7 +88,7 @@ class _WireComposer:
         self.wire_text = wire_text(replace(self.wire, delay=0, truth=False).plain())
 
     def compose(self) -> BlockDraft | FlatWire | None:
-        """The inserted block, or a constant, or ``None`` after a problem."""
+        """Return the inserted block, or a constant, or ``None`` after a problem."""
         parts = self._by_field()
         if parts is None:
             return None
@@ -105,7 +105,7 @@ class _WireComposer:
         return self._draft()
 
     def _by_field(self) -> dict[str, WirePart[WireElement]] | None:
-        """The parts by the reader's fields."""
+        """Return the parts by the reader's fields."""
         fields = self.signal.fields
         found: dict[str, WirePart[WireElement]] = {}
         for part in self.wire.parts:
@@ -147,7 +147,7 @@ class _WireComposer:
         return found
 
     def _constant(self, parts: Mapping[str, WirePart[WireElement]]) -> FlatWire | None:
-        """The wire of numbers alone."""
+        """Return the wire of numbers alone."""
         if self.wire.delay:
             self._report(
                 f"the wire to {self.at} delays a constant", self.wire.where, fix="remove 'delay'"
@@ -209,7 +209,7 @@ class _WireComposer:
         return tuple(np.atleast_1d(np.asarray(values[name], np.float64)).tolist())
 
     def _source(self, item: WireElement) -> tuple[str, Field, NDArray[np.int64]] | None:
-        """The inserted block's input for a source, the field, and the places selected in it."""
+        """Return the inserted block's input for a source, the field, and the places selected in it."""
         assert item.wire is not None
         wire = replace(item.wire, where=item.where, shown=wire_text(item.plain()))
         ends = self.check.source(self.at, wire, self.reader, None)
@@ -265,7 +265,8 @@ class _WireComposer:
         )
 
     def _draft(self) -> BlockDraft | None:
-        """The inserted block: in the ticks of its reader, or of its sources where it is delayed."""
+        """Return the inserted block: in the ticks of its reader, or of its sources where it is
+        delayed."""
         reader = self.reader
         clock = (reader.period_ticks, reader.offset_ticks)
         if self.wire.delay:
@@ -313,11 +314,11 @@ class _WireComposer:
 
 
 def wire_text(plain: object) -> str:
-    """What a graph says, in one line; the text of one source without the quotes of YAML."""
+    """Format a wire in one line; the text of one source without the quotes of YAML."""
     return plain if isinstance(plain, str) else text_of(plain)
 
 
 def _of_one(field: Field) -> Field:
-    """A field like this one for a single number."""
+    """Return a field like this one for a single number."""
     unit = None if field.unit is None else field.unit.text
     return Field((), unit=unit, dtype=field.dtype_name, inferred=field.inferred)

@@ -45,7 +45,7 @@ COMMON = ("on", "kind", "when", "start", "start_spread", "duration", "seed")
 def insert_faults(
     graph: FlatGraph, drafts: dict[str, BlockDraft], settings: Settings, problems: Problems
 ) -> dict[str, BlockDraft]:
-    """The drafts with a block for every fault, and the wires of its readers moved to it."""
+    """Return the drafts with a block for every fault, and the wires of its readers moved to it."""
     latest: dict[str, str] = {}
     for entry in graph.faults or ():
         if isinstance(entry.value, MapNode):
@@ -78,7 +78,7 @@ class _FaultReader:
         self.path = f"{FOLDER}{entry.key}"
 
     def read(self) -> BlockDraft | None:
-        """The block; ``None`` after a problem."""
+        """Read the fault's block; ``None`` after a problem."""
         before = len(self.problems)
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) or self.path in self.drafts:
             self._report(f"{self.name!r} cannot name a fault", self.where, found=self.name,
@@ -107,7 +107,7 @@ class _FaultReader:
         return self._draft(port, source, elements, params, listing(text for text, _ in texts))
 
     def _kind(self) -> str | None:
-        """The kind, and that its keys go with it."""
+        """Read the kind, and check that its keys go with it."""
         entry = self.node.get("kind")
         value = plain(entry.value) if entry is not None else None
         if value not in OPTIONS:
@@ -134,7 +134,7 @@ class _FaultReader:
         return str(value)
 
     def _targets(self) -> list[tuple[str, Position]]:
-        """The texts of ``on`` with their places."""
+        """Return the texts of ``on`` with their places."""
         entry = self.node.get("on")
         if entry is None:
             self._report("the fault does not say where it is", self.node.where, found="nothing",
@@ -148,7 +148,7 @@ class _FaultReader:
     def _place(
         self, text: str, where: Position
     ) -> tuple[str, tuple[BlockDraft, type[Signal]], Selection] | None:
-        """The ``block.port`` of a target, who writes it with what signal, and the selection."""
+        """Find the ``block.port`` of a target, its writer with its signal, and the selection."""
         read = read_selection(text)
         if read is None:
             self._report(f"{text!r} is neither an output nor an input", where, found=text,
@@ -190,7 +190,7 @@ class _FaultReader:
         places: list[tuple[str, tuple[BlockDraft, type[Signal]], Selection]],
         kind_of: str, texts: list[tuple[str, Position]],
     ) -> dict[str, NDArray[np.int64]] | None:  # fmt: skip
-        """The places that change, by field."""
+        """Find the places that change, by field."""
         found: dict[str, NDArray[np.int64]] = {}
         names = _element_names(self.settings)
         for (_, _, selection), (text, where) in zip(places, texts, strict=True):
@@ -232,7 +232,7 @@ class _FaultReader:
         return found
 
     def _parameters(self, kind_of: str, fields: list[Field]) -> FaultParameters | None:
-        """The parameters, in which a value with a unit is a number in that of the field."""
+        """Read the parameters, in which a value with a unit is a number in that of the field."""
         entries = []
         for entry in self.node:
             if entry.key in ("on", "when") or entry.key.startswith("_"):
@@ -330,8 +330,8 @@ class _FaultReader:
         return made
 
     def _event(self) -> Any:
-        """The comparison of ``when``, its signal and wire, and whether it is truth; ``None`` without one, and false
-        after a problem."""
+        """Read the comparison of ``when``, its signal and wire, and whether it is truth; ``None``
+        without one, and false after a problem."""
         entry = self.node.get("when")
         if entry is None:
             return None
@@ -385,7 +385,7 @@ class _FaultReader:
 
 
 def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
-    """The wire, or its parts, from another output where it came from ``source``."""
+    """Return the wire, or its parts, from another output where it came from ``source``."""
     if wire.parts:
         parts = tuple(
             replace(part, items=tuple(
@@ -401,12 +401,12 @@ def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
 
 
 def _element_names(settings: Settings) -> Mapping[str, tuple[str, ...]]:
-    """The names of elements by their dimension."""
+    """Return the names of elements by their dimension."""
     return {} if settings.robot is None else settings.robot.element_names
 
 
 def _number(text: str, field: Field) -> float | None:
-    """A number, a truth value, a name of the field's values, or a quantity in its unit."""
+    """Read a number, a truth value, a name of the field's values, or a quantity in its unit."""
     words = {"true": 1.0, "false": 0.0}
     if field.values is not None:
         words |= {each.name.lower(): float(each.value) for each in field.values}

@@ -35,7 +35,7 @@ class Settings:
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
     folder: Path = Path()
-    """Where the graph's file lies."""
+    """Folder of the graph's file."""
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -109,7 +109,7 @@ def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:
-    """The robot that the graph names, with the named actuator profile in use.
+    """Read the robot that the graph names, with the named actuator profile in use.
 
     Returns ``None`` where the graph names no robot, and where the robot itself has a problem. Every
     fault of the robot's description is reported.
@@ -175,7 +175,7 @@ def _report_faults(error: RobotError, where: Position, problems: Problems) -> No
 def _with_actuators(
     robot: RobotDescription | None, entry: Entry, problems: Problems
 ) -> RobotDescription | None:
-    """The robot with the actuator profile that the graph names in use."""
+    """Return the robot with the actuator profile that the graph names in use."""
     node = entry.value
     name = node.value if isinstance(node, ScalarNode) else None
     if robot is None:

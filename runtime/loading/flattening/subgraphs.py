@@ -93,7 +93,7 @@ class Resolver:
         self.problems = problems
 
     def resolve(self, link: WrittenWire | None, at: str) -> FlatWire | str | None:
-        """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
+        """Return the wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
         if link is None:
             return None
         start = link
@@ -148,7 +148,7 @@ class Resolver:
     def _resolve_composite(
         self, link: WrittenWire, total: FlatWire, selection: Selection, at: str
     ) -> FlatWire | None:
-        """The wire of a link with parts, of which ``selection`` takes something."""
+        """Return the wire of a link with parts, of which ``selection`` takes something."""
         parts = link.parts
         if selection.field:
             parts = tuple(part for part in parts if part.field == selection.field)
@@ -181,7 +181,7 @@ class Resolver:
         return replace(total, parts=tuple(resolved))
 
     def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[WireElement]:
-        """The pieces that a resolved wire adds to a part."""
+        """Return the pieces that a resolved wire adds to a part."""
         rest = Selection("", selection.indices)
         if not wire.parts:
             inner = replace(wire, truth=wire.truth or total.truth)
@@ -206,7 +206,7 @@ class Resolver:
     def _of_constant(
         self, constant: MapNode, selection: Selection, start: WrittenWire, at: str
     ) -> FlatWire | None:
-        """A part of constant values, which is a number again."""
+        """Return a part of constant values, which is a number again."""
         entry = constant.get(selection.field) if selection.field else None
         if selection.indices or (entry is None and len(constant.entries) != 1):
             self._selection(f"{str(selection)!r} cannot be selected of a constant", start, at)
@@ -221,7 +221,7 @@ class Resolver:
         )
 
     def outputs(self) -> dict[str, dict[str, FlatWire]]:
-        """For every sub-graph block that was expanded, where its outputs come from."""
+        """Return, for every sub-graph block that was expanded, the sources of its outputs."""
         found: dict[str, dict[str, FlatWire]] = {}
         for path, instance in self.instances.items():
             if instance.broken:
@@ -231,8 +231,8 @@ class Resolver:
         return found
 
     def inputs(self) -> dict[str, dict[str, str]]:
-        """For every sub-graph block, the output ``block.port`` that each of its inputs is wired to;
-        those that are put together, selected or constant are left out."""
+        """Return, for every sub-graph block, the output ``block.port`` that each of its inputs is
+        wired to; those that are put together, selected or constant are left out."""
         found: dict[str, dict[str, str]] = {}
         for path, instance in self.instances.items():
             wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.links.items()}
@@ -323,7 +323,7 @@ class Resolver:
 def parameter_values(
     block: FlatBlock, subgraph: WrittenGraph, problems: Problems
 ) -> dict[str, Node] | None:
-    """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
+    """Return the values of a sub-graph's parameters for one use; ``None`` if one is missing."""
     declared = {entry.key: entry for entry in subgraph.parameters}
     misspelt: dict[str, None] = {}
     for entry in block.parameters:
@@ -378,7 +378,7 @@ class Bindings:
     problems: Problems
 
     def substitute(self, node: Node) -> Node:
-        """The tree with every ``$name`` replaced; ``$$text`` is the text ``$text``."""
+        """Return the tree with every ``$name`` replaced; ``$$text`` is the text ``$text``."""
         if isinstance(node, ScalarNode):
             text = node.value
             if not isinstance(text, str) or not text.startswith("$"):

@@ -41,7 +41,7 @@ class WrittenWire:
 def read_wire(
     node: Node, prefix: str, instance: str | None, at: str, problems: Problems
 ) -> WrittenWire | None:
-    """The link that an input's value writes; ``None`` after a problem.
+    """Read the link in an input's value; ``None`` after a problem.
 
     Block paths get ``prefix`` in front; ``inputs.name`` is an input of the sub-graph ``instance``.
     """
@@ -84,7 +84,7 @@ def read_wire(
 
 
 def _is_by_field(keys: Mapping[str, Entry]) -> bool:
-    """Whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
+    """Return whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
     if not keys or any(key in SOURCE_KEYS for key in keys):
         return False
     if any(isinstance(entry.value, MapNode) for entry in keys.values()):
@@ -116,7 +116,7 @@ def _read_fields(
 def _read_expression(
     node: ScalarNode | ListNode, prefix: str, instance: str | None, at: str, problems: Problems
 ) -> WrittenWire | None:
-    """A source, a number, or a list of these."""
+    """Read a source, a number, or a list of these."""
     if isinstance(node, ScalarNode) and not is_number(node):
         return _read_source(node, prefix, instance, at, problems)
     part = _read_part("", node, prefix, instance, at, problems)
@@ -152,7 +152,7 @@ def _read_part(
 
 
 def is_number(node: ScalarNode) -> bool:
-    """Whether a value is a number, a truth value, or a number with a unit such as ``3 mm``."""
+    """Return whether a value is a number, a truth value, or a number with a unit such as ``3 mm``."""
     if not isinstance(node.value, str):
         return node.value is not None
     return QUANTITY.match(node.value) is not None

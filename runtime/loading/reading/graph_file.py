@@ -24,7 +24,7 @@ EXAMPLES = {"Hz": "500 Hz", "s": "4 s"}
 
 
 def positive_quantity(value: object, unit: str) -> float:
-    """A positive number in ``unit``, from a number or a text with a unit.
+    """Read a positive number in ``unit``, from a number or a text with a unit.
 
     Raises:
         UnitError: it is none; the text is empty where there is no more to say.
@@ -49,7 +49,7 @@ def _seconds(value: object) -> float:
 
 
 def _key(text: str, written: str = "", **schema: Any) -> Any:
-    """A key that may be missing; ``written`` where Python has another use for the word."""
+    """Declare a key that may be missing; ``written`` where Python has another use for the word."""
     return Field(
         default_factory=lambda: None,
         alias=written or None,
@@ -91,7 +91,7 @@ Items = Annotated[
 
 
 def keys_of(model: type[BaseModel]) -> tuple[str, ...]:
-    """The keys that a model declares, as they are written."""
+    """Return the keys that a model declares, as they are written."""
     return tuple(info.alias or name for name, info in model.model_fields.items())
 
 
@@ -127,11 +127,11 @@ WIRE_KEYS = (*SOURCE_KEYS, *keys_of(WireValue))
 
 
 Wire: TypeAlias = Item | Items | Fields | WireFrom | WireValue
-"""What an input reads."""
+"""Source of an input."""
 
 
 class BackgroundKeys(_Keys):
-    """How a block works in the background."""
+    """Keys of a block that works in the background."""
 
     latency: Seconds = _key("the time after which outputs appear: a multiple of the block's period")
     late: WhenLate = _key(
@@ -161,7 +161,7 @@ class BlockEntry(_Keys):
 
 
 class ClockKeys(_Keys):
-    """How a run is paced."""
+    """Keys of the pacing of a run."""
 
     kind: ClockKind = _key("as fast as possible, by wall time, or by the robot")
     overrun: Overrun = _key("what follows where a tick takes too long")
@@ -172,7 +172,7 @@ class ClockKeys(_Keys):
 
 
 class LinkKeys(_Keys):
-    """How late messages are treated."""
+    """Keys of the policy on late messages."""
 
     max_age: Seconds = _key("the age at which 'late' takes effect")
     late: WhenLate = _key("keep the last values, read zeros, or end the run")
@@ -180,7 +180,7 @@ class LinkKeys(_Keys):
 
 
 class Links(LinkKeys):
-    """How the machines keep together."""
+    """Settings by which the machines keep together."""
 
     mode: LinkMode = _key("wait for each other, or run free")
     of: dict[str, LinkKeys] = _key("the links of single blocks, by block")
@@ -263,7 +263,8 @@ _WRONG_KINDS = {"dict_type", "model_type", "bool_type"}
 def read_section(
     node: MapNode, name: str, model: type[BaseModel], problems: Problems
 ) -> dict[str, Any]:
-    """What a section of the graph gives; what is wrong is reported to ``problems`` and left out."""
+    """Read the values of a section of the graph; what is wrong is reported to ``problems`` and left
+    out."""
     data = plain(node)
     try:
         return model.model_validate(data).model_dump(exclude_unset=True)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from tests.robots.example_robots import needs_robots
 
-from aloft.blocks.signals import Phase
 from aloft.planner.library.library import solve_and_check
 from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
 from aloft.planner.models.symbolic_model import SymbolicModel
@@ -20,6 +19,7 @@ from aloft.planner.problem.obstacles import (
     step_parameters,
 )
 from aloft.planner.solving.solve import make_problem
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.read_task import edge_room
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
