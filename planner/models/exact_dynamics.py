@@ -443,7 +443,7 @@ class ExactDynamics:
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
     def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
-        """Return the states after every step of all stretches in turn: (n_steps, n_positions) and (n_steps,
+        """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
         angles = np.concatenate([one.angles for one in segments])

@@ -70,7 +70,7 @@ def ballistic_guess(problem: FullProblem) -> Array:
 
 
 def _mean_length(problem: FullProblem, problem_phase: ProblemPhase) -> float:
-    """Return the mean length of a stretch's intervals [s]."""
+    """Return the mean length of a phase's intervals [s]."""
     if problem_phase.flies:
         return flight_guess(problem, problem_phase.place)[0] / problem_phase.count
     low, high = problem_phase.bounds

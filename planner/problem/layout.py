@@ -1,6 +1,6 @@
 """The phases of a task divided into intervals: what the knots of its problem stand for.
 
-Knots are the beginnings of intervals, and the end. A stretch is a phase with a number of intervals;
+Knots are the beginnings of intervals, and the end. A problem phase is a phase with a number of intervals;
 where its time is free, and in every flight, the mean length of its intervals is a state that the
 knot before it chooses. With impacts one interval of no length, the touchdown's impulse, comes
 between a flight and the ground.
@@ -106,7 +106,7 @@ class ProblemPhase:
 
 
 def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
-    """Return the stretches of a task in the order of time.
+    """Return the phases of a task in the order of time.
 
     Raises:
         JumpTaskError: a phase on the ground names no contact point.

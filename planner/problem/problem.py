@@ -52,7 +52,7 @@ class FullProblem(NonlinearProgram):
 
     Attributes:
         stances: where the robot stands at the start, between jumps and at the end.
-        stretches: the phases with their intervals.
+        problem_phases: the phases with their intervals.
         steps: the interval lengths [s]; by their mean where that is a variable.
         exact: the model of the robot as it is; ``model`` is the same left and right in mirrored
             coordinates.
@@ -96,7 +96,7 @@ class FullProblem(NonlinearProgram):
         return self.flights[0]
 
     def phase_at(self, k: int) -> ProblemPhase:
-        """Return the stretch of the interval that begins with a knot; the last one at the end."""
+        """Return the phase of the interval that begins with a knot; the last one at the end."""
         return next((s for s in self.problem_phases if k < s.stop), self.problem_phases[-1])
 
     def posture(self, k: int) -> Array:

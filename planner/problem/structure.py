@@ -146,7 +146,7 @@ class Structure:
     """The knots of a task's problem in those coordinates.
 
     Attributes:
-        stretches: the phases with their intervals; ``of_knot`` that of every interval.
+        problem_phases: the phases with their intervals; ``of_knot`` that of every interval.
         given: by knot the variables that are given there, their values and families.
         knots: all of them, the end included.
     """
@@ -266,7 +266,7 @@ class Structure:
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
     def _interval_rows(self, problem_phase: ProblemPhase) -> NDArray[np.int64]:
-        """As ``_kept_rows``; worked out once for a stretch."""
+        """As ``_kept_rows``; worked out once for a phase."""
         if problem_phase not in self._kept:
             self._kept[problem_phase] = self._kept_rows(problem_phase)
         return self._kept[problem_phase]

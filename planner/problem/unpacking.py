@@ -140,7 +140,7 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
 def _turn_forces(
     problem: FullProblem, problem_phase: ProblemPhase, force: Array, *, to_world: bool
 ) -> None:
-    """Turn the forces in a stretch (n, 3 n_contacts) from the axes of the ground that it stands on to the
+    """Turn the forces in a phase (n, 3 n_contacts) from the axes of the ground that it stands on to the
     world's, or back, in place."""
     slope = problem.stances[problem_phase.place].slope
     if slope != LEVEL:

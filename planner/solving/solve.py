@@ -67,7 +67,7 @@ def relaxed(problem: FullProblem, relaxation: float) -> FullProblem:
 
 
 def tighten(problem: FullProblem, values: Array, relaxation: float) -> Solution | None:
-    """Return a solution of the problem, from one of the problem eased so much; ``None`` if none is reached."""
+    """Return a solution of the problem, from one of the problem relaxed so much; ``None`` if none is reached."""
     step, found = FIRST_STEP, None
     iterations, cpu = 0, 0.0
     while relaxation > 1.0 or found is None:
@@ -84,7 +84,7 @@ def tighten(problem: FullProblem, values: Array, relaxation: float) -> Solution 
 
 
 def from_relaxed(problem: FullProblem, guess: Array) -> Solution | None:
-    """Return a solution of the problem from a rough guess, by way of eased ones."""
+    """Return a solution of the problem from a rough guess, by way of relaxed ones."""
     for relaxation in RELAXATIONS:
         first = solve(relaxed(problem, relaxation), guess, solver="fatrop", limit=COLD_LIMIT)
         if first.solved:

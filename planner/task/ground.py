@@ -222,7 +222,7 @@ def _leaning_scene(
 def _extents(
     ground: _Edges, places: tuple[StanceLocation, ...]
 ) -> Iterator[tuple[list[float], list[float], StanceLocation]]:
-    """From where to where each stretch reaches along x and along y [m]."""
+    """From where to where each of the ranges reaches along x and along y [m]."""
     along = [(p.x, p.y)[ground.axis] for p in places]
     aside = [(p.y, p.x)[ground.axis] for p in places]
     side = [_round(min(aside) - WIDTH), _round(max(aside) + WIDTH)]
