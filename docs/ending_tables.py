@@ -27,7 +27,7 @@ def ground_table(runs: Sequence[Row], of: str) -> str:
 
 
 def _landed(runs: Sequence[Row]) -> tuple[str, str]:
-    """How many runs succeed, and how many end upright."""
+    """Return the numbers of runs that succeed, and that end upright, as text."""
     if not runs:
         return "-", "-"
     tilts = [run["final_tilt_deg"] for run in runs]
@@ -51,7 +51,8 @@ def fault_table(runs: Sequence[Row]) -> str:
 
 
 def _fault_cell(runs: Sequence[Row]) -> str:
-    """How the runs of one fault end, such as ``2 succeed, 3 fall; tilt after 0.41 s; 4 warned: torque after 0.1 s``."""
+    """Summarise the runs of one fault, such as ``2 succeed, 3 fall; tilt after 0.41 s; 4 warned:
+    torque after 0.1 s``."""
     ends = {"succeed": 0, "fall": 0, "stop": 0, "fail": 0}
     stops: dict[str, list[float]] = {}
     warned: dict[str, list[float]] = {}

@@ -1,4 +1,4 @@
-"""What looks wrong with a robot's description: ``aloft robot check-up``, and what keeps a robot from jumping.
+"""Oddities of a robot's description: ``aloft robot check-up``, and obstacles to jumping.
 
 Nothing here is a fault that a description is refused for. Each rule compares numbers that nobody writes down on
 purpose with what bodies, legs and motors of that size are like.
@@ -51,7 +51,7 @@ class Remark:
 
 
 def check_up(robot: RobotDescription) -> dict[str, Any]:
-    """The figures of a robot and the remarks about it, as plain data in SI units."""
+    """Compute the figures of a robot and the remarks about it, as plain data in SI units."""
     standing = standing_rows(robot)
     remarks = [
         *_size(robot), *_links(robot), *_joints(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
@@ -107,7 +107,7 @@ def _links(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _extent(link: Link) -> tuple[float, Array]:
-    """How far a link's shapes reach from their middle [m], and that middle (3,)."""
+    """Return the reach of a link's shapes from their middle [m], and that middle (3,)."""
     corners, radii = corners_of(link.shapes)
     low, high = (corners - radii[:, None]).min(axis=0), (corners + radii[:, None]).max(axis=0)
     return 0.5 * float(np.linalg.norm(high - low)), 0.5 * (low + high)
@@ -203,8 +203,9 @@ def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Rem
 
 
 def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
-    """Of every motor its peak torque, what standing takes of it (none where the robot cannot stand), and the bandwidth:
-    how often a second it could turn its joint by ``STEP`` and back, everything behind it at rest."""
+    """Return for every motor its peak torque, the part that standing takes (none where the robot
+    cannot stand), and the bandwidth: the rate at which it could turn its joint by ``STEP`` and
+    back, everything behind it at rest."""
     from ..hal.simulated.mujoco_model import build_mujoco_model
     from ..hal.simulated.stance import joint_inertias, standing_torques
 
@@ -228,7 +229,7 @@ def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
 
 
 def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
-    """What keeps a robot from jumping whatever the jump, in its own terms; empty where nothing does."""
+    """List the obstacles to any jump of a robot, in its own terms; empty where there are none."""
     if robot.base_joint != "floating":
         return [
             f"its base is {robot.base_joint}: write base_joint: floating, if it can leave the ground"
@@ -248,7 +249,8 @@ def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
 
 
 def off_its_feet(robot: RobotDescription) -> str:
-    """Why a robot with feet cannot stand on them in its standing pose; empty where it can."""
+    """Return the reason why a robot with feet cannot stand on them in its standing pose; empty
+    where it can."""
     from ..hal.simulated.unsupported import uneven_contacts
     from ..mathematics.capture_step import support_margin
     from ..robots.kinematics import standing_contacts, standing_feet
@@ -268,8 +270,8 @@ def off_its_feet(robot: RobotDescription) -> str:
 
 
 def torque_factor(task: Any, robot: RobotDescription) -> float | None:
-    """How many times as strong and fast the motors must be for a task to have a plan; none where they are
-    not what is in the way."""
+    """Return the factor on the motors' strength and speed with which a task has a plan; none where
+    they are not in the way."""
     from ..planner.library.library import solve_and_check
     from ..planner.task.files import JumpTaskError, PlanError
 
@@ -287,7 +289,7 @@ SCALED = ("peak_torque", "continuous_torque", "corner_speed", "no_load_speed")
 
 
 def with_stronger_motors(robot: RobotDescription, factor: float) -> RobotDescription:
-    """The robot with torque and speed of its motors scaled, in every profile."""
+    """Return the robot with torque and speed of its motors scaled, in every profile."""
     profiles = {}
     for name, profile in robot.profiles.items():
         motors = {

@@ -48,7 +48,7 @@ def run_job(work: Job) -> Outcome:
 
 
 def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
-    """The part of a run's result that is kept.
+    """Return the part of a run's result that is kept.
 
     Raises:
         AloftError: a signal ended the run, so it has no outcome.
@@ -67,7 +67,7 @@ def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
 
 
 def run_pool(workers: int = 0, cluster: str = "") -> JobPool:
-    """The processes, or the cluster, that make runs."""
+    """Start the processes, or the cluster, that make runs."""
     return JobPool(run_job, workers=workers, cluster=cluster)
 
 

@@ -70,8 +70,8 @@ def lesson_of(
     signals: Signals, plan: PlannedJump, mass: float, applied: tuple[Vector, Vector],
     measured_place: tuple[float, float] | None = None,
 ) -> Lesson | None:  # fmt: skip
-    """What one run teaches; ``None`` where its task cannot be learnt, such as a row of jumps, or it never
-    flew and landed.
+    """Return the lesson of one run; ``None`` where its task cannot be learnt, such as a row of
+    jumps, or it never flew and landed.
 
     Args:
         signals: of the run.
@@ -101,8 +101,8 @@ def lesson_of(
 
 
 def flight(signals: Signals) -> tuple[Array, float, float, NDArray[np.bool_], int]:
-    """The plan's time in every tick, its lift-off and touchdown [s], whether any point was loaded in every
-    tick, and the tick in the middle of the planned flight."""
+    """Return the plan's time in every tick, its lift-off and touchdown [s], whether any point was
+    loaded in every tick, and the tick in the middle of the planned flight."""
     time = np.asarray(signals("plan.reference.time"), np.float64)
     lifted = float(signals("plan.reference.lift_off_time")[0])
     landed = float(signals("plan.reference.touchdown_time")[0])
@@ -151,7 +151,8 @@ def speed_error(signals: Signals) -> float:
 
 
 def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:
-    """By how much the middle of the feet moves between two ticks in both of which they stand [m, world], (3,).
+    """Integrate the motion of the middle of the feet between two ticks in both of which they stand
+    [m, world], (3,).
 
     The specific force is integrated twice, in the axes of the estimated orientation. At both ends the
     estimator knows the velocity from the legs; what the first integral misses of the last one is the mean
@@ -172,7 +173,7 @@ def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:
 
 
 def rotation_matrices(quaternions: Array) -> Array:
-    """The matrices of quaternions x, y, z, w, (n, 4) to (n, 3, 3)."""
+    """Convert quaternions x, y, z, w, (n, 4), to matrices (n, 3, 3)."""
     x, y, z, w = quaternions.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -183,6 +184,6 @@ def rotation_matrices(quaternions: Array) -> Array:
 
 
 def _moved(feet: Array, start: int, end: int) -> tuple[float, float]:
-    """By how much the middle of the feet (ticks, feet, 3) moves between two ticks [m]."""
+    """Return the motion of the middle of the feet (ticks, feet, 3) between two ticks [m]."""
     x, y, _ = (np.asarray(feet[end]) - np.asarray(feet[start])).mean(axis=0)
     return float(x), float(y)

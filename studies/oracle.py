@@ -1,4 +1,4 @@
-"""What a perfect calibration would tell the controller of a simulated robot, from the simulator's own draws.
+"""A perfect calibration of a simulated robot, from the simulator's own draws.
 
 It bounds what a calibration can give: the values are exact, or wrong by errors of a given size.
 """
@@ -36,13 +36,13 @@ class CalibrationErrors(NamedTuple):
 
 EXACT = CalibrationErrors()
 CALIBRATED = CalibrationErrors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
-"""What the calibration is meant to reach."""
+"""Errors that the calibration is meant to reach."""
 
 
 def oracle_values(
     graph: Graph, errors: CalibrationErrors = EXACT, block: str = "robot", seed: int = 0
 ) -> dict[str, Any]:
-    """The parameters of the controller, as overrides of the graph.
+    """Return the parameters of the controller, as overrides of the graph.
 
     Args:
         graph: with the simulated robot and ``CONSUMER``; its seed must be set.
@@ -74,7 +74,7 @@ def _imu(
 
 
 class ReadingAges(NamedTuple):
-    """By how much readings of slow motions are older than joint angles that arrive at once [s]."""
+    """Extra age of the readings of slow motions over joint angles that arrive at once [s]."""
 
     rate: float
     force: float
@@ -83,7 +83,7 @@ class ReadingAges(NamedTuple):
 
 
 def reading_ages(params: SimulatorParameters) -> ReadingAges:
-    """The ages of the simulated robot's readings, exactly as it computes them.
+    """Compute the ages of the simulated robot's readings, exactly as it does.
 
     Delays are whole steps of the physics, and filters are late by what their discrete form is late. The physics
     is integrated semi-implicitly, q[k+1] = q[k] + T v[k+1]: velocities, and specific forces that are their
@@ -106,7 +106,7 @@ def reading_ages(params: SimulatorParameters) -> ReadingAges:
 def _ages(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    """The ages of the readings [s], and the delay that the controller must bridge."""
+    """Return the ages of the readings [s], and the delay that the controller must bridge."""
     band = params.motors.current_bandwidth
     ages = np.array(reading_ages(params))
     ages = np.maximum(0.0, ages + errors.age * draw.normal(size=4))
@@ -169,7 +169,7 @@ def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, f
 
 
 def _pack(params: SimulatorParameters, robot: RobotDescription) -> dict[str, Any]:
-    """The pack's resistance, so that its sag under load is no fault."""
+    """Return the pack's resistance, so that its sag under load is no fault."""
     if params.battery is None:
         return {}
     return {"safety.pack_resistance": params.battery.of(robot).resistance}

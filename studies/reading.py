@@ -38,7 +38,7 @@ TASK_KEYS = ("graph", "set")
 
 
 def read_study(path: Path) -> Study:
-    """The study in a file.
+    """Read the study in a file.
 
     Raises:
         LoadError: something is wrong with the file; the text reports everything that is.
@@ -59,7 +59,8 @@ def read_study(path: Path) -> Study:
 
 
 def part_of(study: Study, texts: Sequence[str]) -> CellFilter:
-    """The filter that texts such as ``axis=value`` mean. Several values of one axis are alternatives.
+    """Return the filter that texts such as ``axis=value`` mean. Several values of one axis are
+    alternatives.
 
     Raises:
         LoadError: there is no such axis, or it has no such value.
@@ -180,7 +181,7 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
 
 
 def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[StudyTask, ...]:
-    """The tasks of another study, which has to name them itself."""
+    """Read the tasks of another study, which has to name them itself."""
     if not isinstance(entry.value, ScalarNode):
         wrong_kind(entry.value, "'graphs_of'", "a study's file, relative to this one", problems)
         return ()
@@ -224,7 +225,8 @@ def _read_task(entry: Entry, path: Path, problems: Problems) -> StudyTask | None
 
 
 def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[Node, Path]]:
-    """The files that a key names, relative to the study's file. Missing files are noted as problems."""
+    """Read the files that a key names, relative to the study's file. Missing files are noted as
+    problems."""
     if entry is None:
         return []
     found = []

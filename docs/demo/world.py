@@ -37,9 +37,10 @@ TO_MUJOCO, FROM_MUJOCO = (
     ("ctrl", "xfrc_applied"),
     ("qpos", "qvel", "sensordata", "site_xpos", "xipos"),
 )
-"""What is copied to the simulator before a step, and from it after each part of one."""
+"""Arrays copied to the simulator before a step, and from it after each part of one."""
 MODEL = ("body_mass", "body_inertia", "body_ipos", "geom_friction", "geom_solref", "geom_solimp")
-"""What the seeds of a trial change of the simulator's model, which MJCF has with six digits only."""
+"""Arrays of the simulator's model that a trial's seed changes; MJCF holds them with six digits
+only."""
 ARRAYS = {
     "phase": "step.phase.phase", "push": "push.push.force", "blow": "push.constants.force",
     "points": "robot.truth.contact_position", "forces": "robot.truth.contact_force",
@@ -49,7 +50,8 @@ ARRAYS = {
     "forbidden": "score.record.forbidden", "tilt": "score.record.peak_tilt",
     "bus": "", "state": "",
 }  # fmt: skip
-"""What a page shows or changes, by block, port or state, and field; and the whole memory of the graph."""
+"""Arrays that a page shows or changes, by block, port or state, and field; and the whole memory of
+the graph."""
 
 
 class World(NamedTuple):
@@ -69,7 +71,7 @@ class World(NamedTuple):
         return robot.plant
 
     def image(self) -> bytearray:
-        """The bytes of an instance."""
+        """Return the bytes of an instance."""
         return self.module.image.bytes_of(constant=False)
 
 
@@ -139,7 +141,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
 
 
 def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
-    """The memory of a field, by block, port or state, and field."""
+    """Return the memory of a field, by block, port or state, and field."""
     block, *names = place.split(".")
     found: Any = bound.blocks[block]
     for name in names:
@@ -148,7 +150,7 @@ def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
 
 
 def _drawn(call: LibraryCall) -> NDArray[np.float64]:
-    """The memory into which a call draws random numbers."""
+    """Return the memory into which a call draws random numbers."""
     size, address = int(call.words[2]), int(call.words[3])
     return np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
 
@@ -193,7 +195,8 @@ def write_world(
 
 
 def _looks(world: World) -> list[dict[str, Any]]:
-    """The surfaces of the robot's links: the body, corners [m, its frame], triangles, colour 0xRRGGBB."""
+    """Return the surfaces of the robot's links: the body, corners [m, its frame], triangles, colour
+    0xRRGGBB."""
     return [
         {"body": body_name(link), "corners": part.corners.round(4).ravel().tolist(),
          "triangles": part.triangles.ravel().tolist(), "color": part.color}
@@ -203,14 +206,14 @@ def _looks(world: World) -> list[dict[str, Any]]:
 
 
 def _places(world: World, fields: Sequence[str]) -> dict[str, list[int]]:
-    """Where arrays of the simulator are in an instance, and how many numbers they have."""
+    """Return the place of each array of the simulator in an instance, and its size."""
     arrays = {field: getattr(world.plant.data, field) for field in fields}
     place = world.module.image.place
     return {field: [place(array)[1], array.size] for field, array in arrays.items()}
 
 
 def _xml(world: World) -> str:
-    """The simulator's model as MJCF."""
+    """Return the simulator's model as MJCF."""
     plant = world.plant
     spec = mujoco_spec(
         plant._robot, scene=plant._params.build_scene(plant._robot), timestep=plant._params.timestep,

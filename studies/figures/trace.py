@@ -41,11 +41,11 @@ class Trace:
     signals: Mapping[str, Array]
 
     def truth(self, name: str) -> Array:
-        """A signal that only the simulator knows."""
+        """Return a signal that only the simulator knows."""
         return self.signals[f"robot.truth.{name}"]
 
     def plan(self, name: str) -> Array:
-        """A signal of the planned motion."""
+        """Return a signal of the planned motion."""
         return self.signals[f"plan.reference.{name}"]
 
     @property

@@ -1,4 +1,4 @@
-"""Where the quadrotor is: its IMU, corrected by a motion capture system."""
+"""Observer of a quadrotor's state: its IMU, corrected by a motion capture system."""
 
 import math
 
@@ -17,7 +17,7 @@ STEEPEST = math.radians(60.0)
 
 
 class Observed(Signal):
-    """What the observer believes, and what it believed."""
+    """The observer's present and past estimates."""
 
     started = Field(dtype="bool", text="whether there was a first measurement")
     position = Field(3, unit="m", frame="world", text="base origin")

@@ -27,7 +27,7 @@ MOST = np.full(4, 7.0)
 
 
 def controller(**target) -> np.ndarray:
-    """What the controller asks of rotors that hover, for a robot that is level at the origin."""
+    """Return the command to the rotors in hover, for a robot that is level at the origin."""
     bench = BlockBench(GeometricController, {"lead": 1.0, "trim_rate": 0.0}, robot=ROBOT)
     bench.set("base", orientation=[0.0, 0.0, 0.0, 1.0])
     bench.set("thrusters", thrust=WEIGHT / 4)
