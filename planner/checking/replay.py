@@ -196,8 +196,9 @@ def _defects(
     plan: PlannedJump, impacts: dict[int, tuple[Array, Array]], lasting: NDArray[np.int64],
     places: Array, rates: Array,
 ) -> Array:  # fmt: skip
-    """How far exact dynamics from each knot misses the next, see ``Replay``; ``places`` and ``rates`` are
-    the ends of the lasting intervals."""
+    """Return the distances by which exact dynamics from each knot miss the next, see ``Replay``; ``places`` and
+    ``rates`` are the ends of the lasting intervals.
+    """
     reached, moving = plan.position[:-1, :7].copy(), plan.velocity[:-1, :6].copy()
     reached[lasting], moving[lasting] = places[:, :7], rates[:, :6]
     for k, (behind, _) in impacts.items():
@@ -243,7 +244,7 @@ def _sample(
 
 
 def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
-    """What is left over of the planner's own equations in every interval, zero at impacts.
+    """Return the residuals of the planner's own equations in every interval, zero at impacts.
 
     The ``full`` formulation holds accelerations of its coordinates constant over an interval and
     fulfils the equations of motion in its middle. Exact dynamics evaluates these anew.

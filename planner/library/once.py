@@ -1,4 +1,4 @@
-"""What follows from a plan and a robot alone, and is therefore computed once.
+"""Cache of results that depend only on a plan and a robot.
 
 A study runs the same jump many times in every worker; its plan is checked and turned into a table
 in the first of these runs only, and both are kept for later processes. What counts is the content of
@@ -33,7 +33,7 @@ FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "math
 
 
 def noted_folder() -> Path:
-    """Where it is noted that a plan has passed."""
+    """Return the folder of the notes that a plan has passed."""
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(home) / "aloft" / "checked"
 
@@ -61,7 +61,7 @@ def _code() -> bytes:
 
 
 KEPT = 32
-"""How many results are kept, of the plans used last."""
+"""Number of results that are kept, of the plans used last."""
 
 TABLE_FOLDERS = (*FOLDERS, "planner/library")
 """The code that decides on a table."""
@@ -102,7 +102,8 @@ def content(plan: PlannedJump, robot: RobotDescription) -> bytes:
 
 
 def require_valid_once(plan: PlannedJump, robot: RobotDescription) -> None:
-    """As ``require_valid``, but only the first time for the same plan, robot and check, in any process.
+    """Check a plan as ``require_valid`` does, but only the first time for the same plan, robot and check, in any
+    process.
 
     Raises:
         InvalidPlanError: the plan is not valid.
@@ -114,7 +115,7 @@ def require_valid_once(plan: PlannedJump, robot: RobotDescription) -> None:
 def reference_table_once(
     plan: PlannedJump, robot: RobotDescription, stand_time: float
 ) -> JumpTable:
-    """As ``reference_table``, which is made once. It is not to be written to."""
+    """Return the table of ``reference_table``, which is made once. It is not to be written to."""
     key = content(plan, robot), stand_time
 
     def make() -> JumpTable:

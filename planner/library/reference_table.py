@@ -109,7 +109,7 @@ def reference_table(
 
 
 def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, float, float]]:
-    """When thrust, flight and landing of the jumps behind the first begin."""
+    """Yield when thrust, flight and landing of the jumps behind the first begin."""
     for before, (lift_off, touchdown) in zip(
         plan.touchdown_times, plan.later_flights, strict=False
     ):
@@ -120,7 +120,7 @@ def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, 
 
 
 def _contacts(plan: PlannedJump, intervals: NDArray[np.int64]) -> NDArray[np.bool_] | None:
-    """By row which points carry load, where it is not always all of them or none."""
+    """Return by row which points carry load, where it is not always all of them or none."""
     if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
         return None
     return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
@@ -205,8 +205,9 @@ def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
 def _middle_values(
     plan: PlannedJump, values: Array, instants: Array, intervals: NDArray[np.int64]
 ) -> Array:
-    """What holds in the middle of the intervals, at instants in those intervals: linear from one middle
-    to the next, never across lift-off or touchdown."""
+    """Return the values in the middle of the intervals at instants in those intervals: linear from one middle to the
+    next, never across lift-off or touchdown.
+    """
     lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
     ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
     found = np.empty((len(instants), *values.shape[1:]))

@@ -36,7 +36,7 @@ from ..task.scaling import per_robot
 from .euler_angles import cross, times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
-"""Where the parts xx, yy, zz, xy, xz, yz of an inertia stand in its matrix."""
+"""Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
 KEPT_CALLS = 32
 """Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
@@ -90,9 +90,10 @@ class Stretch(NamedTuple):
 
 
 class FeetStates(NamedTuple):
-    """Of n states the centre of mass, its velocity and the angular momentum about it (n, 3), the contact points
-    (n, n_contacts, 3), sole centres and their velocities (n, n_feet, 3), of balls the lowest points, and the
-    feet's yaw and pitch [rad] (n, n_feet)."""
+    """States of the feet in n states: the centre of mass, its velocity and the angular momentum about it (n, 3), the
+    contact points (n, n_contacts, 3), sole centres and their velocities (n, n_feet, 3), of balls the lowest points, and
+    the feet's yaw and pitch [rad] (n, n_feet).
+    """
 
     com: Array
     com_velocity: Array
@@ -167,7 +168,7 @@ class ExactDynamics:
         return points, np.vstack(found)
 
     def evaluated_points(self, q: Array) -> Array:
-        """As ``points``, of a state whose Jacobians are evaluated as well."""
+        """Return the result of ``points``, with the state's Jacobians evaluated as well."""
         self.pin.computeJointJacobians(self.model, self.data, q)
         self.pin.updateFramePlacements(self.model, self.data)
         return self._contact_places()
@@ -185,9 +186,9 @@ class ExactDynamics:
         return self.sole_places(), self.foot_angles()[0]
 
     def footholds(self, heading: float = 0.0) -> Array:
-        """What stays in place while the contact points stand on the ground, in the state that was
-        evaluated last, (n_contacts, 3), in a stance of that ``heading`` [rad]; see
-        ``SymbolicModel.footholds``."""
+        """Return the places that stay fixed while the contact points stand on the ground, in the state that was
+        evaluated last, (n_contacts, 3), in a stance of that ``heading`` [rad]; see ``SymbolicModel.footholds``.
+        """
         places = self._contact_places()
         cosine, sine = math.cos(heading), math.sin(heading)
         for ball in self.balls:
@@ -198,7 +199,7 @@ class ExactDynamics:
         return places
 
     def joint_places(self, q: Array) -> Array:
-        """Where the joints are in the world [m], (n_joints, 3)."""
+        """Return the places of the joints in the world [m], (n_joints, 3)."""
         self.pin.forwardKinematics(self.model, self.data, q)
         places = [self.data.oMi[joint].translation for joint in range(2, self.model.njoints)]
         return np.array(places).reshape(-1, 3)
@@ -211,7 +212,7 @@ class ExactDynamics:
         return places
 
     def feet(self, position: Array, velocity: Array) -> FeetStates:
-        """What a reference of the controller says of n states."""
+        """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
         axes, count, feet = (
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
@@ -298,8 +299,9 @@ class ExactDynamics:
         bend: Array | None = None,
         force: Array | None = None,
     ) -> MotionTerms:
-        """What follows from the states (n, n_positions) and (n, n_velocities) of n instants, the joints' accelerations
-        (n, n_joints) and the contact forces (n, n_contacts, 3) [N, world]; both are zero if they are not given.
+        """Return what follows from the states (n, n_positions) and (n, n_velocities) of n instants, the joints'
+        accelerations (n, n_joints) and the contact forces (n, n_contacts, 3) [N, world]; both are zero if they are not
+        given.
 
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
@@ -307,7 +309,7 @@ class ExactDynamics:
         return self._evaluate(self._fixed, position, velocity, bend, force)
 
     def link_poses(self, position: Array) -> LinkPoses:
-        """Where the links are in n states (n, n_positions), the base first."""
+        """Return the poses of the links in n states (n, n_positions), the base first."""
         place = np.zeros((len(position), len(self._links), 3))
         rotation = np.zeros((*place.shape[:2], 9))
         run_compiled(
@@ -363,7 +365,9 @@ class ExactDynamics:
         return terms.com[0], terms.inertia[0][WHOLE]
 
     def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """What the joints' motion says, both (n, n_joints), in the base's axes. Of balls the points are the centres."""
+        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
+        centres.
+        """
         position, velocity = (
             np.zeros((len(angles), self.model.nq)),
             np.zeros((len(angles), self.model.nv)),
@@ -380,8 +384,9 @@ class ExactDynamics:
     def base_residual(
         self, position: Array, velocity: Array, acceleration: Array, force: Array
     ) -> Array:
-        """What is left over of the base's six equations of motion [N or N m, its axes], (n, 6), at n instants with
-        accelerations (n, n_velocities), the base's in its axes."""
+        """Return the residual of the base's six equations of motion [N or N m, its axes], (n, 6), at n instants with
+        accelerations (n, n_velocities), the base's in its axes.
+        """
         terms = self.motion(position, velocity, acceleration[:, 6:], force)
         turn = matrices_of_quaternions(position[:, 3:7])
         missed = acceleration[:, :6] - terms.base

@@ -24,11 +24,11 @@ HARD, HARD_TURN = 40.0, 100.0
 MATTERS = 0.5
 """Held joints that need less than this share of their motors in such a motion have no constraint."""
 TWIN = 10.0
-"""How many times as far apart as usual the left and right angles of a mirrored twin's pose may be meant to be the same."""
+"""Factor on the tolerance within which the left and right angles of a mirrored twin's pose count as the same."""
 ROUNDED = 6
 """Digits of such an angle."""
 SAME = {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)}
-"""What all links have where only the joints of limbs are compared."""
+"""Properties of all links where only the joints of limbs are compared."""
 
 
 def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
@@ -81,7 +81,7 @@ def twin_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]
 
 
 def _matters(load: HeldLoad) -> bool:
-    """Whether a hard jump could need a good part of what the joint's motor can hold: what moves on it may."""
+    """Check whether a hard jump could need a good part of what the joint's motor can hold: what moves on it may."""
     arm = np.linalg.norm(np.array(load.com) - np.array(load.origin))
     torque = load.mass * arm * HARD + max(load.inertia[:3]) * HARD_TURN
     return bool(load.carried) or bool(torque > MATTERS * load.most)
@@ -107,7 +107,7 @@ LEANS = 4
 UNEVEN = 5e-4
 """m; by how much the contact points of a stance may be above or below the ground."""
 LEAN_ROUNDS, LEG_STEPS = 12, 20
-"""Of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
+"""Iterations of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
 REACHED, BALANCED = 1e-12, 1e-10
 """m; what feet miss of such ground at most, and the centre of mass of where it stands on level ground."""
 MOST_PLACED = 64
@@ -278,7 +278,7 @@ def _lean(normal: Array) -> Array:
 
 
 def _base_rotation(q: Array) -> Array:
-    """From body to world of a base with the pitch, roll and yaw of the coordinates ``q``."""
+    """Return the rotation from body to world of a base with the pitch, roll and yaw of the coordinates ``q``."""
     return rotation(q[3:6][ORDER])
 
 

@@ -82,7 +82,7 @@ def composite_inertia(robot: RobotDescription, start: Stance) -> RigidBody:
 
 
 def ankles(robot: RobotDescription, stance: Stance) -> Array:
-    """Where the ankles are in a stance, in the order of the limbs (n_legs, 3)."""
+    """Return the places of the ankles in a stance, in the order of the limbs (n_legs, 3)."""
     places = ExactDynamics(robot).joint_places(pose_of(stance.coordinates))
     return places[[leg[-1] for leg in limbs_of(robot)[0]]]
 
@@ -92,7 +92,7 @@ QUATERNION = slice(3, 7)
 
 
 def quaternion_product(a: Any, b: Any) -> Any:
-    """Of x, y, z, w."""
+    """Return the product of two quaternions x, y, z, w."""
     import casadi as ca
 
     vector = a[3] * b[:3] + b[3] * a[:3] + ca.cross(a[:3], b[:3])

@@ -156,8 +156,9 @@ def _pair(
 
 
 def _sign(one: Joint, twin: Joint) -> float:
-    """Whether the second joint's coordinate is the first's (1) or minus it (-1) in a mirrored
-    motion; 0 if its axis is no mirror image."""
+    """Return the sign of the second joint's coordinate in a mirrored motion: the first's (1) or minus it (-1); 0 if its
+    axis is no mirror image.
+    """
     image = _mirrored_axis(one)
     for sign in (1.0, -1.0):
         if _near(sign * image, twin.axis, DIRECTION):
@@ -184,7 +185,7 @@ def _near(one: Any, other: Any, tolerance: float) -> bool:
 
 
 def _alike_inertia(one: Link, other: Link) -> bool:
-    """Whether the second link is the first's mirror image."""
+    """Check whether the second link is the first's mirror image."""
     size = max(abs(x) for x in one.inertia)
     return (
         abs(one.mass - other.mass) <= SHARE * max(one.mass, 1e-3)
@@ -219,7 +220,7 @@ def _contact_pairs(
 
 
 def _transmissions_alike(robot: RobotDescription, pairs: Sequence[Pair]) -> bool:
-    """Whether motors do the same for both limbs of every pair, and nothing across limbs."""
+    """Check whether motors do the same for both limbs of every pair, and nothing across limbs."""
     geared = robot.joint_to_motor.T @ robot.joint_to_motor
     matrices = (geared, robot.rotor_matrix)
     own = np.zeros_like(geared, dtype=bool)

@@ -11,7 +11,7 @@ from ..task.sequence import edge_of
 from ..task.task import JumpTask
 
 MOST_KINDS = 64
-"""That are kept; BRUCE's hops are of about forty."""
+"""Greatest number of kinds that are kept; BRUCE's hops are of about forty."""
 
 
 class HopProblems:

@@ -1,4 +1,4 @@
-"""Makes the plan of the next hop within a fixed number of steps, or says what is done instead."""
+"""Plan of the next hop, made within a fixed number of steps, or its replacement."""
 
 from __future__ import annotations
 

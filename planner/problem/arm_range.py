@@ -1,4 +1,4 @@
-"""How far arms may swing: ranges of their joints in which they keep clear of the body that carries them.
+"""Swing range of arms: ranges of their joints in which they keep clear of the body that carries them.
 
 An arm here is a limb that moves and has no foot. Its distance from trunk and head has corners, so that a
 solver would follow it badly. It depends on the arm's own few angles alone, so it is looked up beforehand, and what the
@@ -18,7 +18,7 @@ from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shape
 from ..task.scaling import per_robot
 
 POSES = 6000
-"""How many poses of an arm are looked at, at most."""
+"""Greatest number of poses of an arm that are examined."""
 FINEST = 61
 """Angles of a joint of an arm with few joints."""
 TURN = np.pi
@@ -27,9 +27,10 @@ TURN = np.pi
 
 @per_robot
 def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float, float]]:
-    """By the index of every joint of an arm the angles [rad] around its place in the standing pose in which the arm
-    keeps ``gap`` [m] from the links that stand still with the base, and half of it on its own side of the base's middle
-    plane, or the distances that it stands in. A box: every pose in it does. Arms have no more joints than can be looked at in ``POSES`` poses, three angles each; others are not bounded.
+    """Return by the index of every joint of an arm the angles [rad] around its place in the standing pose in which the
+    arm keeps ``gap`` [m] from the links that stand still with the base, and half of it on its own side of the base's
+    middle plane, or the distances that it stands in. A box: every pose in it does. Arms have no more joints than can be
+    looked at in ``POSES`` poses, three angles each; others are not bounded.
     """
     found: dict[int, tuple[float, float]] = {}
     chains = arms(robot)
@@ -79,7 +80,7 @@ def _clear(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float,
     angles: list[Array], start: tuple[int, ...],
 ) -> Array:  # fmt: skip
-    """Whether the arm keeps clear, on the grid of its joints' angles."""
+    """Return whether the arm keeps clear, on the grid of its joints' angles."""
     grid = np.stack(np.meshgrid(*angles, indexing="ij"), axis=-1)
     q = np.tile(robot.standing_position, (grid[..., 0].size, 1))
     q[:, joints] = grid.reshape(len(q), -1)

@@ -1,5 +1,6 @@
-"""Where the solver begins: standing, a ballistic flight, standing; or the same jump straight ahead,
-displaced and turned as the task wants it."""
+"""Initial guess of the solver: standing, a ballistic flight, standing; or the same jump straight ahead, displaced and
+turned as the task wants it.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ USUAL_TIMES = {Phase.SQUAT: 0.4, Phase.THRUST: 0.2, Phase.LANDING: 0.15}
 
 
 def flight_guess(problem: FullProblem, number: int) -> tuple[float, float]:
-    """How long a flight lasts [s] and the vertical speed it begins with [m/s], roughly."""
+    """Return the rough duration of a flight [s] and its initial vertical speed [m/s]."""
     hop = problem.task.hops()[number]
     fall = hop.landing_height or 0.0
     if hop.rise is not None:
@@ -79,7 +80,7 @@ def _mean_length(problem: FullProblem, stretch: ProblemPhase) -> float:
 
 
 def _guess_lengths(problem: FullProblem, guess: Array, k: int, mean: float) -> None:
-    """The mean interval lengths among a knot's variables: its own, and that it chooses."""
+    """Set the mean interval lengths among a knot's variables: its own, and that it chooses."""
     assembly, knot = problem.assembly, problem.assembly.knots[k]
     if problem.stretch_at(k).timed:
         guess[assembly.state_start[k] + 2 * problem.coordinates.size] = mean

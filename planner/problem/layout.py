@@ -31,7 +31,7 @@ FLIGHT_MIDDLE = 4.0
 
 
 def spacing(phase: Phase, count: int, *, last: bool = True) -> Array:
-    """Interval lengths (count,) with a mean of one; ``last`` says that no jump follows."""
+    """Return interval lengths (count,) with a mean of one; with ``last`` no jump follows."""
     place = (np.arange(count) + 0.5) / count
     if phase is Phase.FLIGHT:
         lengths = 1.0 + (FLIGHT_MIDDLE - 1.0) * np.sin(np.pi * place)
@@ -74,12 +74,12 @@ class ProblemPhase:
 
     @property
     def flies(self) -> bool:
-        """Whether the robot is in the air."""
+        """True if the robot is in the air."""
         return self.phase is Phase.FLIGHT
 
     @property
     def timed(self) -> bool:
-        """Whether the mean length of its intervals is a state."""
+        """True if the mean length of its intervals is a state."""
         return self.flies or self.time is None
 
     @property

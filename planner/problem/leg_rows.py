@@ -88,5 +88,5 @@ def fore_and_hind(model: SymbolicModel, coordinates: Coordinates) -> list[tuple[
 
 
 def _root(model: SymbolicModel, limb: int) -> tuple[float, float, float]:
-    """Where a limb's first joint is on the base [m]."""
+    """Return the place of a limb's first joint on the base [m]."""
     return model.robot.joints[model.limbs[limb][0]].origin

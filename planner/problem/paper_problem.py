@@ -141,7 +141,7 @@ def _interval(model: SymbolicModel, x: Any, v: Any, pull: Any, F: Any, w: Any) -
 
 
 def _posture(model: SymbolicModel, x: Any, w: Any) -> tuple[Any, Any]:
-    """Return the centre of mass and the contact points are those of the position."""
+    """Return the rows by which centre of mass and contact points are those of the position."""
     import casadi as ca
 
     n = model.size + 1
@@ -205,7 +205,7 @@ class PaperProblemBuilder:
         return self.fill.done(self.task, self.model, self.grid, self.start, self.end)
 
     def _in_contact(self, k: int) -> bool:
-        """Whether the feet are on the ground at a knot; at the last one that follows from rest."""
+        """Check whether the feet are on the ground at a knot; at the last one that follows from rest."""
         return 0 < k <= self.lift_off or self.touchdown <= k < self.last
 
     def _knots(self) -> list[Knot]:

@@ -68,12 +68,12 @@ class FullProblem(NonlinearProgram):
 
     @property
     def start(self) -> Stance:
-        """Where the robot stands at the start."""
+        """Stance of the robot at the start."""
         return self.stances[0]
 
     @property
     def end(self) -> Stance:
-        """Where the robot stands at the end."""
+        """Stance of the robot at the end."""
         return self.stances[-1]
 
     @property
@@ -233,8 +233,9 @@ class ProblemBuilder:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
 
     def _bound_base(self, k: int) -> None:
-        """How far the torso may lean at a knot behind the first; and how low it may be on legs that fold until it
-        lies on the ground, or the robot would count as fallen."""
+        """Bound the torso's lean at a knot behind the first, and its height on legs that fold until it lies on the
+        ground, or the robot would count as fallen.
+        """
         stretch = self.of_knot[k]
         if self.structure.obstacles.knees_fold and not stretch.flies:
             at = int(self.assembly.state_start[k]) + self.free_base.index(2)
@@ -252,7 +253,7 @@ class ProblemBuilder:
         return self.margins.load * robot.total_mass * GRAVITY / max(1, len(stretch.contacts))
 
     def _most_lean(self, k: int) -> float:
-        """How far the torso may lean away from the nominal posture at a knot."""
+        """Return the largest lean of the torso away from the nominal posture at a knot."""
         stretch, bounds = self.of_knot[k], [np.inf]
         if stretch.place == 0 and not (stretch.flies and k > stretch.first):
             bounds.append(self.margins.squat_lean or np.inf)
@@ -326,7 +327,7 @@ class ProblemBuilder:
         return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self._effort(k))
 
     def _slope(self) -> Array:
-        """How steeply the computed motors' torque falls with speed [N m s/rad]."""
+        """Return the slope at which the computed motors' torque falls with speed [N m s/rad]."""
         motors, chosen = self.model.robot.motors, list(self.coordinates.joints)
         slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
         return np.asarray(slope[chosen])

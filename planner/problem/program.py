@@ -1,4 +1,4 @@
-"""What the formulations ``paper`` and ``srbm`` hand to the solver: the grid of a jump of one flight, and how they fill it."""
+"""Program of the formulations ``paper`` and ``srbm``: the grid of a jump of one flight, and how they fill it."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ class BoundsBuilder:
             start += size
 
     def fix(self, k: int, family: str, values: Array | list[float]) -> None:
-        """The values of a knot's fixed variables."""
+        """Fix a knot's fixed variables at these values."""
         rows = self.assembly.fixed_rows(k)
         self.row_lower[rows] = self.row_upper[rows] = values
         for row in rows:

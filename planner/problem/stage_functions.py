@@ -278,7 +278,7 @@ COORDINATES: Mapping[str, Callable[[SymbolicModel], Coordinates | None]] = {
     "sagittal": sagittal_coordinates,
     "mirrored": mirrored_coordinates,
 }
-"""By their name."""
+"""Makers of coordinates, by their name."""
 
 
 def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
@@ -439,7 +439,7 @@ def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
 def _pressures(
     model: SymbolicModel, coordinates: Coordinates, forces: Any, share: Any
 ) -> list[Any]:
-    """By how much every point carries more than that share of its foot's load."""
+    """Return the load of every point beyond that share of its foot's load."""
     contacts = model.robot.contacts
     rows = []
     for c in coordinates.contacts:
@@ -503,8 +503,9 @@ def derived(
 
 def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
                   ) -> Any:  # fmt: skip
-    """Of every contact point its error along and across the foot and upwards, or normal to the
-    ground, in the heading that the foot stands with."""
+    """Return every contact point's error along and across the foot and upwards, or normal to the ground, in the heading
+    that the foot stands with.
+    """
     import casadi as ca
 
     place, heading = w["place"], w["heading"]

@@ -1,4 +1,4 @@
-"""Which variables and rows a jump's problem has at each of its knots.
+"""Variables and rows of a jump's problem at each of its knots.
 
 What is given there comes with it: the start, the end, times, and no force on points that are not on
 the ground.
@@ -47,7 +47,7 @@ def reduced_contacts(coordinates: Coordinates, points: Iterable[int]) -> set[int
 
 
 def is_mirrored(coordinates: Coordinates, points: Iterable[int]) -> bool:
-    """Whether a mirrored motion can stand on these of the robot's points."""
+    """Check whether a mirrored motion can stand on these of the robot's points."""
     chosen, matrix = set(points), coordinates.force_matrix
     own = reduced_contacts(coordinates, chosen)
     every = len(coordinates.axes)
@@ -119,8 +119,9 @@ def _independent(
 
 
 def _motion(arm: Array, axis: int, axes: tuple[int, ...]) -> Array:
-    """How a foot's own motion, three velocities and three turns, moves a point along an axis; ``arm``
-    leads to the point. In the sagittal plane a foot turns about y only."""
+    """Return the effect of a foot's own motion, three velocities and three turns, on a point along an axis; ``arm``
+    leads to the point. In the sagittal plane a foot turns about y only.
+    """
     direction = np.eye(3)[axis]
     turns = np.cross(arm / LENGTH, direction)
     if 1 not in axes:
@@ -223,7 +224,7 @@ class Structure:
         return values + [(self.n + i, 0.0, "stance") for i in range(self.n)]
 
     def moved(self, task: JumpTask, stances: Sequence[Stance]) -> Structure:
-        """That of a task of the same structure that leads elsewhere, see ``ProblemBuilder.moved``."""
+        """Return the structure for a task of the same structure that leads elsewhere, see ``ProblemBuilder.moved``."""
         found = copy(self)
         found._lead(task, stances)
         found.given = self.given | {len(self.of_knot): found._given_at_the_end()}
@@ -236,7 +237,7 @@ class Structure:
         self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
 
     def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:
-        """What is given at a knot: the start, forces on points without contact, a next time."""
+        """Fix what is given at a knot: the start, forces on points without contact, a next time."""
         n, given = self.n, []
         if k == 0:
             start = self.coordinates.reduce(self.stances[0].coordinates)
@@ -260,14 +261,15 @@ class Structure:
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
     def _interval_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """As ``_kept_rows``; worked out once for a stretch."""
+        """Return ``_kept_rows``, worked out once for a stretch."""
         if stretch not in self._kept:
             self._kept[stretch] = self._kept_rows(stretch)
         return self._kept[stretch]
 
     def _kept_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """The rows of an interval that are kept: no friction where there is no contact, and
-        pressure only where a share is asked for and the whole foot is down."""
+        """Return the rows of an interval that are kept: no friction where there is no contact, and pressure only where
+        a share is required and the whole foot is down.
+        """
         total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
         rows = np.arange(2 * self.n + stretch.timed, total)
         if stretch.flies:
@@ -281,7 +283,7 @@ class Structure:
         return np.setdiff1d(rows, idle) if idle else rows
 
     def _contact_rows(self, before: ProblemPhase, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """Which rows hold the feet at the knot between two intervals."""
+        """Return the rows that hold the feet at the knot between two intervals."""
         held, now = (
             set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
             for s in (before, stretch)
@@ -308,7 +310,7 @@ class Structure:
         return [*[margins.touchdown_slide] * sideways, margins.touchdown_speed]
 
     def _air_rows(self, k: int) -> NDArray[np.int64]:
-        """Which rows are needed: how far ahead only where there is an edge."""
+        """Return the rows that are needed: the distance ahead only where there is an edge."""
         rows = self.pieces["air"].rows
         points = (rows - self.leg_pairs) // 3
         feet = len(self.coordinates.contacts)
@@ -336,8 +338,9 @@ class Structure:
     def _moment_rows(
         self, before: ProblemPhase | None, stretch: ProblemPhase, k: int
     ) -> NDArray[np.int64] | None:
-        """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
-        (angular momentum); ``None`` at any other knot."""
+        """Return the rows of a lift-off (apex or speed, angular momentum) or a touchdown (angular momentum); ``None``
+        at any other knot.
+        """
         lift_off = stretch.flies and k == stretch.first
         kept = []
         if lift_off:
@@ -356,7 +359,7 @@ class Structure:
 
     @staticmethod
     def is_touchdown(before: ProblemPhase | None, stretch: ProblemPhase) -> bool:
-        """Whether a knot between two intervals is the first on the ground, behind any impact."""
+        """Check whether a knot between two intervals is the first on the ground, behind any impact."""
         landed = before is not None and (before.flies or before.impact)
         return landed and not stretch.flies and not stretch.impact
 
@@ -367,9 +370,10 @@ class Structure:
         return step_of(hop, self.places[place]), self._edges[place]
 
     def over_step(self, k: int) -> tuple[bool, bool]:
-        """Of a flight's knot whether feet are above the higher ground there, and whether they are
-        on the lower side of the edge. At the first knot of a step's later part both are true, or
-        they could cut the corner between that knot and the one before it."""
+        """Return whether feet are above the higher ground at a flight's knot, and whether they are on the lower side of
+        the edge. At the first knot of a step's later part both are true, or they could cut the corner between that knot
+        and the one before it.
+        """
         step, edge = self.step_under(k)
         switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
         late, first = self.flight_share(k) >= switch, self.flight_share(k - 1) < switch
@@ -378,6 +382,6 @@ class Structure:
         return higher, lower_side and edge is not None
 
     def flight_share(self, k: int) -> float:
-        """How much of the flight's time is past at a knot of it."""
+        """Return the share of the flight's time that is past at a knot of it."""
         stretch = self.of_knot[k]
         return float(stretch.lengths[: max(0, k - stretch.first)].sum() / stretch.count)

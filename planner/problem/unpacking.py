@@ -1,5 +1,5 @@
-"""From the problem's variables to a plan, and from a plan of a near task to variables.
-A solve on another grid starts from a plan's motion at other instants of the same phases.
+"""Conversion of the problem's variables to a plan, and of a plan of a near task to variables. A solve on another grid
+starts from a plan's motion at other instants of the same phases.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Phases = Sequence[int]
 
 
 def segments(phases: Phases) -> list[tuple[int, int, int]]:
-    """Runs of intervals in one phase: (phase, first interval, one behind the last)."""
+    """Return the runs of intervals in one phase: (phase, first interval, one behind the last)."""
     found, start = [], 0
     for phase, group in groupby(int(phase) for phase in phases):
         stop = start + len(list(group))
@@ -33,13 +33,13 @@ def segments(phases: Phases) -> list[tuple[int, int, int]]:
 
 
 def same_phases(first: Phases, second: Phases) -> bool:
-    """Whether both go through the same phases in the same order."""
+    """Check whether both go through the same phases in the same order."""
     return [s[0] for s in segments(first)] == [s[0] for s in segments(second)]
 
 
 def matching_times(time: Array, phases: Phases, steps: Array, others: Phases) -> Array:
-    """For every knot of a grid (interval lengths ``steps`` in phases ``others``) the instant of the
-    motion with knots at ``time`` and intervals in ``phases`` that is as far into the same phase.
+    """Return for every knot of a grid (interval lengths ``steps`` in phases ``others``) the instant of the motion with
+    knots at ``time`` and intervals in ``phases`` that is as far into the same phase.
 
     Only the proportions of ``steps`` within a phase count. (n_steps + 1,)
     """
@@ -64,8 +64,9 @@ def states_at(instants: Array, time: Array, place: Array, rate: Array) -> tuple[
 
 
 def means_over(instants: Array, time: Array, values: Array) -> Array:
-    """Of what is constant over the intervals of ``time`` (rows of ``values``) the means between
-    the instants, (n_instants - 1, ...)."""
+    """Return the means between the instants of what is constant over the intervals of ``time`` (rows of ``values``),
+    (n_instants - 1, ...).
+    """
     total = np.concatenate(
         [np.zeros_like(values[:1]), np.cumsum(np.diff(time)[:, None] * values[: len(time) - 1], 0)]
     )
@@ -166,14 +167,14 @@ def _middles_in_flight(
 
 
 def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    """Check whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
     impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
     alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
     return _same_grid(problem, plan) or (alike and not impacts)
 
 
 def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether all intervals stand for the same; only then can there be impacts."""
+    """Check whether all intervals stand for the same; only then can there be impacts."""
     intervals = len(plan.time) == problem.knots
     impacts = {s.first for s in problem.stretches if s.impact}
     return (
@@ -284,7 +285,9 @@ _of_models: dict[int, tuple[SymbolicModel, Any, Any]] = {}
 
 
 def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
-    """What ``_evaluate`` gives, of one instant: of a state, and joint torques under ``pushed`` forces."""
+    """Return the functions of one instant that ``_evaluate`` needs: of a state, and joint torques under ``pushed``
+    forces.
+    """
     import casadi as ca
 
     if id(model) not in _of_models:

@@ -67,7 +67,7 @@ class FeetPath:
         return com + offset + self._shape() @ _turned(heading).T, heading
 
     def _middle(self, which: int) -> Array:
-        """From the centre of mass to the middle of the points, on the ground."""
+        """Return the vector from the centre of mass to the middle of the points, on the ground."""
         return np.asarray(self.stances[which].points.mean(axis=0) - self.com[which])
 
     def _shape(self) -> Array:

@@ -52,7 +52,7 @@ from .solver_process import cpu_time
 EASES = (1.4, 2.0)
 """Times the real motor limits that a first motion is looked for with."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02
-"""By how much the limits come down at a time; halved where the solver does not follow."""
+"""Steps by which the limits come down; halved where the solver does not follow."""
 COLD_LIMIT, WARM_LIMIT = 250, 100
 """Iterations."""
 
@@ -107,9 +107,9 @@ def with_impacts(plan: PlannedJump) -> PlannedJump:
 
 
 FACTOR = 1.5
-"""How many times as many intervals a plan is solved on again."""
+"""Factor on the number of intervals when a plan is solved again."""
 ROUNDS = 2
-"""How often at most."""
+"""Greatest number of such repetitions."""
 CURABLE = frozenset(
     {
         "position_defect", "rotation_defect", "velocity_defect", "angular_velocity_defect",
@@ -125,7 +125,7 @@ CURABLE_EXCESS = 8.0
 
 
 def curable(plan: PlannedJump) -> bool:
-    """Whether a plan with its report failed by what finer intervals may cure."""
+    """Check whether a plan with its report failed by what finer intervals may cure."""
     failed = [test for test in plan.report.get("tests", []) if not test["passed"]]
     return bool(failed) and all(
         test["name"] in CURABLE and test["value"] <= CURABLE_EXCESS * max(test["limit"], 1e-3)
@@ -159,7 +159,7 @@ def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
 
 
 def asks_for_finer(task: JumpTask, plan: PlannedJump | None) -> bool:
-    """Whether the plan to start from is a failed plan of the same task."""
+    """Check whether the plan to start from is a failed plan of the same task."""
     return (
         plan is not None
         and bool(plan.report)
@@ -223,7 +223,7 @@ def solve_jump(
 
 
 def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
-    """Return the ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
+    """Solve the ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = cpu_time()
     warm_start, solver = options.warm_start, options.solver
     knots = options.knots
@@ -291,7 +291,7 @@ FORMULATIONS: Mapping[str, Formulation] = {
     "paper": solve_paper,
     "srbm": solve_rigid_body,
 }
-"""By the name a task gives."""
+"""Formulations by the name in a task."""
 
 
 _coordinates = lru_cache(maxsize=16)(make_coordinates)
@@ -320,8 +320,8 @@ def make_problem(
 def problems_like(
     task: JumpTask, robot: RobotDescription, *, coordinates: str
 ) -> Callable[[JumpTask], FullProblem]:
-    """Makes the problems of tasks that differ from one only in where they lead; see ``ProblemBuilder.moved``. The tasks
-    must have been resolved.
+    """Return a maker of the problems of tasks that differ from one only in where they lead; see
+    ``ProblemBuilder.moved``. The tasks must have been resolved.
 
     Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
@@ -451,14 +451,16 @@ def _barrier(problem: FullProblem) -> float:
 
 
 def _last(problem: FullProblem) -> int:
-    """Iterations that the last attempt may take. Longer ones leave no time to look for a task that can be planned."""
+    """Return the iterations that the last attempt may take. Longer ones leave no time to look for a task that can be
+    planned.
+    """
     hops = problem.task.hops()
     alone = len(hops) == 1 and not hops[0].rotation
     return LAST if alone and problem.coordinates.name == "full" else LIMIT
 
 
 def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether a problem has all coordinates, and a plan of it would start from one that has not."""
+    """Check whether a problem has all coordinates, and a plan of it would start from one that has not."""
     return problem.coordinates.name == "full" and plan.statistics.get("coordinates") != "full"
 
 

@@ -15,7 +15,7 @@ from ..problem.assembly import Assembly, NonlinearProgram
 from .solver_process import call_bounded, call_solver, cpu_time, quiet
 
 VIOLATION = 1e-6
-"""What a solution may violate a constraint by, in the constraint's unit."""
+"""Tolerance of a solution for each constraint, in the constraint's unit."""
 DUAL_TOLERANCE = 1e-4
 """fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
 LIMIT = 150
@@ -27,7 +27,7 @@ a solver that restores feasibility without counting, or looks for a step for eve
 FAR, NEAR = 10.0, 1e-4
 """The barrier's parameter to begin with, far from a solution and near one."""
 PUSH = 1e-6
-"""How far a start near a solution is moved away from bounds."""
+"""Distance by which a start near a solution is moved away from bounds."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
 
@@ -116,7 +116,7 @@ def _run(
 
 
 def patience(assembly: Assembly, limit: int) -> int:
-    """How long fatrop may take for so many iterations [s of processor time]; IPOPT, twice as long."""
+    """Return the time that fatrop may take for so many iterations [s of processor time]; IPOPT, twice as long."""
     return max(2, math.ceil(PATIENCE * limit * (sum(assembly.nx) + assembly.constraints)))
 
 

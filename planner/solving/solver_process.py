@@ -44,8 +44,8 @@ def count(seconds: float) -> None:
 
 
 def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:
-    """Whether ``function`` came to its end within ``limit`` seconds of processor time, and what it
-    returned, which has to be picklable.
+    """Return whether ``function`` came to its end within ``limit`` seconds of processor time, and its result, which has
+    to be picklable.
 
     It is called in a copy of this process, so it changes nothing here. Where processes cannot be
     copied it is called here, without a limit.
@@ -73,7 +73,7 @@ def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:
 
 
 def _answer(function: Callable[[], Any], limit: int, writing: int) -> None:
-    """In the copy: do it, write the answer, and end without anything else."""
+    """Call the function in the copy of the process, write the answer, and end without anything else."""
     import resource
 
     # What this process has used so far does not count, and was not passed on.
@@ -94,7 +94,7 @@ KEPT = 12
 
 
 def has_one_thread() -> bool:
-    """Whether this process has no thread but the one that asks."""
+    """Check whether this process has no thread but the calling one."""
     try:
         return len(os.listdir("/proc/self/task")) == 1
     except OSError:  # a system that does not show the threads of libraries
@@ -102,7 +102,7 @@ def has_one_thread() -> bool:
 
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
-    """Call a solver of CasADi. Returns the variables, and what it says of its success."""
+    """Call a solver of CasADi. Returns the variables, and its report of success."""
     with quiet():
         result = function(**arguments)
     stats = function.stats()
@@ -113,8 +113,8 @@ def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
 def call_bounded(
     function: Any, arguments: Mapping[str, Array], limit: int
 ) -> tuple[bool, Answer | None]:
-    """As ``call_solver``, in a fresh copy of a process, given up after ``limit`` seconds of
-    processor time: whether it came to its end, and the answer.
+    """Call ``call_solver`` in a fresh copy of a process, given up after ``limit`` seconds of processor time. Returns
+    whether it came to its end, and the answer.
 
     Raises:
         RuntimeError: the solver raised; the text is its error's.
@@ -126,7 +126,7 @@ def call_bounded(
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """The solvers write to the process's standard output, whatever they are told; not now."""
+    """Silence the solvers, which write to the process's standard output whatever their options."""
     kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -203,7 +203,7 @@ _helper = _Helper()
 
 
 def serve() -> None:
-    """What the process does: answers calls until its input ends."""
+    """Answer calls until the process's input ends."""
     import casadi as ca
 
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")

@@ -35,7 +35,7 @@ class PlanError(AloftError):
 
 
 def need_planner() -> None:
-    """Raises ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
+    """Raise ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
     need_extra("casadi", "plan", "planning a jump")
 
 
@@ -44,7 +44,7 @@ Key = str | int
 
 @dataclass(frozen=True)
 class PlacedFile:
-    """What is in a file: ``values`` as plain data, and where each of them is."""
+    """Content of a file: ``values`` as plain data, and the place of each of them."""
 
     file: str
     values: dict[str, Any]
@@ -64,8 +64,9 @@ class PlacedFile:
         return str(where)
 
     def place_of_words(self, text: str) -> str:
-        """Where the last of the file's keys is that a message speaks of; the start of the file
-        where it speaks of none."""
+        """Return the place of the last of the file's keys that a message names; the start of the file where it names
+        none.
+        """
         describe_task = [
             entry.key_where
             for entry in self.tree

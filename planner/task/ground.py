@@ -22,17 +22,17 @@ from .sequence import (
 from .task import JumpTask
 
 GAP_DEPTH = 0.1
-"""How far the bottom of a gap is below the lowest ground [m]."""
+"""Depth of a gap's bottom below the lowest ground [m]."""
 ROOM = 1.5
-"""How far a step or a platform reaches beyond its edge [m]."""
+"""Length of a step or a platform beyond its edge [m]."""
 WIDTH = 0.75
-"""How far it reaches to either side of the robot's places [m]."""
+"""Reach of it to either side of the robot's places [m]."""
 
 FOOTING = 0.02
-"""How far beyond its planned contact points a foot may land where the ground leans [m]."""
+"""Distance beyond its planned contact points at which a foot may land where the ground leans [m]."""
 
 Stretch = tuple[float, float, StanceLocation]
-"""From, to [m, along the axis], and where the ground between them is the one stood on, going on."""
+"""Stretch of ground: from, to [m, along the axis], and the place whose ground, going on, lies between them."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,9 @@ def _stairs(task: JumpTask, robot: RobotDescription) -> dict[str, Any]:
 
 
 def _edge(task: JumpTask, hop: Hop, start: StanceLocation) -> tuple[int, float, bool]:
-    """Where the ground changes under a jump: the axis, the place along it, and whether the robot
-    goes towards its positive end."""
+    """Return the edge of the ground under a jump: the axis, the place along it, and whether the robot goes towards its
+    positive end.
+    """
     at = edge_of(hop, start)
     ahead = hop.distance_x or 0.0
     if at is None and hop.gap and not changes_ground(hop, start) and abs(ahead) > hop.gap:
@@ -181,7 +182,7 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
 
 
 def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, float]]:
-    """Where the contact points are on the ground, as the robot stands at a place."""
+    """Return the places of the contact points on the ground, as the robot stands at a place."""
     points = standing_contacts(robot)[:, :2]
     cosine, sine = math.cos(place.heading), math.sin(place.heading)
     return [
@@ -222,7 +223,7 @@ def _leaning_scene(
 def _extents(
     ground: _Edges, places: tuple[StanceLocation, ...]
 ) -> Iterator[tuple[list[float], list[float], StanceLocation]]:
-    """From where to where each stretch reaches along x and along y [m]."""
+    """Yield the extents of each stretch along x and along y [m]."""
     along = [(p.x, p.y)[ground.axis] for p in places]
     aside = [(p.y, p.x)[ground.axis] for p in places]
     side = [_round(min(aside) - WIDTH), _round(max(aside) + WIDTH)]
@@ -237,5 +238,5 @@ def _extents(
 
 
 def _round(value: float) -> float:
-    """To a micrometre, so that it reads well."""
+    """Round to a micrometre, so that it reads well."""
     return round(value, 6) + 0.0

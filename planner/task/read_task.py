@@ -94,7 +94,7 @@ def spoken_name(task: JumpTask) -> JumpTask:
 
 
 def describe_task(task: JumpTask) -> str:
-    """What a task asks for, in a few words."""
+    """Return a summary of a task in a few words."""
     if task.jumps or task.repeat:
         return f"{len(task.hops())} jumps"
     told = []
@@ -126,14 +126,14 @@ def _cm(length: float) -> str:
 
 
 LENIENCE = 0.03
-"""What the centre of mass may move within the body [m], beyond what the legs' length allows."""
+"""Travel of the centre of mass within the body [m], beyond what the legs' length allows."""
 
 Contradiction = tuple[str, str]
 """The parameter to look at first, and what is wrong."""
 
 
 def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradiction]:
-    """Everything about the task that cannot be, in the order of its parameters."""
+    """Return all contradictions of the task, in the order of its parameters."""
     return [
         *_unknown_names(task, robot),
         *_contact_phases(task, robot),
@@ -243,7 +243,7 @@ def _flight(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
 
 
 def _fall(height: float) -> float:
-    """How long a fall takes [s]; none from below the ground."""
+    """Return the duration of a fall [s]; none from below the ground."""
     return math.sqrt(2.0 * max(0.0, height) / GRAVITY)
 
 
@@ -272,7 +272,7 @@ def _slopes(task: JumpTask) -> Iterator[Contradiction]:
 
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """Yield a step's edge is under no foot, and nothing of the standing robot is in the step."""
+    """Yield the faults of a step: its edge is under a foot, or part of the standing robot is in the step."""
     for path, hop, start, end in _jumps(task):
         edge = edge_of(hop, start)
         if edge is None or not robot.contacts:
@@ -311,7 +311,7 @@ def edge_room(
 def _stances(
     hop: Hop, start: StanceLocation, end: StanceLocation
 ) -> tuple[tuple[str, StanceLocation, float], ...]:
-    """Where the robot stands before and behind an edge, and how much higher the ground beyond it is [m]."""
+    """Return the places of the robot before and behind an edge, and how much higher the ground beyond it is [m]."""
     step = hop.landing_height or 0.0
     return ("start", start, step), ("landing", end, -step)
 
@@ -319,8 +319,9 @@ def _stances(
 def _reaches(
     robot: RobotDescription, place: StanceLocation, higher: float
 ) -> Iterator[tuple[str, float, float]]:
-    """From which x to which x [m] the feet of a robot that stands there reach, and what of it is lower than ground
-    beside it that is ``higher`` [m]: it must be away from that with all that is below its height."""
+    """Yield the range of x [m] that the feet of a robot that stands there reach, and what of it is lower than ground
+    beside it that is ``higher`` [m]: it must be away from that with all that is below its height.
+    """
     feet = standing_contacts(robot)
     for name, points, radii in (
         ("the feet", feet, np.zeros(len(feet))), *_low_links(robot, higher)

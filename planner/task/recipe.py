@@ -65,8 +65,9 @@ LEAST_CLEARANCE = 0.04
 """m. Over a step that is lower than the feet's share they need to rise by its own height only, or by this: 8 cm over a
 step of 3 cm made G1 leave the ground on bent knees, after a squat in which its base was 0.21 m above the ground."""
 KNEE_SAG = 0.06
-"""Of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are
-50 mrad off. With 4 % the thighs of Solo12 touched, as long as its mesh is."""
+"""Sag of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are 50
+mrad off. With 4 % the thighs of Solo12 touched, as long as its mesh is.
+"""
 TOE_PUSH = 2.5
 """Times the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8. At its
 margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on straight
@@ -79,9 +80,10 @@ DEEP, DEEP_BACK = (0.65, 0.75), (0.8, 0.9)
 """Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
 number the squat begins to be a deep one, and from the second on it wholly is."""
 LOW, FLOWN = 0.1, 0.75
-"""Up to which rise, as a multiple of the centre of mass's height, a robot with toes is asked to fly a share of the
-rise, and that share. Without it such a jump is hardly more than standing up onto the toes, and the toes, which
-leave the ground some milliseconds late, take away more of its speed than the plan has to spare."""
+"""Greatest rise, as a multiple of the centre of mass's height, for which a robot with toes must fly a share of the
+rise, and that share. Without it such a jump is hardly more than standing up onto the toes, and the toes, which leave
+the ground some milliseconds late, take away more of its speed than the plan has to spare.
+"""
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, TOUCHDOWN_ROLL = 1.7, 0.6, 1.2
 """m/s of the feet at touchdown, downwards and along the ground, of soles and of balls, which roll on, for a robot of
 BRUCE's size."""
@@ -92,12 +94,15 @@ robot only if its legs are nearly stretched, and then flat feet are fast."""
 TOES_LAND, TOE_LANDING_KNOTS = 0.04, 6
 """s; for how long before the heels the toes touch down in a jump straight ahead from higher up."""
 TOES_SPEEDS = ((1.37, 1.8), (1.46, 2.3))
-"""Up to which fall, again as a multiple of that height, the toes can be as slow as that [m/s], for a
-robot of BRUCE's size. From higher up nothing is asked for."""
+"""Greatest fall, again as a multiple of that height, from which the toes can be as slow as that [m/s], for a robot of
+BRUCE's size. From higher up there is no limit.
+"""
 DROP = 0.5
-"""How far down such a jump goes at least, again as a multiple of that height."""
+"""Least depth of such a jump, again as a multiple of that height."""
 LANDING_EFFORT = 1.0
-"""From touchdown on, where the toes land first: balance takes over there, and the plan is not followed."""
+"""Share of the motors' abilities from touchdown on, where the toes land first: balance takes over there, and the plan
+is not followed.
+"""
 SQUAT_LEAN, FAR = 0.9, 1.2
 """rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
 HIGH_AND_FAR = (0.42, 0.6)
@@ -122,7 +127,7 @@ class RecipeInputs(Protocol):
 
     @property
     def model_fields_set(self) -> set[str]:
-        """The names of what the task says."""
+        """Names of the fields that the task sets."""
         ...
 
     def hops(self) -> tuple[Hop, ...]:
@@ -149,14 +154,15 @@ class Choice:
 
 
 def applies(task: RecipeInputs) -> bool:
-    """Whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in
-    which nothing turns over."""
+    """Check whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in which nothing
+    turns over.
+    """
     turns = any(hop.rotation for hop in task.hops())
     return task.recipe == "robust" and task.formulation == "full" and not turns
 
 
 def choices(task: RecipeInputs, robot: RobotDescription) -> tuple[Choice, ...]:
-    """Everything that the recipe chooses for a task of a robot; empty if the task sets all parameters."""
+    """Return all choices of the recipe for a task of a robot; empty if the task sets all parameters."""
     if not applies(task) or not robot.contacts:
         return ()
     return (*_plain(task, robot), *_weights(task, robot), *_margins(task, robot))
@@ -227,7 +233,7 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
 
 
 def _toes(robot: RobotDescription) -> str:
-    """What the names of the toes of a robot have in common that can thrust with them; empty for others."""
+    """Return the common word in the names of a robot's toes that can thrust with them; empty for others."""
     token = toe_name_token(robot)
     return token if token and toe_push(robot) >= TOE_PUSH else ""
 
@@ -250,19 +256,19 @@ def _landing(whole: float | None, early: float, toes: str) -> tuple[PhaseSpec, .
 
 
 def _contact_time(task: RecipeInputs, slow: float) -> float | None:
-    """The time on the ground between two jumps [s]: what the task says, or what gives room for balance."""
+    """Return the time on the ground between two jumps [s]: the task's, or one that leaves time for balance."""
     said = "contact_time" in task.model_fields_set
     return task.contact_time if said else rounded(CONTACT * slow)
 
 
 def _time(task: RecipeInputs, name: str, slow: float) -> float | None:
-    """A phase's time [s]: what the task says, or its usual one for a robot of that size."""
+    """Return a phase's time [s]: the task's, or the usual one for a robot of that size."""
     value: float | None = getattr(task, name)
     return value if name in task.model_fields_set or value is None else rounded(value * slow)
 
 
 def _squat_time(task: RecipeInputs, robot: RobotDescription) -> float | None:
-    """The squat's time [s]: what the task says, or the longer, the deeper it is."""
+    """Return the squat's time [s]: the task's, or the longer, the deeper it is."""
     if "squat_time" in task.model_fields_set or task.squat_time is None:
         return task.squat_time
     time = SQUAT + deep(task, robot) * (DEEP_SQUAT - SQUAT)
@@ -334,7 +340,7 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
 
 
 def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
-    """How slowly the feet come down, where the motors can stop the robot all the same."""
+    """Yield slower touchdown speeds of the feet, where the motors can stop the robot all the same."""
     size = size_of(robot)
     hops = task.hops()
     level = not any(hop.landing_height or hop.distance_x or hop.distance_y for hop in hops)
@@ -360,7 +366,7 @@ def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> I
 
 
 def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
-    """How fast the toes may be [m/s] where they should touch down before the heels; ``None``: nowhere.
+    """Return the greatest speed of the toes [m/s] where they should touch down before the heels; ``None``: nowhere.
 
     They should in a single jump straight ahead and down from so high up that flat feet are fast, by a
     robot that has toes. Aside, or with a turn, no such plans are found.
@@ -376,12 +382,14 @@ def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
 
 
 def knee_sag(robot: RobotDescription) -> float:
-    """By how much [m] knees may hang lower than planned, of legs that end in balls: they fold down to the ground."""
+    """Return the distance [m] that knees may hang lower than planned, of legs that end in balls: they fold down to the
+    ground.
+    """
     return KNEE_SAG * size_of(robot).height if ball_feet(robot) else 0.0
 
 
 def deep(task: RecipeInputs, robot: RobotDescription) -> float:
-    """How deep the squat must be, 0 to 1: for a high jump in place, or one far back.
+    """Return the depth of the squat, 0 to 1: for a high jump in place, or one far back.
 
     Such a squat is a fall that the legs must stop, and on soft ground the feet lose the ground as
     they do. It takes longer then, and the ground bears more. Other jumps do worse so (turns, steps
@@ -399,16 +407,16 @@ def deep(task: RecipeInputs, robot: RobotDescription) -> float:
 
 
 def _share(value: float, between: tuple[float, float]) -> float:
-    """How far a value has come from the one to the other of two, from 0 to 1."""
+    """Return a value's share of the way from the one to the other of two, from 0 to 1."""
     low, high = between
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
 def demand(task: RecipeInputs, robot: RobotDescription) -> float:
-    """How much a jump asks for: its kinetic energy at lift-off by m g times the height of the
-    centre of mass, half of it. Speed aside counts three times, as legs push aside with their hips
-    only; a turn as the speed of what is a fifth of that height away. 1.2 is 20 cm straight up for
-    BRUCE."""
+    """Return the demand of a jump: its kinetic energy at lift-off by m g times the height of the centre of mass, half
+    of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of what is a
+    fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
+    """
     height = size_of(robot).height
     found = 0.0
     for hop in task.hops():
@@ -423,7 +431,7 @@ def demand(task: RecipeInputs, robot: RobotDescription) -> float:
 
 
 def _rise(hop: Hop) -> float:
-    """How high a jump goes above where it begins [m]."""
+    """Return the height of a jump above where it begins [m]."""
     if hop.rise is not None:
         return hop.rise
     if hop.take_off_speed is not None:

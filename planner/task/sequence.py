@@ -69,8 +69,7 @@ class FreeTimes(Parameters):
 
 
 class Hop(FreeTimes):
-    """One of several jumps in a row, relative to where it begins; what is not given is as the task
-    says for all of them."""
+    """Jump in a row of several, relative to where it begins; what is not given is as in the task for all of them."""
 
     rise: float | None = parameter(
         None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing there"
@@ -137,7 +136,7 @@ class PhaseSpec(FreeTimes):
 
 
 def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
-    """What is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
+    """Return what is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
     if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
         return (
             "the phases must be squat or thrust, then flights with thrust or landing between "
@@ -153,8 +152,9 @@ def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
 
 @dataclass(frozen=True)
 class StanceLocation:
-    """Where the robot stands between jumps: the soles' middle [m], their heading, how far the body
-    has turned in pitch [rad], and how the ground leans there."""
+    """Place of the robot between jumps: the soles' middle [m], their heading, the body's turn in pitch so far [rad],
+    and the slope of the ground there.
+    """
 
     x: float
     y: float
@@ -170,7 +170,7 @@ class StanceLocation:
         return self.z - a * self.x - b * self.y, a, b
 
     def height(self, x: Any, y: Any) -> Any:
-        """How high the ground under it would be there [m], if it went on; of numbers or arrays."""
+        """Return the height of the ground under it at that place [m], if it went on; of numbers or arrays."""
         if self.slope == LEVEL:
             return self.z + 0.0 * x
         c, a, b = self.plane
@@ -191,7 +191,7 @@ def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
 
 
 def places_of(hops: Sequence[Hop], slope: Slope = LEVEL) -> tuple[StanceLocation, ...]:
-    """Where the robot stands before the first jump, on ground of that ``slope``, and after each."""
+    """Return the places of the robot before the first jump, on ground of that ``slope``, and after each."""
     found = [StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)]
     for hop in hops:
         last = found[-1]
@@ -209,8 +209,9 @@ def places_of(hops: Sequence[Hop], slope: Slope = LEVEL) -> tuple[StanceLocation
 
 
 def on_slopes(hops: Sequence[Hop], slope: Slope) -> tuple[Hop, ...]:
-    """The jumps from ground of that ``slope``. Where a jump says nothing else, ground goes on as it
-    leans where the jump begins, and its ``landing_height`` is above that."""
+    """Return the jumps from ground of that ``slope``. Where a jump sets nothing else, ground goes on as it leans where
+    the jump begins, and its ``landing_height`` is above that.
+    """
     found = list[Hop]()
     for hop in hops:
         here = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)
@@ -235,15 +236,16 @@ def edge_of(hop: Hop, start: StanceLocation) -> float | None:
 
 
 def changes_ground(hop: Hop, start: StanceLocation) -> bool:
-    """Whether a jump lands on other ground than that on which it begins, going on as it leans."""
+    """Check whether a jump lands on other ground than that on which it begins, going on as it leans."""
     end = places_of([hop], start.slope)[1]
     goes_on = start.height(start.x + end.x, start.y + end.y) - start.z
     return (hop.landing_slope or LEVEL) != start.slope or abs(end.z - goes_on) > 1e-8
 
 
 def step_of(hop: Hop, start: StanceLocation) -> float:
-    """By how much the ground is higher behind the edge under a jump than before it [m], in the line
-    of the jump; where there is no edge, how much higher it lands."""
+    """Return the rise of the ground at the edge under a jump [m], in the line of the jump; where there is no edge, how
+    much higher it lands.
+    """
     edge, up = edge_of(hop, start), hop.landing_height or 0.0
     if edge is None or (start.slope == LEVEL and not hop.landing_slope):
         return up
@@ -267,7 +269,7 @@ class KnownStairs(Parameters):
     steps: int = parameter(text="how many there are", ge=1, le=100)
 
     def passed(self, x: float) -> int:
-        """How many of their edges are behind a place."""
+        """Return the number of their edges that are behind a place."""
         return min(self.steps, max(0, math.floor((x - self.x) / self.run + 1.0 + 1e-9)))
 
     def under(self, hops: Sequence[Hop]) -> tuple[Hop, ...]:
@@ -291,7 +293,7 @@ class KnownStairs(Parameters):
 
 
 class RoughGround(Parameters):
-    """How uneven the ground under a row of jumps is. Every number is uniform and independent."""
+    """Unevenness of the ground under a row of jumps. Every number is uniform and independent."""
 
     seed: int = parameter(0, ge=0, le=2**31, text="what the ground is drawn by")
     steps: float = parameter(

@@ -1,4 +1,4 @@
-"""A task says which jump is wanted. It is written in YAML or made in Python.
+"""Task of a jump: the motion that is wanted. It is written in YAML or made in Python.
 
 name: forward_10cm
 rise: 15 cm
@@ -48,7 +48,7 @@ PLAN_FORMAT = 1
 
 
 class Knots(Parameters):
-    """How many intervals each phase is divided into; about 60 in all are enough for a small biped."""
+    """Numbers of intervals of each phase; about 60 in all are enough for a small biped."""
 
     squat: int = parameter(8, ge=2, le=200, text="the squat")
     thrust: int = parameter(16, ge=4, le=200, text="the thrust")
@@ -280,14 +280,14 @@ class JumpTask(FreeTimes):
         return self
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As pydantic's, without what ``hops`` and ``places`` have kept."""
+        """Copy the task as pydantic does, without what ``hops`` and ``places`` have kept."""
         copy = super().model_copy(update=update, deep=deep)
         for name in ("_every_hop", "_every_place"):
             vars(copy).pop(name, None)
         return copy
 
     def hops(self) -> tuple[Hop, ...]:
-        """The jumps in a row, everything filled in; one of them if nothing else is asked for."""
+        """Return the jumps in a row, everything filled in; a single one by default."""
         return self._every_hop
 
     @cached_property
@@ -307,7 +307,7 @@ class JumpTask(FreeTimes):
         return row if drawn is None else drawn.under(row)
 
     def places(self) -> tuple[StanceLocation, ...]:
-        """Where the robot stands at the start, between its jumps, and at the end."""
+        """Return the places of the robot at the start, between its jumps, and at the end."""
         return self._every_place
 
     @cached_property
@@ -316,7 +316,7 @@ class JumpTask(FreeTimes):
 
     @property
     def leans(self) -> bool:
-        """Whether the ground leans anywhere where the robot stands."""
+        """True if the ground leans anywhere where the robot stands."""
         return any(place.slope != LEVEL for place in self.places())
 
     def spans(self) -> tuple[PhaseSpec, ...]:
@@ -410,7 +410,7 @@ class JumpTask(FreeTimes):
         return self.model_dump(mode="json", exclude=left_out, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
-        """What a plan of this task is kept under: the same for the same task, robot and format."""
+        """Return the key under which a plan of this task is kept: the same for the same task, robot and format."""
         whole = {
             "format": PLAN_FORMAT,
             "task": self.resolved(robot).content(),
@@ -426,8 +426,9 @@ def content_name(content: object) -> str:
 
 
 def planned_robot(robot: RobotDescription) -> dict[str, Any]:
-    """What a plan depends on of a robot. The task says itself which actuators it is planned for; no plan
-    depends on sensors that are mounted on links."""
+    """Return what a plan depends on of a robot. The task itself names the actuators it is planned for; no plan depends
+    on sensors that are mounted on links.
+    """
     return robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(mode="json")
 
 
