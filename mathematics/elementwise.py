@@ -180,17 +180,6 @@ def sign(a: Array1D, out: Array1D) -> None:
 
 
 @kernel
-def reciprocal(a: Array1D, out: Array1D) -> None:
-    for i in range(out.shape[0]):
-        out[i] = _divided(1.0, a[i])
-
-
-@kernel
-def square(a: Array1D, out: Array1D) -> None:
-    out[:] = a * a
-
-
-@kernel
 def square_root(a: Array1D, out: Array1D) -> None:
     for i in range(out.shape[0]):
         out[i] = math.sqrt(a[i]) if a[i] >= 0.0 else math.nan
@@ -309,11 +298,10 @@ def nearest(a: Array1D, out: Array1D) -> None:
 
 
 FUNCTIONS: Mapping[str, Any] = {
-    "abs": absolute, "sign": sign, "negative": negative, "reciprocal": reciprocal, "square": square,
-    "sqrt": square_root, "exp": exponential, "log": logarithm, "log10": logarithm_10, "sin": sine,
-    "cos": cosine, "tan": tangent, "asin": arc_sine, "acos": arc_cosine, "atan": arc_tangent,
-    "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine, "tanh": hyperbolic_tangent, "floor": round_down,
-    "ceil": round_up, "round": nearest,
+    "abs": absolute, "sign": sign, "sqrt": square_root, "exp": exponential, "log": logarithm,
+    "log10": logarithm_10, "sin": sine, "cos": cosine, "tan": tangent, "asin": arc_sine,
+    "acos": arc_cosine, "atan": arc_tangent, "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine,
+    "tanh": hyperbolic_tangent, "floor": round_down, "ceil": round_up, "round": nearest,
 }  # fmt: skip
 """Functions of one array, by name."""
 OF_TWO: Mapping[str, Any] = {"atan2": angle, "min": least, "max": greatest, "hypot": hypotenuse}

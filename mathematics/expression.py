@@ -19,10 +19,7 @@ from . import elementwise
 from .arrays import Array
 from .compiling.kernel_call import KernelCall
 
-CALLABLE = (
-    "abs", "sign", "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh",
-    "floor", "ceil", "min", "max", "hypot",
-)  # fmt: skip
+CALLABLE = (*elementwise.FUNCTIONS, *elementwise.OF_TWO)
 """The functions that an expression may call."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: Mapping[type[ast.AST], Any] = {

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, Refused, Value, join, number
+from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, NotCompilable, Value, join, number
 
 Translation = Callable[[FunctionCode, Sequence[Value]], Value]
 """Writes a call with these arguments, and returns its result."""
@@ -78,7 +78,7 @@ def _length(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     (value,) = arguments
     try:
         return code.size(value, 0)
-    except Refused:
+    except NotCompilable:
         return number(len(value.members))
 
 
@@ -160,7 +160,7 @@ def apply(code: FunctionCode, out: Value, operands: Sequence[Value], write: Tran
                 continue
             skipped = len(places) - each.array.dimensions
             if skipped < 0:
-                raise Refused("an array of more dimensions than the one that is written")
+                raise NotCompilable("an array of more dimensions than the one that is written")
             values.append(code.element(each, places[skipped:]))
         code.assign(out.array, code.place(out, places), write(code, values))
 

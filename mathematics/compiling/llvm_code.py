@@ -23,7 +23,7 @@ _RANK = {"bool": 0, "int": 1, "float": 2}
 _NUMBER = {"bool": "i1", "int": "i64", "float": "double"}
 
 
-class Refused(Exception):
+class NotCompilable(Exception):
     """A kernel does something that compiled code cannot."""
 
 
@@ -48,11 +48,11 @@ class Value:
         """Kind of the number.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if isinstance(self.type, NumberType):
             return self.type.kind
-        raise Refused(f"this takes a number, not {_described(self.type)}")
+        raise NotCompilable(f"this takes a number, not {_described(self.type)}")
 
     @property
     def shape(self) -> tuple[str, ...]:
@@ -64,21 +64,21 @@ class Value:
         """The type of an array.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if isinstance(self.type, ArrayType):
             return self.type
-        raise Refused(f"this takes an array, not {_described(self.type)}")
+        raise NotCompilable(f"this takes an array, not {_described(self.type)}")
 
     @property
     def members(self) -> tuple[Value, ...]:
         """The parts of a tuple.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if not isinstance(self.type, RecordType):
-            raise Refused(f"this takes a tuple, not {_described(self.type)}")
+            raise NotCompilable(f"this takes a tuple, not {_described(self.type)}")
         made, first = [], 0
         for part in self.type.parts:
             count = len(leaves(part))
@@ -122,7 +122,7 @@ def join(a: ArgumentType, b: ArgumentType) -> ArgumentType:
     """Return the type of a value that is of one type or the other.
 
     Raises:
-        Refused: there is none.
+        NotCompilable: there is none.
     """
     if a == b:
         return a
@@ -133,7 +133,7 @@ def join(a: ArgumentType, b: ArgumentType) -> ArgumentType:
             return ArrayType(a.dtype, a.dimensions, "A")
         case RecordType(), RecordType() if a.kind is b.kind and len(a.parts) == len(b.parts):
             return RecordType(a.kind, tuple(map(join, a.parts, b.parts)))
-    raise Refused(f"this is {_described(a)} here and {_described(b)} elsewhere")
+    raise NotCompilable(f"this is {_described(a)} here and {_described(b)} elsewhere")
 
 
 def _described(kind: ArgumentType) -> str:
@@ -281,7 +281,7 @@ class FunctionCode:
         if name in ("Add", "Sub", "Mult"):
             return self.result(f"{_REAL[name]} double {x}, {y}")
         if name not in ("Div", "Mod", "FloorDiv"):
-            raise Refused(f"numbers with a fraction have no {name}")
+            raise NotCompilable(f"numbers with a fraction have no {name}")
         if not b.constant:
             self.fail_if(self.result(f"fcmp oeq double {y}, 0.0"))
         if name == "Div":
@@ -323,7 +323,7 @@ class FunctionCode:
         if name in _WHOLE:
             return r(f"{_WHOLE[name]} i64 {x}, {y}")
         if name not in ("Mod", "FloorDiv"):
-            raise Refused(f"whole numbers have no {name}")
+            raise NotCompilable(f"whole numbers have no {name}")
         if not b.constant:
             self.fail_if(r(f"icmp eq i64 {y}, 0"))
         rest = r(f"srem i64 {x}, {y}")
@@ -349,7 +349,7 @@ class FunctionCode:
             if b.constant is not None and 0 < b.constant <= _LARGEST_POWER:
                 return self.operation("Mult", self._power(a, number(b.constant - 1)), a)
             if a.constant != 2 or not (b.counts or b.type == INT):
-                raise Refused("of powers of whole numbers there are x ** 3 and 2 ** n")
+                raise NotCompilable("of powers of whole numbers there are x ** 3 and 2 ** n")
             return Value(INT, (self.result(f"shl i64 1, {b.parts[0]}"),), counts=True)
         x, y = self.convert(a, FLOAT).parts[0], self.convert(b, FLOAT).parts[0]
         return Value(FLOAT, (self.call("pow", "double", f"double {x}", f"double {y}"),))
@@ -365,7 +365,7 @@ class FunctionCode:
     def compare(self, name: str, a: Value, b: Value) -> Value:
         """Write ``a < b`` and so on; ``name`` is that of the class in ``ast``."""
         if name not in _COMPARISONS:
-            raise Refused(f"numbers are compared by < <= > >= == !=, not by {name}")
+            raise NotCompilable(f"numbers are compared by < <= > >= == !=, not by {name}")
         kind = join(INT, join(a.type, b.type))
         x, y = self.convert(a, kind).parts[0], self.convert(b, kind).parts[0]
         whole, real = _COMPARISONS[name]
@@ -438,7 +438,7 @@ class FunctionCode:
 
     def _from_start(self, index: Value, size: str) -> Value:
         if index.kind != "int":
-            raise Refused("an index is a whole number; write int(...)")
+            raise NotCompilable("an index is a whole number; write int(...)")
         if index.counts:
             return index
         wrapped = self.result(f"add nsw i64 {index.parts[0]}, {size}")
@@ -479,7 +479,7 @@ class FunctionCode:
         kind = value.array
         full = [*indices, *[Slice(None, None)] * (kind.dimensions - len(indices))]
         if len(full) > kind.dimensions:
-            raise Refused(f"{len(indices)} indices for {_described(kind)}")
+            raise NotCompilable(f"{len(indices)} indices for {_described(kind)}")
         begins: list[Value] = []
         shape: list[str] = []
         kept: list[int] = []
@@ -560,7 +560,7 @@ def memory_type(kind: ArrayType) -> str:
         return "double" if dtype.itemsize == 8 else "float"
     if dtype.kind in "iub":
         return f"i{8 * dtype.itemsize}"
-    raise Refused(f"an array of {kind.dtype} cannot be read")
+    raise NotCompilable(f"an array of {kind.dtype} cannot be read")
 
 
 def _same(code: FunctionCode, operand: str, leaf: str, wanted: str, text: str) -> str:

@@ -309,10 +309,13 @@ class Executor:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
-        metrics, unmet, praise = merge_metrics(by_block)
+        metrics, unmet, success_reason = merge_metrics(by_block)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
-        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
-        code, reason = self._verdict(error, problems, interrupts, unmet, praise)
+        unmet, success_reason = (
+            self._with_stop(unmet, judges),
+            self._with_stop(success_reason, judges),
+        )
+        code, reason = self._verdict(error, problems, interrupts, unmet, success_reason)
         for program in self.ticker.programs:
             program.fold()
         pacer = self.ticker.pacer
@@ -356,7 +359,7 @@ class Executor:
         problems: Sequence[str],
         interrupts: Interrupts,
         unmet: str | None,
-        praise: str | None,
+        success_reason: str | None,
     ) -> tuple[ExitCode, str]:
         """Return the exit code and the reason; of several reasons, the gravest."""
         stopped = self.bound.clock.stop_reason
@@ -371,7 +374,7 @@ class Executor:
             return ExitCode.RUN_FAILED, problems[0]
         if unmet is not None:
             return ExitCode.NOT_SUCCESSFUL, unmet
-        return ExitCode.SUCCESS, praise or stopped or "ran to its end"
+        return ExitCode.SUCCESS, success_reason or stopped or "ran to its end"
 
 
 @contextmanager

@@ -271,8 +271,8 @@ def run_virtual(
         for path, block in part.blocks.items()
         if path in [spec.path for spec in placed.blocks_on(name)]
     }
-    metrics, unmet, praise = merge_metrics(own)
-    reason = unmet or praise or stopped or "ran to its end"
+    metrics, unmet, success_reason = merge_metrics(own)
+    reason = unmet or success_reason or stopped or "ran to its end"
     began = 1_000_000_000
     return VirtualRun(unmet is None, reason, metrics, parts, (time.time - began) * 1e-9)
 
