@@ -235,7 +235,7 @@ def merge(
 
 
 def summary(run: RecordedRun) -> dict[str, Any]:
-    """The summary of a recording as plain data."""
+    """Summarise a recording as plain data."""
     header, outcome, ticks = run.header, run.outcome, run.ticks
     duration = len(ticks) / header.base_rate
     return {
@@ -273,7 +273,7 @@ def summary(run: RecordedRun) -> dict[str, Any]:
 
 
 def plain(value: Any) -> str:
-    """A value as the text of a table's cell."""
+    """Write a value as the text of a table's cell."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {entry}" for key, entry in value.items())
     if isinstance(value, list):

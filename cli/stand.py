@@ -23,7 +23,7 @@ from .shared.run_graph import OneRunOptions, run_many, run_once
 
 @dataclass(frozen=True)
 class StandOptions:
-    """What it does while it stands."""
+    """The options of standing."""
 
     squat: Annotated[
         str,

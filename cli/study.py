@@ -204,7 +204,7 @@ def run_study(
 
 
 def json_text(value: dict[str, Any]) -> str:
-    """The text of a JSON file; numbers that are not finite become null."""
+    """Write the text of a JSON file; numbers that are not finite become null."""
     import json
 
     from .shared.output import plain

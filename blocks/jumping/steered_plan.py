@@ -51,11 +51,11 @@ from .moved_landing import (
     MotionScratch,
     MovedLanding,
     RetargetParameters,
+    add_velocity_change,
     begin_swing,
     middle_of,
     move_landing,
     place_feet,
-    throw,
 )
 from .plan_progress import (
     PlanProgress,
@@ -336,7 +336,7 @@ class SteeredPlan(Block):
                 memory.goal[:] = scratch.place[:2]
                 memory.goal_heading = heading
                 memory.level = memory.before_level
-                land_at(followed.done, memory)
+                move_goal_by_plan(followed.done, memory)
             progress.late = 0.0
         time = read_plan(now - followed.began, delay, reference, progress, table, constants)
         if not memory.waits and command.replaces and command.number > memory.taken:
@@ -489,10 +489,10 @@ def retarget(
     within_turn = min(max(turn, -constants.turn - asked[2]), constants.turn - asked[2])
     if thrusts:
         most = params.retarget_limit
-        throw(moved, AHEAD, within_ahead, reference, params, most)
-        throw(moved, ASIDE, within_aside, reference, params, most)
-        throw(moved, UP, up, reference, params, params.retarget_height)
-        throw(moved, TURN, within_turn, reference, params, params.retarget_turn)
+        add_velocity_change(moved, AHEAD, within_ahead, reference, params, most)
+        add_velocity_change(moved, ASIDE, within_aside, reference, params, most)
+        add_velocity_change(moved, UP, up, reference, params, params.retarget_height)
+        add_velocity_change(moved, TURN, within_turn, reference, params, params.retarget_turn)
     else:
         begin_swing(moved, reference)
         most = params.foothold_limit
@@ -526,7 +526,7 @@ def tell_request(memory: SteeringState, request: PlanRequest) -> None:
 
 
 @kernel
-def land_at(done: Array1D, memory: SteeringState) -> None:
+def move_goal_by_plan(done: Array1D, memory: SteeringState) -> None:
     """Move the goal to where a plan lands, with the robot's own error."""
     ahead = done[0] + memory.bias[memory.kind, 0]
     aside = done[1] + memory.bias[memory.kind, 1]

@@ -53,7 +53,7 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
 
 
 def diagram_of(run: RecordedRun) -> bytes:
-    """The block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
+    """Draw the block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
     from ...logs.replay.opened_run import OpenedRun
     from ...runtime.drawing.diagram import diagram
     from ...runtime.drawing.layout import draw as drawn
@@ -98,7 +98,7 @@ def open_page(page: str) -> None:
 
 
 def how_to_view(recording: Path) -> str:
-    """The shortest command that shows a recording."""
+    """Return the shortest command that shows a recording."""
     program = Path(sys.argv[0])
     here = Path.cwd()
     name = program.relative_to(here) if program.is_relative_to(here) else program
@@ -107,7 +107,7 @@ def how_to_view(recording: Path) -> str:
 
 
 def read(file: Path, *, damaged: bool = False) -> RecordedRun:
-    """The recording. Raises ``AloftError`` if it cannot be read."""
+    """Read the recording. Raises ``AloftError`` if it cannot be read."""
     from ...logs.file import reader
     from ...logs.recording.place import part_of
 

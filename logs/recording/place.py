@@ -25,19 +25,19 @@ _MOST_NAMES = 100
 
 
 def part_of(path: Path) -> Path:
-    """The name under which the recording ``path`` is written."""
+    """Return the name under which the recording ``path`` is written."""
     return path.with_name(f"{path.stem}{PART}{path.suffix}")
 
 
 def whole_of(path: Path) -> Path | None:
-    """The recording that is written under the name ``path``; ``None`` if it is no such name."""
+    """Return the recording that is written under the name ``path``; ``None`` if it is no such name."""
     if not path.stem.endswith(PART):
         return None
     return path.with_name(f"{path.stem.removesuffix(PART)}{path.suffix}")
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a recorder is writing the file ``path``. Raises ``OSError`` if it is not there."""
+    """Tell whether a recorder is writing the file ``path``. Raises ``OSError`` if it is not there."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         return not _lock(descriptor)
@@ -128,7 +128,8 @@ class RecordingPlace:
 
 
 def split_name(path: Path, number: int) -> Path:
-    """The name of a later file of a recording in several: ``jump-part002.rrd`` follows ``jump.rrd``."""
+    """Return the name of a later file of a recording in several: ``jump-part002.rrd`` follows
+    ``jump.rrd``."""
     return path.with_name(f"{path.stem}-part{number:03d}{path.suffix}")
 
 
@@ -164,14 +165,14 @@ def take_place(path: Path, keep: int = 0) -> RecordingPlace:
 
 
 def _kind_of(path: Path) -> str:
-    """What ``path`` is, which is no file, in words."""
+    """Describe ``path``, which is no file, in words."""
     if path.is_fifo():
         return "a FIFO"
     return "a socket" if path.is_socket() else "a device"
 
 
 def _take(target: Path, keep: int) -> RecordingPlace | None:
-    """The place of ``target``, or ``None`` if another run has it."""
+    """Take the place of ``target``; return ``None`` if another run has it."""
     part, said = part_of(target), ""
     while True:
         descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -196,7 +197,7 @@ def _take(target: Path, keep: int) -> RecordingPlace | None:
 
 
 def _free(target: Path) -> Path:
-    """A name beside ``target`` that nothing has."""
+    """Find a free name beside ``target``."""
     number = 1
     while True:
         suffix = "" if number == 1 else f"-{number}"
@@ -207,7 +208,8 @@ def _free(target: Path) -> Path:
 
 
 def replaced(path: Path, keep: int = 0) -> str:
-    """What becomes of the recording that has the name ``path`` now, in words; empty without one."""
+    """Describe the fate of the recording that has the name ``path`` now, in words; empty without
+    one."""
     try:
         made = datetime.fromtimestamp(path.stat().st_mtime)
     except OSError:
@@ -222,8 +224,8 @@ ELSEWHERE = "--record FILE writes elsewhere, --no-record writes none"
 
 
 def remedy(number: int, path: Path | None, elsewhere: str = ELSEWHERE) -> str:
-    """The fix for an error with the system's ``number`` (as in ``errno``) at ``path``, in words;
-    ``elsewhere`` says how to do without that place."""
+    """Describe the fix for an error with the system's ``number`` (as in ``errno``) at ``path``, in
+    words; ``elsewhere`` says how to do without that place."""
     if number in (errno.ENOSPC, errno.EDQUOT):
         return f"make room{_room(path)}, or {elsewhere}"
     if number == errno.EFBIG:
@@ -234,12 +236,13 @@ def remedy(number: int, path: Path | None, elsewhere: str = ELSEWHERE) -> str:
 
 
 def cause_of(error: BaseException) -> int:
-    """The system's number of what went wrong, also where a clearer error stands for it; or zero."""
+    """Return the system's number of the underlying error, also where a clearer error stands for it;
+    or zero."""
     return getattr(error.__cause__ or error, "errno", None) or 0
 
 
 def _room(path: Path | None) -> str:
-    """How much room is left where ``path`` lies."""
+    """Describe the free space on the disk of ``path``."""
     if path is None:
         return ""
     folder = path.absolute().parent

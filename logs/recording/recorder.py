@@ -231,7 +231,7 @@ class Recorder:
         return False
 
     def _waiting_helps(self) -> bool:
-        """Whether to go on waiting for the process. It warns once that the process is slow."""
+        """Tell whether to go on waiting for the process. It warns once that the process is slow."""
         assert self.link is not None
         stalled = self.link.stalled_for()
         if not self.link.is_alive() or stalled > GIVE_UP_TIME:
@@ -352,7 +352,8 @@ class Recorder:
         )
 
     def _ticks_found(self, path: Path) -> tuple[int, Path]:
-        """The ticks in the files that the process left, and the name of the last of them."""
+        """Count the ticks in the files that the process left, and return the name of the last of
+        them."""
         count = 0
         while self._split:
             try:

@@ -25,12 +25,13 @@ ENDING = 10.0
 
 
 def rerun_is_installed() -> bool:
-    """Whether the process will find Rerun."""
+    """Tell whether the process will find Rerun."""
     return find_spec("rerun") is not None
 
 
 def start_early() -> RecorderLink | None:
-    """The process for a run that will be recorded; ``None`` where the recorder will say why not."""
+    """Start the process for a run that will be recorded; ``None`` where the recorder will say why
+    not."""
     with suppress(OSError):
         return RecorderLink() if rerun_is_installed() else None
     return None
@@ -119,11 +120,12 @@ class RecorderLink:
         return self._process.pid
 
     def is_alive(self) -> bool:
-        """Whether the process is running."""
+        """Tell whether the process is running."""
         return self._process.is_alive()
 
     def stalled_for(self) -> float:
-        """The seconds since the process last made progress, or since ``reset_stall_timer`` was called.
+        """Return the seconds since the process last made progress, or since ``reset_stall_timer``
+        was called.
 
         It makes progress when it takes something out of the ring, and, where the system tells,
         when it reads or writes a file, as it does while it starts and while it ends.
@@ -134,7 +136,8 @@ class RecorderLink:
         return time.monotonic() - self._since
 
     def _bytes_moved(self) -> int:
-        """The bytes that the process has read and written so far; zero where nothing tells it."""
+        """Return the bytes that the process has read and written so far; zero where nothing tells
+        it."""
         try:
             with open(f"/proc/{self.process_id}/io", encoding="ascii") as file:
                 return sum(int(line.split()[1]) for line in file if line[1:5] == "char")

@@ -47,7 +47,8 @@ LAST_SYNC = 2.0
 BATCH, BATCH_BYTES = 1024, 1 << 24
 """Ticks written at once, and their bytes, at most."""
 SLOW_FLUSH = 4.0
-"""How many flush periods ticks may wait that are fewer than those of one period of the graph."""
+"""Number of flush periods for which ticks may wait that are fewer than those of one period of the
+graph."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
@@ -124,7 +125,7 @@ class RecorderProcess:
         self._notes = list(self._changes)
 
     def _begun_at(self) -> int:
-        """The first tick of the run."""
+        """Return the first tick of the run."""
         header = self._header
         return header.first_tick if header.run_begin is None else header.run_begin
 
@@ -148,8 +149,8 @@ class RecorderProcess:
             self._synced = now
 
     def _flush_is_due(self, waited: float) -> bool:
-        """Whether it is time: a simulation that is slower than real time may wait longer, as small
-        batches are larger in the file."""
+        """Tell whether it is time: a simulation that is slower than real time may wait longer, as
+        small batches are larger in the file."""
         period = self._task.flush_period
         full = self._filled >= period * self._header.base_rate
         return waited >= (period if full else SLOW_FLUSH * period)
@@ -254,7 +255,7 @@ class RecorderProcess:
         self.report.lost = self._taken - self.report.rows if self._task.path else 0
 
     def problems(self) -> list[str]:
-        """The problems so far."""
+        """Return the problems so far."""
         found = []
         if self.report.problem:
             found.append(f"nothing more is recorded: {self.report.problem}")
@@ -305,8 +306,8 @@ def _live_feed(source: str, header: Header, name: str = "") -> LiveFeed:
 
 
 def _went_on(path: Path, ticks: int, back_to: int | None) -> dict[str, Any]:
-    """The outcome in a file of a run that goes on in the file ``path``, or goes back there; ``ticks`` were
-    run so far."""
+    """Return the outcome in a file of a run that goes on in the file ``path``, or goes back there;
+    ``ticks`` were run so far."""
     back = "" if back_to is None else f"went back to tick {back_to} and "
     return {
         "success": False,
@@ -322,7 +323,7 @@ def _went_on(path: Path, ticks: int, back_to: int | None) -> dict[str, Any]:
 
 
 def _memory() -> int:
-    """The largest amount of memory that this process has used [bytes]."""
+    """Return the largest amount of memory that this process has used [bytes]."""
     try:
         import resource
     except ImportError:  # not on Windows
@@ -331,14 +332,19 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-class WithoutPandas:
-    """Finds for Python that there is no pandas. Arrow would import it where it is installed, only to see
-    that no value here comes from it, which takes longer than all else that this process does for a short run."""
+class _NoPandas:
+    """Finds for Python that there is no pandas."""
 
     def find_spec(self, name: str, *_: Any) -> None:
-        """Raises ``ModuleNotFoundError`` for pandas; all else is for other finders."""
+        """Raise ``ModuleNotFoundError`` for pandas; all else is for other finders."""
         if name == "pandas":
             raise ModuleNotFoundError(name)
+
+
+def block_pandas_import() -> None:
+    """Let imports of pandas fail in this process. Arrow would import it where it is installed, only to see that no
+    value here comes from it, which takes longer than all else that this process does for a short run."""
+    sys.meta_path.insert(0, _NoPandas())
 
 
 def main(tasks: str) -> None:
@@ -346,7 +352,7 @@ def main(tasks: str) -> None:
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    sys.meta_path.insert(0, WithoutPandas())
+    block_pandas_import()
     import_module("rerun")  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)

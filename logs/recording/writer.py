@@ -273,7 +273,7 @@ class RecordingWriter:
 
 
 def _bytes(data: bytes) -> Any:
-    """An Arrow array of bytes that shares their memory."""
+    """Wrap bytes in an Arrow array that shares their memory."""
     import pyarrow as pa
 
     return pa.Array.from_buffers(pa.uint8(), len(data), [None, pa.py_buffer(data)])

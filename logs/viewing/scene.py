@@ -216,7 +216,8 @@ class FootTargetPart(ScenePart):
 
 
 def foot_outline(part: ScenePart, foot: int, color: int) -> object:
-    """The outline of a sole in its own frame: a box around its contact points and their radius.
+    """Make the outline of a sole in its own frame: a box around its contact points and their
+    radius.
 
     The outline of a point foot is a square as wide as the foot.
     """
@@ -290,7 +291,8 @@ class PushPart(ScenePart):
         self.send("push", moments, arrows)
 
     def _acting(self, moments: Moments) -> Moments:
-        """The instants at which it acts, and the first one and those at which it has just ended."""
+        """Return the instants at which it acts, and the first one and those at which it has just
+        ended."""
         acts = (moments[f"{self.ports.push}.force"] != 0.0).any(axis=1)
         return self.changing("push", moments, acts * moments.batch.ticks[moments.due])
 
@@ -308,7 +310,7 @@ DEEPEST_FLOOR = -10.0
 
 
 def color_of_ground(friction: float | None) -> int:
-    """The colour of a piece of ground, as 0xRRGGBBAA."""
+    """Return the colour of a piece of ground, as 0xRRGGBBAA."""
     if friction is None:
         return COLOR
     share = min(max((friction - 0.3) / 0.7, 0.0), 1.0)
@@ -318,7 +320,7 @@ def color_of_ground(friction: float | None) -> int:
 
 
 def _normals(field: HeightField) -> NDArray[np.float64]:
-    """The normals at a field's corners, for its shading, (n, 3)."""
+    """Return the normals at a field's corners, for its shading, (n, 3)."""
     heights = np.array(field.heights)
     rows, columns = heights.shape
     x, y = ((field.most[k] - field.least[k]) / (n - 1) for k, n in enumerate((columns, rows)))

@@ -15,7 +15,8 @@ from .scene_ports import Ports, ports_of
 
 
 def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSensor]:
-    """The ports on which the robot publishes mounted sensors, ``block.sensor``, with their sensors.
+    """Return the ports on which the robot publishes mounted sensors, ``block.sensor``, with their
+    sensors.
 
     Sensors of a user's own module that cannot be imported here are left out.
     """

@@ -26,9 +26,9 @@ from .evidence import (
     MILLIMETRE,
     Evidence,
     PlanTestResult,
-    arm_lack,
+    arm_clearance_deficit,
     body_heights,
-    leg_lack,
+    leg_clearance_deficit,
     worst,
 )
 from .replay import replay
@@ -376,16 +376,16 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None:  # else no two legs have shapes that could touch
-        sample = int(lacking.argmax())
-        yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None:  # else no two legs have shapes that could touch
+        sample = int(deficit.argmax())
+        yield PlanTestResult("leg_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
-    swung = arm_lack(robot, e.poses, task.leg_clearance) if task.moving else None
+    swung = arm_clearance_deficit(robot, e.poses, task.leg_clearance) if task.moving else None
     if swung is not None:
-        lacking, link = swung
-        sample = int(lacking.argmax())
-        yield PlanTestResult("arm_clearance", float(lacking[sample]), MILLIMETRE, "m",
+        deficit, link = swung
+        sample = int(deficit.argmax())
+        yield PlanTestResult("arm_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what moving arms lack of that gap to the rest of the body",
                     f"{link} {e.moment(sample)}")  # fmt: skip
 
@@ -473,8 +473,8 @@ def _narrow(e: Evidence) -> Iterator[str]:
     ):
         if height.min() < least + MILLIMETRE < height[0]:
             yield name
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None and lacking[0] < -MILLIMETRE < lacking.max():
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None and deficit[0] < -MILLIMETRE < deficit.max():
         yield "leg"
 
 

@@ -125,7 +125,7 @@ def require_valid(plan: PlannedJump, robot: RobotDescription) -> None:
         )
 
 
-def why_not(error: Exception) -> str:
+def failure_text(error: Exception) -> str:
     """Return what binds where a task has no valid plan, in a few words, from what the planner raised."""
     if isinstance(error, InvalidPlanError):
         return ", ".join(t["name"] for t in error.plan.report["tests"] if not t["passed"])

@@ -71,7 +71,7 @@ class JointMotion(NamedTuple):
         return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """Motion over some steps under constant contact forces.
 
     Attributes:
@@ -444,24 +444,24 @@ class ExactDynamics:
         count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
         h = duration / count
         angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        stretch = Stretch(q[:7], v[:6], angles, speeds, force, np.full(count, h))
-        places, rates = self.follow([stretch])
+        segment = Segment(q[:7], v[:6], angles, speeds, force, np.full(count, h))
+        places, rates = self.follow([segment])
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
-    def follow(self, stretches: list[Stretch]) -> tuple[Array, Array]:
-        """Return the states after every step of all stretches in turn: (n_steps, n_positions) and (n_steps,
+    def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
+        """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
-        angles = np.concatenate([one.angles for one in stretches])
-        speeds = np.concatenate([one.speeds for one in stretches])
-        steps = np.concatenate([one.steps for one in stretches])
-        counts = np.array([len(one.steps) for one in stretches])
+        angles = np.concatenate([one.angles for one in segments])
+        speeds = np.concatenate([one.speeds for one in segments])
+        steps = np.concatenate([one.steps for one in segments])
+        counts = np.array([len(one.steps) for one in segments])
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        force = np.array([one.force for one in stretches])
+        force = np.array([one.force for one in segments])
         base, twist = (
-            np.array([one.base for one in stretches]),
-            np.array([one.twist for one in stretches]),
+            np.array([one.base for one in segments]),
+            np.array([one.twist for one in segments]),
         )
         seen = self._at_origin(angles, speeds)
         starts, ends = (
@@ -546,13 +546,13 @@ def joint_motions(
 
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
-) -> list[Stretch]:
+) -> list[Segment]:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
     angles, speeds, _ = joints.at(np.asarray(quarters))
     return [
-        Stretch(
+        Segment(
             position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
             np.full(2, 0.5 * float(time[k + 1] - time[k])),
         )

@@ -120,9 +120,13 @@ def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
 def coarse(task: JumpTask) -> JumpTask:
     """Return a task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
 
-    def on_fewer(span: PhaseSpec) -> PhaseSpec:
-        return span if span.knots is None else span.model_copy(update={"knots": TOE_KNOTS})
+    def on_fewer(phase_spec: PhaseSpec) -> PhaseSpec:
+        return (
+            phase_spec
+            if phase_spec.knots is None
+            else phase_spec.model_copy(update={"knots": TOE_KNOTS})
+        )
 
-    phases = task.phases and tuple(on_fewer(span) for span in task.phases)
+    phases = task.phases and tuple(on_fewer(phase_spec) for phase_spec in task.phases)
     knots = STEP_KNOTS if task.landing_height else KNOTS
     return task.model_copy(update={"knots": knots, "phases": phases})

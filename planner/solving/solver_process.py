@@ -103,7 +103,7 @@ def has_one_thread() -> bool:
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
     """Call a solver of CasADi. Returns the variables, and its report of success."""
-    with quiet():
+    with without_output():
         result = function(**arguments)
     stats = function.stats()
     found = {key: stats.get(key) for key in ("success", "iter_count", "unified_return_status")}
@@ -125,7 +125,7 @@ def call_bounded(
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def without_output() -> Iterator[None]:
     """Silence the solvers, which write to the process's standard output whatever their options."""
     kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -68,12 +68,12 @@ class PlacedFile:
         """Return the place of the last of the file's keys that a message names; the start of the file where it names
         none.
         """
-        describe_task = [
+        named_keys = [
             entry.key_where
             for entry in self.tree
             if re.search(rf"\b{re.escape(entry.key)}\b", text)
         ]
-        return str(max(describe_task, default=self.tree.where))
+        return str(max(named_keys, default=self.tree.where))
 
 
 def read_placed(path: Path, example: str) -> PlacedFile:

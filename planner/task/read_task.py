@@ -190,9 +190,9 @@ def _contact_phases(task: JumpTask, robot: RobotDescription) -> Iterator[Contrad
         for key in ("take_off", "touchdown")
         for name in getattr(task, key) or ()
     ]
-    for number, span in enumerate(task.phases or ()):
-        groups.append((f"phases.{number}.contacts", span.contacts))
-        groups.append((f"phases.{number}.raised", span.raised or ()))
+    for number, phase_spec in enumerate(task.phases or ()):
+        groups.append((f"phases.{number}.contacts", phase_spec.contacts))
+        groups.append((f"phases.{number}.raised", phase_spec.raised or ()))
     wrong = list(wrong_groups(robot, groups)) if robot.contacts else []
     yield from wrong
     for key in ("take_off", "touchdown"):

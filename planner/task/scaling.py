@@ -256,11 +256,11 @@ def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]
         if name not in task.model_fields_set
     }
     weights: Parameters = getattr(task, "weights")  # noqa: B009 - any task's
-    said = weights.model_fields_set if "weights" in task.model_fields_set else set()
+    given_fields = weights.model_fields_set if "weights" in task.model_fields_set else set()
     lighter = {
         name: rounded(type(weights).model_fields[name].default * light)
         for name in ("force", "impulse")
-        if name not in said
+        if name not in given_fields
     }
     if lighter:
         changed["weights"] = weights.model_copy(update=lighter)

@@ -92,7 +92,8 @@ class StatusPublisher:
         self._thread.join(1.0)
 
     def status(self, rate: float) -> dict[str, Any]:
-        """Return the status of the part; ``rate`` is the ticks per second that it runs at present."""
+        """Return the status of the part; ``rate`` is the ticks per second that it runs at
+        present."""
         peers = self._peers
         return {
             "machine": self._machine,

@@ -209,7 +209,8 @@ class _WireComposer:
         return tuple(np.atleast_1d(np.asarray(values[name], np.float64)).tolist())
 
     def _source(self, item: WireElement) -> tuple[str, Field, NDArray[np.int64]] | None:
-        """Return the inserted block's input for a source, the field, and the places selected in it."""
+        """Return the inserted block's input for a source, the field, and the places selected in
+        it."""
         assert item.wire is not None
         wire = replace(item.wire, where=item.where, shown=wire_text(item.plain()))
         ends = self.check.source(self.at, wire, self.reader, None)

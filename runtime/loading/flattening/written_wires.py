@@ -152,7 +152,8 @@ def _read_part(
 
 
 def is_number(node: ScalarNode) -> bool:
-    """Return whether a value is a number, a truth value, or a number with a unit such as ``3 mm``."""
+    """Return whether a value is a number, a truth value, or a number with a unit such as ``3
+    mm``."""
     if not isinstance(node.value, str):
         return node.value is not None
     return QUANTITY.match(node.value) is not None
