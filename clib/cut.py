@@ -200,7 +200,7 @@ def _stubs(
 def _terminals(
     name: str, spec: BlockSpec, port: str, wanted: Mapping[str, None] | None
 ) -> list[Terminal]:
-    """One terminal for each field of an output; ``name`` alone if the only field is ``value``."""
+    """Return one terminal for each field of an output; ``name`` alone if the only field is ``value``."""
     fields: Mapping[str, Field] = spec.block_type.outputs[port].signal.fields
     plain = list(fields) == ["value"]
     return [
@@ -289,8 +289,9 @@ def _read_by(
 def _ancestors(
     blocks: Iterable[str], specs: Mapping[str, BlockSpec], outside: Container[str]
 ) -> dict[str, None]:
-    """Blocks and all on which they depend, in this tick or through earlier ones, but not through
-    what is outside."""
+    """Return the blocks and all on which they depend, in this tick or through earlier ones, but not through what is
+    outside.
+    """
     found: dict[str, None] = {}
     pending = list(blocks)
     while pending:

@@ -113,7 +113,7 @@ def take_part(
 
 
 def _outside(specs: dict[str, BlockSpec], graph: CheckedGraph) -> list[BlockSpec]:
-    """Stand-ins for the blocks that are read and are not inside; they only have memory."""
+    """Return stand-ins for the blocks that are read and are not inside; they only have memory."""
     read: dict[str, dict[str, None]] = {}
     for spec in specs.values():
         for wire in spec.wires.values():
@@ -132,7 +132,7 @@ def _outside(specs: dict[str, BlockSpec], graph: CheckedGraph) -> list[BlockSpec
 
 
 def _nothing(self: Block) -> None:
-    """Somebody else writes the outputs."""
+    """Leave the outputs to their writer outside."""
 
 
 def needs_python(block: Block) -> Iterator[str]:

@@ -89,8 +89,9 @@ class PlacedYaml:
         return cls(plain(tree) if tree.entries else None, tree, faults)
 
     def place(self, path: tuple[str | int, ...]) -> tuple[int, int]:
-        """Line and column of the value at a path, or of the nearest thing that holds it; (0, 0)
-        where the file holds nothing of it."""
+        """Return the line and column of the value at a path, or of the nearest thing that holds it; (0, 0) where the
+        file holds nothing of it.
+        """
         steps, node, _ = locate(self.tree, path)
         if not self.tree.entries or (path and not steps):
             return (0, 0)

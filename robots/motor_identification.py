@@ -192,7 +192,7 @@ def identify_motors(
 
 
 def _differences(n: int) -> Array:
-    """Directions in which torque constants differ and their mean stays, (n, n - 1)."""
+    """Return the directions in which torque constants differ and their mean stays, (n, n - 1)."""
     values, vectors = np.linalg.eigh(np.eye(n) - np.full((n, n), 1.0 / n))
     return np.asarray(vectors[:, values > 0.5])
 
@@ -205,8 +205,9 @@ def _motor_angles(
 
 
 def waves_of(turned: Array, periods: float, period: float) -> Array:
-    """Sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the
-    equations, (ticks, 2 n)."""
+    """Return the sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the equations,
+    (ticks, 2 n).
+    """
     edge = round(EDGE / period)
     waves = smooth(np.hstack([np.sin(periods * turned), np.cos(periods * turned)]), period)
     return waves[edge : len(turned) - edge : EVERY]

@@ -250,7 +250,7 @@ class PowerSupply(Element):
     winding_thermal_resistance: float | None = Field(None, gt=0.0)
 
     def heating(self, motors: Motors) -> Array:
-        """Copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""
+        """Return the copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""
         if self.torque_constant is not None and self.winding_resistance is not None:
             heat = self.winding_resistance / self.torque_constant**2
             return np.full(len(motors.peak_torque), heat)

@@ -91,7 +91,7 @@ def corners_of(shapes: Sequence[Shape]) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=512)
 def convex(corners: tuple[Vector3, ...]) -> Any:
-    """Coal's hull of the corners, from which distances to others follow."""
+    """Return Coal's hull of the corners, from which distances to others follow."""
     import coal
 
     points = coal.StdVec_Vec3s()

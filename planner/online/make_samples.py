@@ -79,7 +79,7 @@ def step_request(index: int, reach: StepReach) -> HopRequest:
 
 
 def scaled(limits: Sequence[float], robot: RobotDescription) -> list[float]:
-    """Lengths of BRUCE for another robot."""
+    """Scale lengths of BRUCE to another robot."""
     share = standing_height(robot) / HEIGHT
     return [round(share * length, 3) for length in limits]
 

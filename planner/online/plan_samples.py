@@ -76,7 +76,7 @@ class PlanSamples:
         return int(square.argmin())
 
     def plan(self, row: int) -> PlannedJump:
-        """One of the plans. Its flight begins and ends at knots, whose times are in single precision."""
+        """Return one of the plans. Its flight begins and ends at knots, whose times are in single precision."""
         weights = np.eye(len(self.requests))[row]
         plan = self._make(HopRequest(*self.requests[row].tolist()), weights)
         flying = np.flatnonzero(plan.phase == Phase.FLIGHT)

@@ -47,7 +47,7 @@ def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float,
 def _ranges(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float
 ) -> dict[int, tuple[float, float]]:
-    """Those of one arm."""
+    """Return the ranges of one arm."""
     count = min(FINEST, int(POSES ** (1.0 / len(joints))))
     angles, start = list[Array](), list[int]()
     for k in joints:

@@ -134,8 +134,9 @@ def relaxable(plan: PlannedJump) -> bool:
 
 
 def finer_knots(plan: PlannedJump) -> Knots:
-    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
-    with the most counts."""
+    """Return numbers of intervals for solving a plan's task again; of several phases of a kind the one with the most
+    counts.
+    """
     count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
     for phase, start, stop in segments(plan.phase[:-1].tolist()):
         name = Phase(phase).name.lower()
@@ -336,7 +337,9 @@ def _builder(
     task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
     *, twin: bool = False,
 ) -> ProblemBuilder:  # fmt: skip
-    """See ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left and right."""
+    """Return the builder of ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left
+    and right.
+    """
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)

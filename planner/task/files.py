@@ -51,8 +51,9 @@ class PlacedFile:
     tree: MapNode
 
     def place(self, keys: Sequence[Key], *, key: bool = False) -> str:
-        """``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest
-        where there is none."""
+        """Return ``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest where there
+        is none.
+        """
         node: Node = self.tree
         where = node.where
         for step in keys:

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Phase(IntEnum):
-    """What the robot is doing, in the order of a jump."""
+    """Phase of the robot, in the order of a jump."""
 
     HANG = -1
     """It hangs in a gantry, or is put down, and does not carry itself yet."""

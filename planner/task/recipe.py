@@ -182,7 +182,7 @@ def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, An
 
 
 def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
-    """Impact, effort and phases."""
+    """Yield the choices of impact, effort and phases."""
     given_fields, slow = task.model_fields_set, size_of(robot).slow
     if "impact" not in given_fields:
         yield Choice("impact", True, "feet that stop before they touch cost joint speed")

@@ -181,8 +181,9 @@ class StanceLocation:
 
 
 def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
-    """Axes along feet of that ``heading``, across them and normal to ground that leans, as the
-    columns of a matrix (3, 3)."""
+    """Return the axes along feet of that ``heading``, across them and normal to ground that leans, as the columns of a
+    matrix (3, 3).
+    """
     cosine, sine = np.cos(heading), np.sin(heading)
     if slope == LEVEL:
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

@@ -67,7 +67,7 @@ class LinkTree:
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
-    """Plain numbers without rounding errors, so that every machine reads the same robot."""
+    """Return plain numbers without rounding errors, so that every machine reads the same robot."""
     return [float(value) for value in np.round(np.asarray(values, dtype=float), digits) + 0.0]
 
 

@@ -74,7 +74,7 @@ def _obj_triangles(text: str) -> Array:
 
 
 def simplified(triangles: Array, most: int) -> tuple[Array, Indices]:
-    """Corners (n, 3) and triangles (m, 3) of nearly the same surface, of ``most`` triangles or fewer.
+    """Return corners (n, 3) and triangles (m, 3) of nearly the same surface, of ``most`` triangles or fewer.
 
     Corners in one cell of a cubic grid become one, at their mean (vertex clustering: Rossignac and
     Borrel, 1993). The cells are as small as the number of triangles allows.
