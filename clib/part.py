@@ -40,7 +40,7 @@ class NumberParameter(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class SubGraph:
     """A part of a graph, bound to memory of its own.
 
     Attributes:
@@ -67,7 +67,7 @@ class Part:
 
 def take_part(
     path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()
-) -> Part:
+) -> SubGraph:
     """Return the part of a graph that a library shall compute.
 
     Args:
@@ -105,7 +105,7 @@ def take_part(
     if problems:
         raise NeedsPython(problems)
     live = [item for each in order for item in _parameters(bound.blocks[each])]
-    return Part(
+    return SubGraph(
         found, graph, bound, order,
         tuple(each for each in live if isinstance(each, NumberParameter)),
         tuple(each for each in live if isinstance(each, str)),
