@@ -424,9 +424,9 @@ def _share(value: float, between: tuple[float, float]) -> float:
 
 
 def take_off_energy_ratio(task: RecipeInputs, robot: RobotDescription) -> float:
-    """Return the take-off energy ratio of a jump: its kinetic energy at lift-off by m g times the height of the centre of mass, half
-    of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of what is a
-    fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
+    """Return the take-off energy ratio of a jump: its kinetic energy at lift-off by m g times the height of the centre
+    of mass, half of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of
+    what is a fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
     """
     height = size_of(robot).height
     found = 0.0
