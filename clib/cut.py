@@ -144,7 +144,7 @@ def _read_from_outside(inside: Sequence[FlatBlock], specs: Mapping[str, BlockSpe
                 wanted = specs[block.path].block_type.inputs[name].signal.fields
                 before = ports.get(each.source_port, {})
                 ports[each.source_port] = (
-                    None if wire.parts or before is None else {**before, **dict.fromkeys(wanted)}
+                    None if wire.slices or before is None else {**before, **dict.fromkeys(wanted)}
                 )
     return found
 
@@ -303,7 +303,7 @@ def _ancestors(
 
 
 def _whole(name: str, wire: FlatWire, inside: Iterable[str]) -> str:
-    if wire.parts or wire.constant is not None or wire.delay or wire.source_block not in inside:
+    if wire.slices or wire.constant is not None or wire.delay or wire.source_block not in inside:
         raise AloftError(
             f"the output {name!r} of the sub-graph is not one whole output of a block in it; "
             "name outputs of blocks with --output block.port"

@@ -11,9 +11,9 @@ from ..files.document import read_file
 from ..files.nodes import MapNode, plain
 from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
+from .element import Vector3
 from .importing.package_files import SCHEME, find_file, package_of
 from .importing.xacro_text import XACRO
-from .part import Vector3
 from .plausible_size import wrong_size
 from .robot_description import (
     BASE_VELOCITIES,
@@ -31,7 +31,7 @@ from .robot_description import (
     Sensors,
     Thruster,
     Transmission,
-    TurnedPart,
+    TurnedShape,
 )
 from .shapes import Capsule, Hull, Shape
 from .validation import RobotError, RobotFault, find_faults
@@ -311,7 +311,7 @@ __all__ = [
     "Shape",
     "Thruster",
     "Transmission",
-    "TurnedPart",
+    "TurnedShape",
     "Vector3",
     "find_robot",
     "read_description",
