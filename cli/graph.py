@@ -17,7 +17,7 @@ from .shared.running_graphs import As, Keys, Local
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.drawing.page import Values
+    from ..extensions.studio.diagram.page import Values
     from ..runtime.language.stages import CheckedGraph
 
 
@@ -133,10 +133,10 @@ def draw_files(
     Raises:
         AloftError: there is no such sub-graph, or a file cannot be written.
     """
+    from ..extensions.studio.diagram.layout import draw
+    from ..extensions.studio.diagram.render import svg as svg_text
     from ..files.problems import listing
     from ..runtime.drawing.diagram import diagram, subgraphs
-    from ..runtime.drawing.layout import draw
-    from ..runtime.drawing.render import svg as svg_text
 
     known = subgraphs(graph)
     for path in closed:
@@ -148,7 +148,7 @@ def draw_files(
             svg.write_text(svg_text(drawing, graph.name), encoding="utf-8")
             typer.echo(f"diagram: {svg}", err=True)
         if png is not None:
-            from ..runtime.drawing.render import save_png
+            from ..extensions.studio.diagram.render import save_png
 
             save_png(drawing, png, dark=dark)
             typer.echo(f"diagram: {png}", err=True)
@@ -158,7 +158,7 @@ def draw_files(
 
 def serve(graph: CheckedGraph, values: Values | None = None) -> None:
     """Show the diagram in a browser until Ctrl-C is pressed."""
-    from ..runtime.drawing.page import ADDRESS, page_server
+    from ..extensions.studio.diagram.page import ADDRESS, page_server
     from .shared.viewing import open_page
 
     server = page_server(graph, values=values)
@@ -186,7 +186,7 @@ def serve_running(
     Raises:
         AloftError: it does not run.
     """
-    from .shared.live import RemoteRunAddress, open_live_run, serve_live
+    from ..extensions.studio.cli.live import RemoteRunAddress, open_live_run, serve_live
 
     if graph is not None and graph.suffix not in (".yaml", ".yml"):
         raise AloftError(f"--live is for a graph that is running; {graph} is none")

@@ -95,7 +95,7 @@ def web(
     ] = None,
 ) -> None:
     """Change them in the browser, with sliders, beside the running graph's diagram."""
-    from .shared.live import open_live_run, serve_live
+    from ..extensions.studio.cli.live import open_live_run, serve_live
 
     with errors_reported(False):
         serve_live(open_live_run(run), save, "parameters")

@@ -10,20 +10,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..extensions.commissioning.cli.bring_up import bring_up
+from ..extensions.commissioning.cli.robot_bench import add_bench_verbs
+from ..extensions.commissioning.cli.robot_calibration import calibrate
+from ..extensions.commissioning.cli.robot_reach import reach
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.bring_up import bring_up
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
-from .shared.robot_bench import add_bench_verbs
-from .shared.robot_calibration import calibrate
-from .shared.robot_reach import reach
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ..extensions.commissioning.identification.identification import (
+        IdentifiedBody,
+        IdentifiedDelay,
+    )
     from ..logs.file.reader import RecordedRun
     from ..robots.description import ReadRobot
-    from ..robots.identification import IdentifiedBody, IdentifiedDelay
     from ..robots.robot_description import RobotDescription
 
 robot = typer.Typer(
@@ -381,13 +384,13 @@ def _identified(
 ) -> tuple[IdentifiedBody, IdentifiedDelay]:  # fmt: skip
     import numpy as np
 
-    from ..mathematics.rotations import to_matrix
-    from ..robots.identification import (
+    from ..extensions.commissioning.identification.identification import (
         IdentificationError,
         MeasuredRun,
         identify_delay,
         identify_rigid_body,
     )
+    from ..mathematics.rotations import to_matrix
 
     names = {
         "position": f"{robot}.joints.position", "velocity": f"{robot}.joints.velocity",

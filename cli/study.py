@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..extensions.analysis.cli.sensitivity import SensitivityOptions, rank_parameters
 from ..runtime.language.errors import AloftError, ExitCode
 from .shared.options import Cluster, JsonBesideTables, Workers, expand_option_groups
 from .shared.output import console, errors_reported, print_json, print_warning, say
-from .shared.sensitivity import SensitivityOptions, rank_parameters
 from .shared.studies import (
     check_cells,
     make_all,
@@ -85,10 +85,10 @@ def study(
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
     """
+    from ..lab.cli.paper import NAME, draw_paper
     from ..studies.batch.seeds import parse_seeds
     from ..studies.comparison import Comparing, compared_axis, read_detect
     from ..studies.reading import read_study, rows_where
-    from .shared.paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):

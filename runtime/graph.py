@@ -129,9 +129,9 @@ class Graph:
 
     def _repr_html_(self) -> str:
         """Draw the block diagram, for notebooks."""
+        from ..extensions.studio.diagram.layout import draw
+        from ..extensions.studio.diagram.render import svg
         from .drawing.diagram import diagram
-        from .drawing.layout import draw
-        from .drawing.render import svg
 
         return svg(draw(diagram(self.checked)), self.checked.name)
 

@@ -14,6 +14,17 @@ Conventions, the same everywhere:
 
 from __future__ import annotations
 
+from ...extensions.hopping.signals import (
+    BodyTwist,
+    CourseGoal,
+    FootholdPose,
+    JumpCommand,
+    JumpFrame,
+    PlanOutcome,
+    PlanRequest,
+    PlanSegment,
+    SeenStones,
+)
 from .control import (
     BaseState,
     ContactState,
@@ -46,17 +57,6 @@ from .robot import (
     RobotTruth,
     ThrustCommand,
     ThrusterState,
-)
-from .steering import (
-    BodyTwist,
-    CourseGoal,
-    FootholdPose,
-    JumpCommand,
-    JumpFrame,
-    PlanOutcome,
-    PlanRequest,
-    PlanSegment,
-    SeenStones,
 )
 
 __all__ = [

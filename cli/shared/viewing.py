@@ -54,10 +54,10 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
 
 def diagram_of(run: RecordedRun) -> bytes:
     """Draw the block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
+    from ...extensions.studio.diagram.layout import draw as drawn
+    from ...extensions.studio.diagram.render import save_png
     from ...logs.replay.opened_run import OpenedRun
     from ...runtime.drawing.diagram import diagram
-    from ...runtime.drawing.layout import draw as drawn
-    from ...runtime.drawing.render import save_png
 
     try:
         graph = OpenedRun(run, Path(run.header.source).parent).graph

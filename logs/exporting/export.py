@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
+from ...extensions.ros2.codec import Codec, MessageType
 from ...hal.sensors.sensor import RosMessage
 from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.description import Hull, RobotDescription
 from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
-from ...ros2.codec import Codec, MessageType
 from ...runtime.language.errors import AloftError
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun

@@ -21,8 +21,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from ...extensions.studio.diagram.page import shown
 from ...robots.description import RobotDescription, RobotError, find_robot
-from ...runtime.drawing.page import shown
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange

@@ -13,10 +13,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+from ...extensions.deployment.keys import check_endpoints, secured
 from ..language.errors import AloftError
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
-from .keys import check_endpoints, secured
 from .transport import MessageCallback, NetworkTransport, free_ports
 from .zenoh_session import as_chunk, prefix_of, session_config
 

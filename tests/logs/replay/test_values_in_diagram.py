@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.extensions.studio.diagram.page import page_server, shown
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun, TickValues
-from aloft.runtime.drawing.page import page_server, shown
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\

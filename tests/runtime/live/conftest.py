@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
-from aloft.runtime.live.live_server import LiveServer
+from aloft.extensions.studio.live.live_run import LiveRun
+from aloft.extensions.studio.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
