@@ -7,12 +7,12 @@ from contextlib import closing
 from dataclasses import dataclass
 from time import perf_counter
 
-from ..lab.studies.shared_start import shared_result
 from ..runtime.language.errors import AloftError, ExitCode
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import JobPool
 from .expansion import Cell, Job, job, seeded_graph
 from .journal import Journal, Outcome
+from .shared_start import shared_result
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hal.simulated.scenes import flat
-from ..lab.figures.offscreen import Offscreen, Pixels, View
 from ..logs.file.reader import RecordedRun
 from ..logs.viewing.contacts import force_scale, thruster_forces
 from ..logs.viewing.scene_ports import scene_ports
@@ -21,6 +20,7 @@ from ..mathematics.arrays import Array
 from ..plotting import DPI, Panel, draw_panels, image, new_figure, style
 from ..robots.kinematics import link_poses
 from ..runtime.language.errors import AloftError
+from .offscreen import Offscreen, Pixels, View
 
 if TYPE_CHECKING:
     from PIL.Image import Image

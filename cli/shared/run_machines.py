@@ -18,13 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...extensions.studio.live.part_feed import PartFeed
 from ...processes.child_process import ChildProcess
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.observer import StatusPublisher
 from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
+from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import load
 from ...runtime.placement.placed import PlacedGraph, place
 from ...runtime.running.memory import BoundGraph

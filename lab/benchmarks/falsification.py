@@ -13,8 +13,8 @@ from ...extensions.analysis.studies.falsification import searched_cells
 from ...runtime.language.errors import AloftError
 from ...studies.expansion import Job, job, seeded_graph
 from ...studies.reading import read_study
+from ...studies.shared_start import shared_result
 from ...studies.tuning import draw_runs, value_at
-from ..studies.shared_start import shared_result
 from .rows import Row
 
 STUDY = Path(__file__).parent.parent / "graphs" / "studies" / "worst_push_12cm.yaml"

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...robots.description import find_robot
 from ...studies.expansion import load_cell
+from ...studies.offscreen import NoRendererError, View
 from .curves import draw_jump, draw_push, jump_numbers, push_numbers
-from .offscreen import NoRendererError, View
 from .strip import Moment, Motion, draw_strip, moments_of
 
 if TYPE_CHECKING:

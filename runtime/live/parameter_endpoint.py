@@ -28,7 +28,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ...extensions.studio.live.window import Window, digest
 from ...files.problems import LoadError
 from ..language.errors import AloftError
 from ..loading.checking.parameters import adjust, entries
@@ -37,6 +36,7 @@ from ..running.memory import BoundGraph
 from ..running.run_control import RunControl, refusal_of
 from ..running.run_result import RunResult
 from ..running.ticker import Ticker
+from .window import Window, digest
 
 LONGEST_REQUEST = 1 << 16
 """Bytes of one request."""

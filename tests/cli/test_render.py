@@ -7,13 +7,13 @@ import pytest
 from PIL import Image
 
 from aloft import load
-from aloft.lab.figures.offscreen import NoRendererError, Offscreen
 from aloft.logs.file.reader import read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.film import Camera, Take, instants
+from aloft.studies.offscreen import NoRendererError, Offscreen
 
 from .conftest import run_for_json, run_here
 

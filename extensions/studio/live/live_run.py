@@ -19,10 +19,7 @@ from ....runtime.live.parameter_endpoint import (
     ask_to_watch,
     set_parameters,
 )
-from ....runtime.loading import LoadError, load, load_text
-from ....runtime.running.memory import Memory
-from .texts import ValueTexts, tick_text, time_texts
-from .window import (
+from ....runtime.live.window import (
     ENDED,
     PAUSED,
     RATE,
@@ -32,6 +29,9 @@ from .window import (
     WindowReader,
     digest,
 )
+from ....runtime.loading import LoadError, load, load_text
+from ....runtime.running.memory import Memory
+from .texts import ValueTexts, tick_text, time_texts
 
 STALLED_AFTER = 1.0
 """Seconds without a new tick after which the graph is shown as standing still."""

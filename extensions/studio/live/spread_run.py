@@ -14,12 +14,12 @@ from ....runtime.language.layout import Layout
 from ....runtime.links.observer import STALE, Observer
 from ....runtime.links.part import part_graph
 from ....runtime.live.parameter_endpoint import EndpointError, ask, set_parameters
+from ....runtime.live.part_feed import PartWindow, read_part
+from ....runtime.live.window import RATE, STARTING, digest
 from ....runtime.placement.placed import PlacedGraph
 from ....runtime.running.memory import Memory
 from .live_run import STALLED_AFTER
-from .part_feed import PartWindow, read_part
 from .texts import ValueTexts, tick_text, time_texts
-from .window import RATE, STARTING, digest
 
 Find = Callable[[], PlacedGraph | None]
 """Gives the graph as it runs now, with its endpoints; ``None`` where that is not known."""

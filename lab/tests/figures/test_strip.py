@@ -5,10 +5,10 @@ import pytest
 
 from aloft.hal.simulated.scenes import step
 from aloft.lab.figures import offscreen
-from aloft.lab.figures.offscreen import NoRendererError, Offscreen, View
 from aloft.lab.figures.strip import Moment, Motion, draw_strip, moments_of
 from aloft.robots.description import find_robot
 from aloft.runtime.language.terrain import Terrain
+from aloft.studies.offscreen import NoRendererError, Offscreen, View
 
 ROBOT = find_robot("bruce")
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])

@@ -17,10 +17,10 @@ from tests.logs.viewing.browser import PROGRAM, Browser
 from tests.waiting import free_port
 
 from aloft.extensions.studio.live.live_server import LiveServer
-from aloft.extensions.studio.live.part_feed import packed
 from aloft.extensions.studio.live.spread_run import SpreadRun
-from aloft.extensions.studio.live.window import WindowLayout
 from aloft.runtime.live.parameter_endpoint import EndpointError
+from aloft.runtime.live.part_feed import packed
+from aloft.runtime.live.window import WindowLayout
 from aloft.runtime.loading import load
 from aloft.runtime.placement.placed import PlacedGraph, place
 

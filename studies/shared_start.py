@@ -20,18 +20,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.graph import Graph
-from ...runtime.language.block import Block
-from ...runtime.language.errors import AloftError, RunError
-from ...runtime.language.parameter_change import Adjustment
-from ...runtime.language.parameters import is_live
-from ...runtime.loading.checking.parameters import adjust
-from ...runtime.running.chain import can_be_chained
-from ...runtime.running.memory import BoundGraph, Snapshot
-from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import RunHash
-from ...runtime.running.stepping import SteppedRun
-from ...studies.expansion import Job, seeded_graph
+from ..runtime.graph import Graph
+from ..runtime.language.block import Block
+from ..runtime.language.errors import AloftError, RunError
+from ..runtime.language.parameter_change import Adjustment
+from ..runtime.language.parameters import is_live
+from ..runtime.loading.checking.parameters import adjust
+from ..runtime.running.chain import can_be_chained
+from ..runtime.running.memory import BoundGraph, Snapshot
+from ..runtime.running.run_result import RunResult
+from ..runtime.running.sinks import RunHash
+from ..runtime.running.stepping import SteppedRun
+from .expansion import Job, seeded_graph
 
 EVERY = 10
 """Ticks between two snapshots."""

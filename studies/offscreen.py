@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...hal.simulated.mujoco_model import body_name, mujoco_spec
-from ...mathematics.arrays import Array
-from ...robots.surfaces import normals, robot_surfaces
-from ...runtime.language.errors import AloftError
-from ...runtime.language.terrain import Terrain
+from ..hal.simulated.mujoco_model import body_name, mujoco_spec
+from ..mathematics.arrays import Array
+from ..robots.surfaces import normals, robot_surfaces
+from ..runtime.language.errors import AloftError
+from ..runtime.language.terrain import Terrain
 
 if TYPE_CHECKING:
-    from ...robots.description import RobotDescription
+    from ..robots.description import RobotDescription
 
 
 Pixels = NDArray[np.uint8]

@@ -11,8 +11,8 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-from aloft.extensions.studio.live.part_feed import _HEAD, PartFeed, packed, read_part
-from aloft.extensions.studio.live.window import digest
+from aloft.runtime.live.part_feed import _HEAD, PartFeed, packed, read_part
+from aloft.runtime.live.window import digest
 from aloft.runtime.loading import load
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph

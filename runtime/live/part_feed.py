@@ -17,19 +17,12 @@ from struct import Struct
 from typing import Any
 from zlib import crc32
 
-from ....runtime.running.memory import BoundGraph
-from ....runtime.running.run_result import RunResult
-from ....runtime.running.sinks import Note
-from ....runtime.running.ticker import Ticker
-from ....runtime.transports.transport import MessageCallback, Transport, window_key
-from .window import (
-    Window,
-    WindowContents,
-    WindowLayout,
-    WindowReader,
-    digest,
-    parse_window,
-)
+from ..running.memory import BoundGraph
+from ..running.run_result import RunResult
+from ..running.sinks import Note
+from ..running.ticker import Ticker
+from ..transports.transport import MessageCallback, Transport, window_key
+from .window import Window, WindowContents, WindowLayout, WindowReader, digest, parse_window
 
 RATE = 5.0
 """Rate at which the window is sent [Hz]."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aloft.extensions.studio.live.window import (
+from aloft.runtime.live.window import (
     ENDED,
     RATE,
     RUNNING,

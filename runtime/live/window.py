@@ -21,12 +21,12 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ....runtime.language.layout import Layout
-from ....runtime.language.stages import CheckedGraph
-from ....runtime.running.memory import BoundGraph, nameless_memory
-from ....runtime.running.run_result import RunResult
-from ....runtime.running.ticker import Ticker
-from ....runtime.running.timing import STAMPED_TICKS
+from ..language.layout import Layout
+from ..language.stages import CheckedGraph
+from ..running.memory import BoundGraph, nameless_memory
+from ..running.run_result import RunResult
+from ..running.ticker import Ticker
+from ..running.timing import STAMPED_TICKS
 
 RATE = 25.0
 """Rate at which the window is renewed [per second of the graph's time]."""
