@@ -38,7 +38,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = "aloft"
 MOST_TESTS = 6
 """Largest number of test files that are run for one change, the nearest first."""

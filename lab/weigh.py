@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[1]
 LEFT_OUT = ("tests/", "docs/", "scripts/")
 BESIDE = "benchmarks"
 """A folder that comes with the source but is no part of the package: its row is below the total."""

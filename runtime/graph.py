@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -128,12 +129,12 @@ class Graph:
         return Graph(load_text(self.checked.text, self.checked.file, overrides))
 
     def _repr_html_(self) -> str:
-        """Draw the block diagram, for notebooks."""
-        from ..extensions.studio.diagram.layout import draw
-        from ..extensions.studio.diagram.render import svg
-        from .drawing.diagram import diagram
+        """The block diagram, for notebooks; without the extension ``studio`` the text of the graph."""
+        from .language.extensions import is_provided, provided
 
-        return svg(draw(diagram(self.checked)), self.checked.name)
+        if is_provided("diagram_svg"):
+            return str(provided("diagram_svg")(self.checked))
+        return f"<pre>{escape(self.checked.text)}</pre>"
 
     def about(self) -> Mapping[str, Any]:
         """Return the additional result fields of a run: none."""

@@ -14,17 +14,7 @@ Conventions, the same everywhere:
 
 from __future__ import annotations
 
-from ...extensions.hopping.signals import (
-    BodyTwist,
-    CourseGoal,
-    FootholdPose,
-    JumpCommand,
-    JumpFrame,
-    PlanOutcome,
-    PlanRequest,
-    PlanSegment,
-    SeenStones,
-)
+from ...planner.task.phase import Phase
 from .control import (
     BaseState,
     ContactState,
@@ -44,7 +34,7 @@ from .control import (
     WholeBodyCommand,
     WholeBodyTarget,
 )
-from .jumping import JumpReference, Phase, PhaseState
+from .jumping import JumpReference, PhaseState
 from .robot import (
     CommandMode,
     ContactSwitches,
@@ -61,11 +51,9 @@ from .robot import (
 
 __all__ = [
     "BaseState",
-    "BodyTwist",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
-    "CourseGoal",
     "DelayEstimate",
     "DrivePhase",
     "DynamicsTerms",
@@ -73,27 +61,20 @@ __all__ = [
     "ExternalForce",
     "FootLoad",
     "FootTarget",
-    "FootholdPose",
     "ImuReading",
     "JointCommand",
     "JointState",
     "JointTarget",
     "JointTorque",
-    "JumpCommand",
-    "JumpFrame",
     "JumpReference",
     "MassEstimate",
     "MotorCondition",
     "Phase",
     "PhaseState",
     "PlaceMeasurement",
-    "PlanOutcome",
-    "PlanRequest",
-    "PlanSegment",
     "PointTarget",
     "RobotHealth",
     "RobotTruth",
-    "SeenStones",
     "SwitchFault",
     "SwitchHealth",
     "ThrustCommand",

@@ -28,7 +28,7 @@ from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.part import part_graph
 from ...runtime.placement.placed import PlacedGraph, moves_actuators, place
 from ...runtime.running.memory import BoundGraph
-from .keys import secured
+from ...runtime.transports.tls import secured
 
 PACKAGE = "aloft-robotics"
 ABOUT = "deployment.json"

@@ -22,14 +22,17 @@ from typing import Any
 
 from ...runtime.language.errors import AloftError
 from ...runtime.placement.placed import PlacedGraph
-from ...runtime.transports.zenoh_session import (
-    access_control,
-    observers_access,
-    session_settings,
+from ...runtime.transports.tls import (
+    AUTHORITY,
+    CERTIFICATE,
+    KEY,
+    SESSION,
+    check_endpoints,
+    party_access,
+    tls_settings,
 )
+from ...runtime.transports.zenoh_session import session_settings
 
-CERTIFICATE, KEY, AUTHORITY = "certificate.pem", "key.pem", "authority.pem"
-"""The files of one party: what it is known by, its secret, and whom it trusts."""
 AUTHORITY_KEY = "authority-key.pem"
 _EARLIER = timedelta(minutes=10)
 """Clocks of other machines may be late."""
@@ -200,7 +203,6 @@ def _write_secret(path: Path, key: Any) -> None:
         file.write(data)
 
 
-SESSION = "session.json5"
 _LOOPBACK = ("127.0.0.1", "localhost")
 
 
@@ -256,54 +258,6 @@ def make_keys(
     return made
 
 
-def check_endpoints(placed: PlacedGraph) -> None:
-    """Refuse endpoints without encryption.
-
-    Raises:
-        AloftError: one is not ``tls``; the error has the fix.
-    """
-    for spec in placed.machines:
-        if not spec.endpoint.startswith("tls/"):
-            secure = f"tls/{spec.endpoint.partition('/')[2]}"
-            raise AloftError(
-                f"machine {spec.name!r} listens at {spec.endpoint}, where anybody who reaches it can "
-                f"command; write machines: {{{spec.name}: {secure}}}, or --set "
-                f"machines.{spec.name}={secure}"
-            )
-
-
-def secured(placed: PlacedGraph, folder: Path, name: str) -> dict[str, Any]:
-    """Return the settings of a session of ``name`` from its folder: TLS and access control.
-
-    Raises:
-        AloftError: the folder lacks a file, or was made for another graph.
-    """
-    own = folder / name if (folder / name).is_dir() else folder
-    for file in (CERTIFICATE, KEY, AUTHORITY, SESSION):
-        if not (own / file).is_file():
-            raise AloftError(f"{own / file} is missing: `aloft keys GRAPH -o {folder}` makes it")
-    try:
-        session = json.loads((own / SESSION).read_text("utf-8"))
-        access, observers = session["access_control"], session["metadata"]["observers"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise AloftError(f"{own / SESSION} cannot be read: {error}") from error
-    machines = [spec.name for spec in placed.machines]
-    expected = _access(placed, name, observers)
-    if access != expected:
-        raise AloftError(
-            f"{own / SESSION} was made for another graph than {placed.graph.name}, with other "
-            f"machines ({', '.join(machines)}) or links: `aloft keys` with this graph makes it anew "
-            "and keeps the certificates"
-        )
-    return {"transport/link/tls": _tls(own), "access_control": access}
-
-
-def _access(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[str, Any]:
-    if name in [spec.name for spec in placed.machines]:
-        return access_control(placed, name, observers)
-    return observers_access(placed, name)
-
-
 def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[str, Any]:
     """Return the configuration of a session, as Zenoh reads it, with paths relative to its own
     folder."""
@@ -313,8 +267,8 @@ def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[s
     nested: dict[str, Any] = {}
     settings = session_settings(ends[place : place + 1], ends[:place])
     settings |= {
-        "transport/link/tls": _tls(Path()),
-        "access_control": _access(placed, name, observers),
+        "transport/link/tls": tls_settings(Path()),
+        "access_control": party_access(placed, name, observers),
     }
     for key, value in settings.items():
         *outer, last = key.split("/")
@@ -323,19 +277,6 @@ def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[s
             at = at.setdefault(part, {})
         at[last] = value
     return {**nested, "metadata": {"observers": list(observers)}}
-
-
-def _tls(folder: Path) -> dict[str, Any]:
-    certificate, key = str(folder / CERTIFICATE), str(folder / KEY)
-    return {
-        "root_ca_certificate": str(folder / AUTHORITY),
-        "listen_certificate": certificate,
-        "listen_private_key": key,
-        "connect_certificate": certificate,
-        "connect_private_key": key,
-        "enable_mtls": True,
-        "verify_name_on_connect": True,
-    }
 
 
 def _is_for(folder: Path, hosts: Sequence[str]) -> bool:

@@ -17,7 +17,7 @@ from ...studies.shared_start import shared_result
 from ...studies.tuning import draw_runs, value_at
 from .rows import Row
 
-STUDY = Path(__file__).parent.parent / "graphs" / "studies" / "worst_push_12cm.yaml"
+STUDY = Path(__file__).parents[2] / "graphs" / "studies" / "worst_push_12cm.yaml"
 RUNS, MINUTES, CORES = 5000, 15.0, 2
 """The goal: so many runs in this time on so many processors."""
 

@@ -23,6 +23,7 @@ from aloft import LoadError, load
 from aloft.cli.shared.output import say
 from aloft.cli.shared.run_graph import print_result
 from aloft.cli.shared.running_graphs import path_of
+from aloft.extensions.studio.diagram.diagram import diagram
 from aloft.extensions.studio.diagram.layout import draw
 from aloft.extensions.studio.diagram.render import svg
 from aloft.extensions.studio.live.live_run import LiveRun
@@ -31,11 +32,10 @@ from aloft.logs.file.reader import read
 from aloft.logs.recording.drawn_run import write_view
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.viewer import ViewerError, start_viewer
-from aloft.runtime.drawing.diagram import diagram
 from aloft.runtime.live.parameter_endpoint import EndpointError
 from aloft.studies.film import Camera, Take, instants, pictures, write_film
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[2] / "docs"
 JUMP = FOLDER.parent / "graphs" / "jump.yaml"
 HOPS = FOLDER.parent / "graphs" / "hops.yaml"
 FILMED = {

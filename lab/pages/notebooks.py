@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[2] / "docs"
 COPIED = ("gallery", "projects")
 
 

@@ -57,7 +57,7 @@ from aloft.robots.importing.package_files import find_file
 from aloft.runtime.language.parameters import Parameters
 from aloft.studies.batch.seeds import run_seeds
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 DOCS, README = ROOT / "docs", ROOT / "README.md"
 
 
@@ -124,7 +124,11 @@ def write_excerpts() -> None:
 
 def write_faults(file: Path) -> None:
     """Write the effects of faults on BRUCE, by the time of their onset."""
-    refresh(DOCS / "analysis.md", "faults", fault_table(_runs_of([file])))
+    refresh(
+        DOCS.parent / "extensions" / "analysis" / "analysis.md",
+        "faults",
+        fault_table(_runs_of([file])),
+    )
 
 
 def write_frontier(folder: Path) -> None:
@@ -321,7 +325,11 @@ def write_late(file: Path) -> None:
 
 def write_export(file: Path) -> None:
     """Write the duration of a tick of the exported library."""
-    refresh(DOCS / "c_library.md", "export", ratio_table(read_json(file)))
+    refresh(
+        DOCS.parent / "extensions" / "export" / "c_library.md",
+        "export",
+        ratio_table(read_json(file)),
+    )
 
 
 def write_tick(file: Path) -> None:
@@ -338,7 +346,11 @@ def write_twin(file: Path) -> None:
     from pyarrow import parquet
 
     runs = parquet.read_table(file.with_name("runs.parquet")).to_pylist()
-    refresh(DOCS / "bring_up.md", "twin", twin_table(read_json(file)["rows"], runs))
+    refresh(
+        DOCS.parent / "extensions" / "commissioning" / "bring_up.md",
+        "twin",
+        twin_table(read_json(file)["rows"], runs),
+    )
 
 
 class Page(NamedTuple):

@@ -6,7 +6,7 @@ from types import ModuleType
 
 from aloft.lab.benchmarks.rows import Row
 
-PAGE = Path(__file__).parent.parent / "docs" / "whole_body.md"
+PAGE = Path(__file__).parents[2] / "docs" / "whole_body.md"
 
 
 def test_the_table(docs_script: Callable[[str], ModuleType]) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from aloft.studies.reading import read_study
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "comparisons.md").read_text()
 
 

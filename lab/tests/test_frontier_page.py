@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "frontier.md").read_text()
 FOUND = {
     "name": "up", "what": "the rise", "unit": "cm", "reached": 23.0, "landed": 19, "runs": 20,

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PLACES = {
     "README.md": ("results", "tasks", "tick"),
     "extensions/commissioning/bring_up.md": ("twin",),

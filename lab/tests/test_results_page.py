@@ -12,7 +12,7 @@ import pytest
 
 from aloft.studies.batch.seeds import SeedRow
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 RESULTS = (ROOT / "docs" / "results.md").read_text()
 README = (ROOT / "README.md").read_text()
 ROW = re.compile(r"^\| .* \| \d+ of \d+ \| .* \|$", re.MULTILINE)

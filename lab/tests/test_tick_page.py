@@ -9,7 +9,7 @@ import pytest
 from aloft.lab.benchmarks.rows import Row
 from aloft.lab.benchmarks.tick.chart import tick_chart
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PAGE, README = ROOT / "docs" / "compiled.md", ROOT / "README.md"
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),

@@ -21,7 +21,6 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from ...extensions.studio.diagram.page import shown
 from ...robots.description import RobotDescription, RobotError, find_robot
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.layout import Layout
@@ -33,6 +32,7 @@ from ..file.dependencies import digests, files_read, named_file, other_files, un
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
+from ..viewing.signal_names import value_text
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
@@ -281,6 +281,6 @@ class TickValues:
         row = int(known.searchsorted(tick, side="right")) - 1
         _, rows = self._run.window(int(known[row]), int(known[row]) + 1)
         return {
-            name: shown(self._layout.view(rows, name)[0], signal.unit or "")
+            name: value_text(self._layout.view(rows, name)[0], signal.unit or "")
             for name, signal in self._signals.items()
         }

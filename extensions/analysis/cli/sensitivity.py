@@ -1,4 +1,4 @@
-"""Sensitivity for ``aloft study --sensitivity``: the runs, the table and the chart."""
+"""Which parameters decide a metric, for ``aloft sensitivity``: the runs, the table and the chart."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.shared.output import number, print_json, say, table
+from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.output import console, errors_reported, number, print_json, say, table
 from ....cli.shared.studies import check_cells, report_stop, run_maker
 from ....runtime.language.errors import AloftError, ExitCode
 
@@ -21,35 +22,71 @@ if TYPE_CHECKING:
     from ..studies.sensitivity import Effect
 
 
-@dataclass(frozen=True)
-class SensitivityOptions:
-    """The options of a study's sensitivity."""
-
-    sensitivity: Annotated[
+def sensitivity(
+    file: Annotated[Path, typer.Argument(help="The study file.")],
+    metric: Annotated[
         str,
-        typer.Option(
-            help="Rank the graph's numeric parameters by their effect on this metric, or on 'success'."
+        typer.Argument(
+            help="The metric by whose change the graph's numeric parameters are ranked, or 'success'."
         ),
-    ] = ""
+    ],
     vary: Annotated[
-        list[str] | None,
-        typer.Option(help="With --sensitivity: only these, such as 'wbc.*'. Repeatable."),
-    ] = None
+        list[str] | None, typer.Option(help="Only these parameters, such as 'wbc.*'. Repeatable.")
+    ] = None,
     spread: Annotated[
-        float,
-        typer.Option(
-            min=1e-6, max=1.0, help="With --sensitivity: relative variation of each parameter."
-        ),
-    ] = 0.2
+        float, typer.Option(min=1e-6, max=1.0, help="Relative variation of each parameter.")
+    ] = 0.2,
     trajectories: Annotated[
-        int, typer.Option(min=2, help="With --sensitivity: elementary effects of each parameter.")
-    ] = 4
-    sobol: Annotated[
-        int, typer.Option(min=0, help="With --sensitivity: Sobol indices of the first N.")
-    ] = 0
+        int, typer.Option(min=2, help="Elementary effects of each parameter.")
+    ] = 4,
+    sobol: Annotated[int, typer.Option(min=0, help="Sobol indices of the first N.")] = 0,
     samples: Annotated[
         int, typer.Option(min=8, help="With --sobol: samples, a power of two; N + 2 runs each.")
-    ] = 64
+    ] = 64,
+    seeds: Annotated[
+        str, typer.Option(help="Seeds in place of the study's: 0:4 for a quick look.")
+    ] = "",
+    where: Annotated[
+        list[str] | None,
+        typer.Option(help="The cell of the grid: axis=value, task=..., arm=... Repeatable."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
+    ] = None,
+    workers: Workers = 0,
+    cluster: Cluster = "",
+    as_json: JsonBesideTables = False,
+) -> None:
+    """Rank the numeric parameters of a graph by their effect on a metric (extra 'analysis').
+
+    Elementary effects after Morris rank all of them, Sobol indices those that matter most.
+    """
+    from ....studies.batch.seeds import parse_seeds
+    from ....studies.reading import read_study, rows_where
+
+    screen = console(to_stderr=as_json)
+    with errors_reported(as_json):
+        found = read_study(file)
+        options = SensitivityOptions(metric, vary, spread, trajectories, sobol, samples)
+        chosen = parse_seeds(seeds) if seeds else list(found.seeds)
+        folder = out or Path("results") / found.name
+        code = rank_parameters(
+            found, rows_where(found, where or []), chosen, folder, workers, cluster, options, screen,
+            as_json,
+        )  # fmt: skip
+    raise typer.Exit(code)
+
+
+@dataclass(frozen=True)
+class SensitivityOptions:
+    """The question: a metric, and how the parameters are varied; see ``sensitivity``."""
+
+    metric: str
+    vary: list[str] | None
+    spread: float
+    trajectories: int
+    sobol: int
+    samples: int
 
 
 def rank_parameters(
@@ -89,14 +126,14 @@ def rank_parameters(
     runs = options.trajectories * (len(varied) + 1) * len(seeds)
     some = min(options.sobol, len(varied))
     runs += options.samples * (some + 2) * len(seeds) if some else 0
-    title = f"{found.name}: {options.sensitivity} within {100.0 * options.spread:g} %"
+    title = f"{found.name}: {options.metric} within {100.0 * options.spread:g} %"
     with Journal(folder / "sensitivity.jsonl") as journal:
         with run_maker(
             journal, workers, cluster, screen, f"sensitivity of {found.name}", runs
         ) as make:
 
             def evaluate(points: Array) -> Array:
-                return metric_at(points, names, options.sensitivity, cell, seeds, make)
+                return metric_at(points, names, options.metric, cell, seeds, make)
 
             names = varied
             effects = elementary_effects(varied, evaluate, options.trajectories, seed=0)
@@ -111,7 +148,7 @@ def rank_parameters(
     idle = [each.key for each in effects if each.mean_size == 0.0]
     if as_json:
         print_json({
-            "success": True, "study": found.name, "metric": options.sensitivity,
+            "success": True, "study": found.name, "metric": options.metric,
             "spread": options.spread, "seeds": list(seeds), "trajectories": options.trajectories,
             "runs": len(make.made), "effects": as_data(effects), "without_effect": idle,
             "not_varied": left, "plots": plots,

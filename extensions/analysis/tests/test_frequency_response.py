@@ -9,7 +9,7 @@ import aloft
 from aloft.extensions.analysis import frequency_responses, linearise
 from aloft.extensions.analysis.loop_margins import loop_responses
 
-GRAPHS = Path(__file__).parent.parent.parent / "graphs"
+GRAPHS = Path(__file__).parents[3] / "graphs"
 T = 0.01
 LOOP = """
 rate: 100 Hz

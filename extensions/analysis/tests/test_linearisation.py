@@ -13,8 +13,8 @@ from aloft.extensions.analysis.instant import bound_graph
 from aloft.extensions.analysis.period import Period
 from aloft.logs.file.header import recorded_signals
 
-GRAPHS = Path(__file__).parent.parent.parent / "graphs"
-PROJECTS = Path(__file__).parent.parent.parent / "docs" / "projects"
+GRAPHS = Path(__file__).parents[3] / "graphs"
+PROJECTS = Path(__file__).parents[3] / "docs" / "projects"
 T = 0.01
 QUIET = {"push.force": 0.0, "robot.jitter": 0.0, "robot.joint_velocity_noise": 0.0, "robot.switch_bounce": 0.0,
          **{f"robot.{sensor}_{error}": 0.0

@@ -98,7 +98,7 @@ STANDING = {
 
 @pytest.mark.long
 def test_the_standing_robot_sways_beyond_its_delay_margin() -> None:
-    graph = aloft.load(Path(__file__).parents[2] / "graphs" / "push.yaml", STANDING)
+    graph = aloft.load(Path(__file__).parents[3] / "graphs" / "push.yaml", STANDING)
     torque = "joint_pd.command.torque[*]"
     found = margins(linearise(graph, inputs=torque, outputs=torque, at=1.5, opened=True))
     assert found.growth < 0.01  # blocks that learn, but no fall

@@ -9,8 +9,8 @@ import pytest
 import aloft
 from aloft.extensions.analysis import linearise, trim
 
-GRAPHS = Path(__file__).parent.parent.parent / "graphs"
-PROJECTS = Path(__file__).parent.parent.parent / "docs" / "projects"
+GRAPHS = Path(__file__).parents[3] / "graphs"
+PROJECTS = Path(__file__).parents[3] / "docs" / "projects"
 G = 9.81
 SPRING = """
   f: {use: blocks.Constant, with: {value: [0.0], unit: N}}

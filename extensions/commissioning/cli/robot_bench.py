@@ -25,13 +25,6 @@ HardwareFile = Annotated[Path, typer.Argument(help="The hardware file.")]
 _STATES = {0: "off", 1: "on", 2: "off after an error", 3: "damping"}
 
 
-def add_bench_verbs(robot: typer.Typer) -> None:
-    """Add the verbs to the group."""
-    for verb in (scan, status, watch, zero, jog, estop):
-        robot.command(verb.__name__)(verb)
-    robot.command("schema")(schema)
-
-
 def scan(
     file: HardwareFile,
     last: Annotated[int, typer.Option(help="The last address to ping.", min=0, max=252)] = 32,

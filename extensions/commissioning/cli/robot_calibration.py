@@ -49,7 +49,7 @@ def calibrate(
 ) -> None:
     """Find the IMU's place, angle and age, torque constants, friction, play and pack of a robot.
 
-    A graph is run first; extensions/commissioning/graphs/calibrate.yaml is one for BRUCE, extensions/commissioning/graphs/robots_calibrate.yaml for all robots. Every value has
+    A graph is run first; extensions/commissioning/graphs/calibrate.yaml is one for BRUCE, extensions/commissioning/graphs/robots/calibrate.yaml for all robots. Every value has
     its standard deviation, and what the model does not explain is listed by joint and sensor, and by phase.
     """
     from ..identification.calibration import fragment

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.hal.bear.virtual_wire import VirtualWire
 
-from aloft.hal.bear import bench
+from aloft.extensions.commissioning import bench
 from aloft.hal.bear.bus import BearBus, BusError
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.protocol import FrameReader, Instruction, Torque

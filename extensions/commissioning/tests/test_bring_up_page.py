@@ -9,8 +9,8 @@ from typing import get_args
 
 from aloft.hal.twin.faults import Kind
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "bring_up.md").read_text()
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "extensions" / "commissioning" / "bring_up.md").read_text()
 ROWS = [
     [cell.strip() for cell in line.strip("|").split("|")]
     for line in PAGE.split("| what goes wrong |")[1].split("\n\n")[0].splitlines()[2:]

@@ -15,18 +15,11 @@ from tests.needed import needs
 from tests.runtime.links.example_graphs import ring
 from tests.waiting import free_port, wait_for
 
-from aloft.extensions.deployment.keys import (
-    AUTHORITY_KEY,
-    KEY,
-    SESSION,
-    Authority,
-    host_of,
-    make_keys,
-    secured,
-)
+from aloft.extensions.deployment.keys import AUTHORITY_KEY, Authority, host_of, make_keys
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
 from aloft.runtime.placement.placed import PlacedGraph, place
+from aloft.runtime.transports.tls import KEY, SESSION, secured
 from aloft.runtime.transports.transport import data_key
 from aloft.runtime.transports.zenoh_session import (
     access_control,

@@ -122,7 +122,7 @@ def cut(
     blocks = tuple(replace(b, machine=None) for b in inside)
     without = replace(flat, blocks=blocks, duration=None, clock=None, machines=None, links=None)
     lines = [
-        f"  {path}: {{use: fmi.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
+        f"  {path}: {{use: export.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
         for path, ports in stubs.items()
     ]
     return Cut(without.text + "".join(lines), tuple(inputs), tuple(results), graph, blocks)

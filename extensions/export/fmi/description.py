@@ -142,7 +142,9 @@ def _read(path: Path, file: str) -> Any:
     try:
         from fmpy.model_description import read_model_description
     except ImportError:
-        raise BlockError("fmi.CoSimulation needs FMPy: pip install 'aloft-robotics[fmi]'") from None
+        raise BlockError(
+            "export.CoSimulation needs FMPy: pip install 'aloft-robotics[fmi]'"
+        ) from None
     try:
         read = read_model_description(str(path), validate=False)
     except Exception as error:  # noqa: BLE001  its own errors have no common base

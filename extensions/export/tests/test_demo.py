@@ -22,7 +22,7 @@ from tests.logs.viewing.pixels import pixels_of
 import aloft
 from aloft.extensions.export.clib.part import NeedsPython
 
-DEMO = Path(__file__).parent.parent / "docs" / "demo"
+DEMO = Path(__file__).parents[3] / "extensions" / "export" / "demo"
 SEEDS = range(1000, 1004)
 PUSHES = [(k % len(SEEDS), 0.7, 45.0 * k) for k in range(8)] + [(k, 1.1, 180.0) for k in range(4)]
 """The number of the robot, the impulse [N s] and its direction [deg]: the weak ones nearly always

@@ -14,7 +14,7 @@ import aloft
 
 fmpy = pytest.importorskip("fmpy")
 needs("pythonfmu3")
-PAGE = (Path(__file__).parent.parent / "docs" / "fmi.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "extensions" / "export" / "fmi.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.long

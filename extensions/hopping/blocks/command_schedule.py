@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....blocks.signals import JumpCommand, PlanRequest
 from ....mathematics.arrays import Array1D, Array2D, Flags1D
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Context, Input, Output, State
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import Field, Signal
+from ..signals import JumpCommand, PlanRequest
 
 
 class TimedCommand(Parameters):

@@ -22,7 +22,7 @@ from ....blocks.scoring.standing import (
     record_robot,
     rest_metrics,
 )
-from ....blocks.signals import CourseGoal, RobotTruth, WholeBodyCommand
+from ....blocks.signals import RobotTruth, WholeBodyCommand
 from ....mathematics.arrays import Array2D
 from ....mathematics.elementary import atan2, sincos
 from ....mathematics.kernel import kernel
@@ -32,6 +32,7 @@ from ....runtime.language.block import Block, Input, Metric, State
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import parameter
 from ....runtime.language.signals import Field, Signal
+from ..signals import CourseGoal
 
 SETTLING = 0.15
 """A foot that has taken a step may settle for so long [s]."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from ....blocks.signals import FootholdPose, JumpCommand
 from ....mathematics.elementary import atan2
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Input, Output, State
 from ....runtime.language.signals import Field, Signal
+from ..signals import FootholdPose, JumpCommand
 
 
 class FootholdTaken(Signal):

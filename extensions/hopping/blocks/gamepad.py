@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from ....blocks.signals import BodyTwist
 from ....runtime.language.block import Block, Context, Metric, Output, UnmetRequirement
 from ....runtime.language.parameters import Parameters, parameter
+from ..signals import BodyTwist
 
 AHEAD, ASIDE, TURN = 1, 0, 3
 """Axes of a pad with two sticks, as SDL numbers them: both of the left stick, and the right one sideways."""
@@ -82,7 +82,7 @@ class Gamepad(Block):
 
         if find_spec("pygame") is None:
             yield UnmetRequirement(
-                "hal.Gamepad needs pygame, which is not installed",
+                "hopping.Gamepad needs pygame, which is not installed",
                 expected="pygame",
                 found="none",
                 fix="pip install 'aloft-robotics[gamepad]'",

@@ -10,10 +10,10 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from ....blocks.signals import JumpCommand
 from ....runtime.language.block import Block, Metric, Output
 from ....runtime.language.errors import BlockError
 from ....runtime.language.parameters import Parameters, parameter
+from ..signals import JumpCommand
 
 KEYS: Mapping[str, tuple[int, int, int]] = {
     "\x1b[A": (1, 0, 0), "\x1b[B": (-1, 0, 0), "\x1b[D": (0, 1, 0), "\x1b[C": (0, -1, 0),

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ....blocks.signals import PlanOutcome, PlanRequest, PlanSegment
 from ....planner.library.jump_table import row_dimensions, table_rows
 from ....robots.description import RobotDescription
 from ....runtime.language.block import (
@@ -23,7 +22,8 @@ from ....runtime.language.errors import BlockError
 from ....runtime.language.parameters import Parameters
 from ....runtime.language.signals import Field
 from ..planner.hop_request import HopRequest
-from ..signals import PLAN_ROWS, SEGMENT_ROWS, PlanRows
+from ..planner.plan_outcome import PlanOutcome
+from ..signals import PLAN_ROWS, SEGMENT_ROWS, PlanRequest, PlanRows, PlanSegment
 
 if TYPE_CHECKING:
     from ..planner.next_hop import HopPlan

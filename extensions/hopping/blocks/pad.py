@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ....blocks.signals import BodyTwist
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Output, State
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import Parameters, live_parameter, parameter
 from ....runtime.language.signals import Field, Signal
+from ..signals import BodyTwist
 
 
 class PadHeld(Signal):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from ....blocks.signals import PlanSegment
 from ....mathematics.kernel import kernel
 from ....runtime.language.signals import Field
-from ..signals import PLAN_ROWS, SEGMENT_ROWS, PlanRows
+from ..signals import PLAN_ROWS, SEGMENT_ROWS, PlanRows, PlanSegment
 
 BEHIND = 10.0
 """Rows behind the last one of a plan repeat it, so far apart [s]."""

@@ -17,14 +17,7 @@ from ....blocks.jumping.plan_progress import (
     plan_time,
 )
 from ....blocks.jumping.table_reading import interpolate_rows, write_columns, write_marks
-from ....blocks.signals import (
-    BodyTwist,
-    CourseGoal,
-    DelayEstimate,
-    DynamicsTerms,
-    JumpReference,
-    PlanOutcome,
-)
+from ....blocks.signals import DelayEstimate, DynamicsTerms, JumpReference
 from ....mathematics.arrays import Array, Array1D
 from ....mathematics.interpolation import minimum_jerk
 from ....mathematics.kernel import kernel
@@ -42,6 +35,8 @@ from ....runtime.language.context import Clock
 from ....runtime.language.errors import AloftError, BlockError
 from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import Field, Signal
+from ..planner.plan_outcome import PlanOutcome
+from ..signals import BodyTwist, CourseGoal
 
 if TYPE_CHECKING:
     from ....planner.task.task import JumpTask

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from ....blocks.signals import BaseState, JumpFrame
+from ....blocks.signals import BaseState
 from ....mathematics.elementary import cos, sin
 from ....mathematics.kernel import kernel
 from ....mathematics.rotations import multiply, turn_about_vertical
 from ....runtime.language.block import Block, Input, Output
 from ....runtime.language.signals import Field, Signal
+from ..signals import JumpFrame
 
 
 class StartFrame(Block):

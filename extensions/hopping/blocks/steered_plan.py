@@ -15,19 +15,7 @@ from ....blocks.jumping.plan_progress import (
     read_plan,
 )
 from ....blocks.jumping.table_reading import integrate_rows
-from ....blocks.signals import (
-    CourseGoal,
-    DelayEstimate,
-    DynamicsTerms,
-    JumpCommand,
-    JumpFrame,
-    JumpReference,
-    Phase,
-    PhaseState,
-    PlanOutcome,
-    PlanRequest,
-    PlanSegment,
-)
+from ....blocks.signals import DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from ....mathematics.arrays import Array1D, Array2D, Flags1D
 from ....mathematics.constants import GRAVITY
 from ....mathematics.elementary import hypot, sincos
@@ -60,7 +48,15 @@ from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import Field, Signal
 from ..planner.hop_plans import level_reach, missing_plans, standing_row
 from ..planner.hop_request import LEVEL
-from ..signals import PLAN_ROWS
+from ..planner.plan_outcome import PlanOutcome
+from ..signals import (
+    PLAN_ROWS,
+    CourseGoal,
+    JumpCommand,
+    JumpFrame,
+    PlanRequest,
+    PlanSegment,
+)
 from .moved_landing import (
     AHEAD,
     ASIDE,

@@ -9,13 +9,12 @@ from typing import Any, Self
 import numpy as np
 from pydantic import model_validator
 
-from ....blocks.signals import JumpCommand, PlanRequest, SeenStones
 from ....mathematics.arrays import Array2D
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Context, Input, Output, State
 from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import Field, Signal
-from ..signals import STONES_SEEN
+from ..signals import STONES_SEEN, JumpCommand, PlanRequest, SeenStones
 
 Interval = tuple[float, float]
 CLOSE = 1e-3

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from ....blocks.signals import BodyTwist, JumpCommand, PlanRequest
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Input, Output, State
 from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import Field, Signal
+from ..signals import BodyTwist, JumpCommand, PlanRequest
 
 
 class TwistTaken(Signal):

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import field_validator
 
-from ....blocks.signals import BodyTwist
 from ....mathematics.arrays import Array1D, Array2D
 from ....mathematics.kernel import kernel
 from ....runtime.language.block import Block, Output
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import Parameters, parameter
+from ..signals import BodyTwist
 
 
 class TimedTwist(Parameters):

@@ -13,7 +13,9 @@ import typer
 from ....runtime.language.errors import AloftError
 
 if TYPE_CHECKING:
+    from ....runtime.language.stages import CheckedGraph
     from ....runtime.placement.placed import PlacedGraph
+    from ..diagram.page import Values
     from ..live.live_run import LiveRun
     from ..live.live_server import Opened, WatchedRun
     from ..live.spread_run import SpreadRun
@@ -153,3 +155,42 @@ def serve_live(run: WatchedRun, save: Path | None = None, opened: Opened = "diag
             server.serve_forever()
         finally:
             run.close()
+
+
+def serve_running(
+    graph: Path | None,
+    running: str = "",
+    overrides: Sequence[str] = (),
+    keys: Path | None = None,
+    name: str = "viewer",
+    local: int = 0,
+    *,
+    save: Path | None = None,
+    opened: Opened = "diagram",
+) -> None:
+    """Show a running graph in a browser until Ctrl-C is pressed.
+
+    Raises:
+        AloftError: it does not run.
+    """
+    if graph is not None and graph.suffix not in (".yaml", ".yml"):
+        raise AloftError(f"--live is for a graph that is running; {graph} is none")
+    remote = None if graph is None else RemoteRunAddress(graph, overrides, keys, name, local)
+    serve_live(open_live_run(running, remote), save, opened)
+
+
+def serve_diagram(graph: CheckedGraph, values: Values | None = None) -> None:
+    """Show the diagram in a browser until Ctrl-C is pressed."""
+    from ....cli.shared.viewing import open_page
+    from ..diagram.page import ADDRESS, page_server
+
+    server = page_server(graph, values=values)
+    page = f"http://{ADDRESS}:{server.server_address[1]}/"
+    typer.echo(f"{page}\nthe page is there until you press Ctrl-C")
+    open_page(page)
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.server_close()

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
-from ....runtime.drawing.diagram import INTO, OUT, Diagram, DiagramWire
+from .diagram import INTO, OUT, Diagram, DiagramWire
 
 _SWEEPS = 4
 _PASSES = 8

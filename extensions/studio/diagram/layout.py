@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ....runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
+from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
 from .layers import FEW, Layers, Place, WirePassage, arrange
 from .tracks import LANE, STRAIGHT, TRACK, Hop, Net, assign_tracks
 

@@ -17,14 +17,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ....files.nodes import text_of
-from ....runtime.drawing.diagram import diagram, subgraphs
 from ....runtime.language.reference import PortReference, block_reference
 from ....runtime.language.stages import BlockSpec, CheckedGraph
 from ....runtime.loading.picture import BlockRow, table
+from .diagram import diagram, subgraphs
 from .layout import draw
 from .render import svg
 
@@ -288,10 +285,6 @@ def _short(value: Any) -> str:
     return text if len(text) <= 120 else f"{text[:117]}..."
 
 
-MOST = 16
-"""Numbers of one field that are shown; of more the first, and how many there are."""
-
-
 class Values(Protocol):
     """A run whose values can be asked for."""
 
@@ -304,18 +297,6 @@ class Values(Protocol):
 
     def at(self, tick: int) -> Mapping[str, str]:
         """Every field of every output at a tick, by ``block.port.field``."""
-
-
-def shown(value: NDArray[Any], unit: str = "") -> str:
-    """Format the numbers of a field as a short text."""
-    flat = np.ravel(value)
-    texts = [f"{x:.6g}" if flat.dtype.kind == "f" else str(x) for x in flat[:MOST].tolist()]
-    text = ", ".join(texts) if flat.size != 1 else texts[0]
-    if flat.size > MOST:
-        text += f", ... ({flat.size} in all)"
-    if flat.size != 1:
-        text = f"[{text}]"
-    return f"{text} {unit}".rstrip()
 
 
 ADDRESS = "127.0.0.1"

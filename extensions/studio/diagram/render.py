@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import IO, Any
 
-from ....runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
+from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
 from .layout import HEAD, NOTE, PAD, PORT, TITLE, USE, Box, Drawing, note_of, width_of
 
 LIGHT = {

@@ -6,7 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ....runtime.drawing.diagram import DiagramWire
+from .diagram import DiagramWire
 
 TRACK = 6.5
 """Distance from one vertical line to the next."""

@@ -299,7 +299,7 @@ function pad(path) {
   return box;
 }
 if (data.live.tuning)
-  document.body.append(...Object.keys(data.blocks).filter(path => data.blocks[path].use === "blocks.Pad").map(pad));
+  document.body.append(...Object.keys(data.blocks).filter(path => data.blocks[path].use === "hopping.Pad").map(pad));
 const numbers = document.getElementById("numbers");
 numbers.onchange = () => drawing.classList.toggle("plain", !numbers.checked);
 const tune = document.getElementById("tune");

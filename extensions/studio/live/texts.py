@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....logs.viewing.signal_names import value_text
 from ....runtime.language.layout import Layout
 from ....runtime.language.stages import CheckedGraph
-from ..diagram.page import shown
 
 FEW = 2
 """Numbers of a port that stand beside its wire."""
@@ -49,7 +49,9 @@ class ValueTexts:
             full_name = f"{field.port}.{field.name}"
             value = self._layout.view(bus, full_name)
             named = field.named(value)
-            found[full_name] = f"{value.item()} ({named})" if named else shown(value, field.unit)
+            found[full_name] = (
+                f"{value.item()} ({named})" if named else value_text(value, field.unit)
+            )
         return found
 
     def brief(self, bus: NDArray[np.uint8]) -> dict[str, str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....blocks.signals import PlanOutcome
 from ....extensions.hopping.planner.hop_plans import (
     hop_table,
     level_reach,
@@ -19,6 +18,7 @@ from ....extensions.hopping.planner.hop_plans import (
 )
 from ....extensions.hopping.planner.hop_request import HopRequest
 from ....extensions.hopping.planner.next_hop import HopPlanner
+from ....extensions.hopping.planner.plan_outcome import PlanOutcome
 from ....planner.library.jump_table import table_rows
 from ....planner.solving.solver_process import cpu_time
 from ....robots.description import find_robot

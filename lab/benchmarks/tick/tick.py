@@ -128,7 +128,7 @@ def late_share(
     return late / count
 
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 class EarlierController:

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aloft.cli.shared import paper
+from aloft.lab.cli import paper
 from aloft.lab.figures import offscreen
 from aloft.lab.figures.paper import page
 from aloft.studies.reading import read_study
 
 CallJson = Callable[..., dict[str, Any]]
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def pixels(path: Path) -> np.ndarray:

@@ -11,7 +11,7 @@ from aloft.lab.studies.oracle import CALIBRATED, CONSUMER, CalibrationErrors, or
 from aloft.runtime.graph import Graph
 from aloft.runtime.loading import load_text
 
-GRAPHS = Path(__file__).parents[2] / "graphs"
+GRAPHS = Path(__file__).parents[3] / "graphs"
 
 
 def graph_of(overrides, trial="real"):

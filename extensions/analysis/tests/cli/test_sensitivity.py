@@ -44,7 +44,7 @@ def ranked(folder: Path) -> Path:
 def test_parameters_are_ranked_and_drawn(
     ranked: Path, call_json: Callable[..., dict[str, Any]]
 ) -> None:
-    asked = ("study", "study.yaml", "--workers", "1", "--sensitivity", "product", "--spread", "0.1")
+    asked = ("sensitivity", "study.yaml", "product", "--workers", "1", "--spread", "0.1")
     told = call_json(*asked, "--sobol", "2", "--samples", "32")
     effects = {each["key"]: each for each in told["effects"]}
     # d(slope other) over the whole of either range: 2 * 0.1 * 2.0 * 3.0 about the middle
@@ -62,15 +62,13 @@ def test_parameters_are_ranked_and_drawn(
 @pytest.mark.parametrize(
     ("asked", "text"),
     [
-        (["--sensitivity", "products"], "there is product"),
-        (["--sobol", "2"], "go with --sensitivity"),
-        (["--sensitivity", "product", "--dry-run"], "--sensitivity takes neither --open nor"),
-        (["--sensitivity", "product", "--samples", "33"], "--samples 33 is no power of two"),
-        (["--sensitivity", "product", "--vary", "counter.slope"], "fewer than two numeric parameters"),
+        (["products"], "there is product"),
+        (["product", "--samples", "33"], "--samples 33 is no power of two"),
+        (["product", "--vary", "counter.slope"], "fewer than two numeric parameters"),
     ],
 )  # fmt: skip
 def test_wrong_questions(
     ranked: Path, call: Callable[..., Any], asked: list[str], text: str
 ) -> None:
-    done = call("study", "study.yaml", "--workers", "1", *asked, code=2)
+    done = call("sensitivity", "study.yaml", *asked, "--workers", "1", code=2)
     assert text in " ".join(done.stderr.split())

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 import typer
 
-from aloft.cli.shared import bring_up as verb
 from aloft.extensions.commissioning.bring_up.by_hand import HandErrors, RobotByHand
 from aloft.extensions.commissioning.bring_up.session import Request
 from aloft.extensions.commissioning.bring_up.steps import BringUpStep
+from aloft.extensions.commissioning.cli import bring_up as verb
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.twin.server import PseudoTerminal, TwinServer

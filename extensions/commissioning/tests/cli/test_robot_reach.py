@@ -7,7 +7,7 @@ import pytest
 from tests.cli.conftest import run_for_json, run_here
 from tests.cli.test_jump import STICKS
 
-from aloft.cli.shared import robot_reach
+from aloft.extensions.commissioning.cli import robot_reach
 from aloft.extensions.commissioning.reach import frontier
 from aloft.extensions.commissioning.reach.search import PlanJob, RunJob
 from aloft.studies.batch.jobs import JobResult, attempt

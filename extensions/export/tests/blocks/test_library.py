@@ -1,4 +1,4 @@
-"""``blocks.Library``: an exported library in the place of the blocks that it was made of."""
+"""``export.Library``: an exported library in the place of the blocks that it was made of."""
 
 import json
 import shutil
@@ -66,7 +66,7 @@ def with_library(*parts: str, more: str = "") -> str:
     text = RAIL
     for part in parts:
         text = text.replace(
-            f"use: {part}.yaml", f"use: blocks.Library, with: {{folder: {part}{more}}}"
+            f"use: {part}.yaml", f"use: export.Library, with: {{folder: {part}{more}}}"
         )
     return text
 
@@ -215,7 +215,7 @@ blocks:
     in: {command: controller.safety_command, push: push.push}
   push: {use: hal.Push, with: {force: 0 N}, in: {truth: robot.truth}}
   controller:
-    use: blocks.Library
+    use: export.Library
     with: {folder: jumper}
     in: {robot_contacts: robot.contacts, robot_imu: robot.imu, robot_joints: robot.joints, robot_health: robot.health}
 """
@@ -293,7 +293,7 @@ def test_a_process_in_lockstep_gives_the_same_bytes(folder: Path, tmp_path: Path
         found = result.signal("controller.force.value")
         other = (
             "rate: 500 Hz\nduration: 0.1 s\nblocks:\n  force: {use: blocks.Constant, with: {value: [1 N]}}\n"
-            f"  plant: {{use: blocks.Library, with: {{folder: plant, memory: {memory}}}, in: {{force: force.y}}}}\n"
+            f"  plant: {{use: export.Library, with: {{folder: plant, memory: {memory}}}, in: {{force: force.y}}}}\n"
         )
         with pytest.raises(AloftError, match=r"runs another library than plant"):
             aloft.load(other, path=folder / "g.yaml").run()

@@ -126,7 +126,9 @@ def test_the_example_builds_without_a_warning(written: Path, tmp_path: Path, com
 def test_the_rust_of_the_page_calls_the_library(written: Path, tmp_path: Path) -> None:
     if not shutil.which("rustc"):
         pytest.skip("there is no rustc")
-    page = (Path(aloft.__file__).parent / "docs" / "c_library.md").read_text(encoding="utf-8")
+    page = (Path(aloft.__file__).parent / "extensions" / "export" / "c_library.md").read_text(
+        encoding="utf-8"
+    )
     (tmp_path / "caller.rs").write_text(page.partition("```rust\n")[2].partition("```")[0])
     command = ["rustc", "--edition", "2021", "-D", "warnings", "-L", written.parent, "caller.rs"]
     subprocess.run(command, cwd=tmp_path, check=True)
@@ -314,7 +316,7 @@ GENERAL = Path(__file__).with_name("general_blocks.yaml")
 IN_PYTHON = {
     "blocks.ColouredNoise": "NumPy's random numbers", "blocks.WhiteNoise": "NumPy's random numbers",
     "blocks.External": "what Python sets; in a library it is an input",
-    "blocks.Policy": "a network of ONNX", "blocks.Library": "another library",
+    "blocks.Policy": "a network of ONNX", "export.Library": "another library",
 }  # fmt: skip
 """The general blocks that no library has, and why."""
 

@@ -1,4 +1,4 @@
-"""``fmi.CoSimulation``: FMUs of FMI 2.0 and 3.0 as blocks, their units, state, log and hash."""
+"""``export.CoSimulation``: FMUs of FMI 2.0 and 3.0 as blocks, their units, state, log and hash."""
 
 import hashlib
 from pathlib import Path
@@ -24,7 +24,7 @@ rate: 100 Hz
 duration: 0.5 s
 blocks:
   wave: {use: blocks.SineWave, with: {amplitude: 3 N, frequency: 2 Hz}}
-  spring: {use: fmi.CoSimulation, with: {file: spring.fmu, start: {mass: 1.5}}, in: {force: wave.y}}
+  spring: {use: export.CoSimulation, with: {file: spring.fmu, start: {mass: 1.5}}, in: {force: wave.y}}
   where: {use: blocks.Gain, with: {gain: 2 1/m}, in: {u: spring.position}}
 """
 
@@ -219,7 +219,7 @@ rate: 100 Hz
 duration: 0.2 s
 blocks:
   spring:
-    use: fmi.CoSimulation
+    use: export.CoSimulation
     with: {file: spring.fmu, feedthrough: false}
     in: {force: pull.y}
   pull: {use: blocks.Gain, with: {gain: -20 N/m}, in: {u: spring.position}}

@@ -21,7 +21,7 @@ blocks: {wave: {use: blocks.WhiteNoise, with: {std: 1}}}
 USER = """\
 rate: 100 Hz
 duration: 0.05 s
-blocks: {wave: {use: fmi.CoSimulation, with: {file: wave.fmu}}}
+blocks: {wave: {use: export.CoSimulation, with: {file: wave.fmu}}}
 """
 WATCHED = """\
 import atexit

@@ -68,7 +68,7 @@ def test_an_fmu_of_another_tool_gives_what_fmpy_gives(folder: Path, name: str) -
     wires = ", ".join(f"{key}: {key}.y" for key in inputs)
     text = (
         f"rate: {RATE:g} Hz\nduration: {STEPS / RATE} s\nblocks:\n{constants}"
-        f"  unit: {{use: fmi.CoSimulation, with: {{file: {file}}}, in: {{{wires}}}}}\n"
+        f"  unit: {{use: export.CoSimulation, with: {{file: {file}}}, in: {{{wires}}}}}\n"
     )
     result = aloft.load(text).run()
     assert result.success, result.reason

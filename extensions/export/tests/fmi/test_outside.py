@@ -1,4 +1,4 @@
-"""``fmi.Outside``: outputs that somebody sets, their types, and wrong declarations."""
+"""``export.Outside``: outputs that somebody sets, their types, and wrong declarations."""
 
 from typing import Any
 
@@ -34,6 +34,6 @@ def test_outputs_hold_what_was_set() -> None:
     ],
 )
 def test_wrong_fields_are_reported(field: dict[str, Any], message: str) -> None:
-    text = f"rate: 100 Hz\nblocks:\n  a: {{use: fmi.Outside, with: {{ports: {{y: {{value: {field}}}}}}}}}\n"
+    text = f"rate: 100 Hz\nblocks:\n  a: {{use: export.Outside, with: {{ports: {{y: {{value: {field}}}}}}}}}\n"
     with pytest.raises(LoadError, match=message):
         load_text(text, "graph.yaml")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import PlanOutcome
 from aloft.extensions.hopping.blocks.online_planner import OnlinePlanner
+from aloft.extensions.hopping.planner.plan_outcome import PlanOutcome
 from aloft.extensions.hopping.signals import SEGMENT_ROWS
 from aloft.planner.library.jump_table import COLUMNS
 from aloft.runtime.language.errors import BlockError

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import Phase, PlanOutcome
+from aloft.blocks.signals import Phase
 from aloft.extensions.hopping.blocks.steered_plan import SteeredPlan
 from aloft.extensions.hopping.planner.hop_plans import hop_table, samples_of_hops
+from aloft.extensions.hopping.planner.plan_outcome import PlanOutcome
 from aloft.extensions.hopping.signals import SEGMENT_ROWS
 from aloft.planner.library.jump_table import table_rows
 from aloft.robots.description import find_robot

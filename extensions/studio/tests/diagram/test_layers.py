@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aloft.extensions.studio.diagram.diagram import Diagram, DiagramNode, DiagramWire
 from aloft.extensions.studio.diagram.layers import WirePassage, arrange
-from aloft.runtime.drawing.diagram import Diagram, DiagramNode, DiagramWire
 
 
 def diagram_of(edges: list[tuple[str, str]], order: str = "") -> Diagram:

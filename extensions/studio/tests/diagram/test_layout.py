@@ -9,8 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aloft.extensions.studio.diagram.diagram import (
+    INTO,
+    OUT,
+    Diagram,
+    DiagramNode,
+    DiagramWire,
+    diagram,
+)
 from aloft.extensions.studio.diagram.layout import Drawing, draw, size_of
-from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire, diagram
 from aloft.runtime.loading import load
 
 from .test_layers import NAMES, diagram_of

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import Running, start
 
+from aloft.extensions.studio.live import live_run
 from aloft.extensions.studio.live.live_run import LiveRun
 from aloft.extensions.studio.live.texts import ValueTexts
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.part import part_graph
-from aloft.runtime.live import live_run
 from aloft.runtime.live.parameter_endpoint import EndpointError, ask_to_watch
 from aloft.runtime.live.window import digest
 from aloft.runtime.loading import load_text

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from extensions.studio.tests.live.conftest import serving
 from tests.logs.viewing.browser import PROGRAM, Browser
-from tests.runtime.live.conftest import Running, serving, start, write_graph
+from tests.runtime.live.conftest import Running, start, write_graph
 
 from aloft.extensions.studio.live.live_run import LiveRun
 from aloft.extensions.studio.live.live_server import LONGEST_BODY, LiveServer

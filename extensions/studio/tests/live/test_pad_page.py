@@ -22,7 +22,7 @@ GRAPH = """\
 rate: 200 Hz
 clock: {kind: paced}
 blocks:
-  stick: {use: blocks.Pad}
+  stick: {use: hopping.Pad}
 """
 
 

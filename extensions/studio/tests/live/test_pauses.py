@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from extensions.studio.tests.live.conftest import serving
 from tests.logs.viewing.browser import PROGRAM, Browser
-from tests.runtime.live.conftest import Running, serving, start
+from tests.runtime.live.conftest import Running, start
 
 from aloft.extensions.studio.live.live_run import LiveRun, paused_text
 from aloft.extensions.studio.live.live_server import LiveServer

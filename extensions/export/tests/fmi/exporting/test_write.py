@@ -143,7 +143,9 @@ def test_the_fmu_as_a_block_in_its_place_gives_the_same_numbers(
     folder: Path, reference: aloft.RunResult, part: str, kind: str
 ) -> None:
     export(str(folder / "rail.yaml"), folder / f"{part}.fmu", part)
-    text = RAIL.replace(f"use: {part}.yaml", f"use: fmi.CoSimulation, with: {{file: {part}.fmu}}")
+    text = RAIL.replace(
+        f"use: {part}.yaml", f"use: export.CoSimulation, with: {{file: {part}.fmu}}"
+    )
     result = aloft.load(text, path=folder / "rail.yaml").run()  # the loop: the plant breaks it
     result.raise_if_failed()
     pairs = {
@@ -156,7 +158,7 @@ def test_the_fmu_as_a_block_in_its_place_gives_the_same_numbers(
 
 def test_a_snapshot_goes_through_the_fmu(folder: Path, kind: str) -> None:
     export(str(folder / "rail.yaml"), folder / "plant.fmu", "plant")
-    text = RAIL.replace("use: plant.yaml", "use: fmi.CoSimulation, with: {file: plant.fmu}")
+    text = RAIL.replace("use: plant.yaml", "use: export.CoSimulation, with: {file: plant.fmu}")
     with aloft.load(text, path=folder / "rail.yaml").open() as run:
         run.step(30)
         kept = run.snapshot()
@@ -194,7 +196,7 @@ blocks:
     (folder / "whole.yaml").write_text(text)
     made = export(str(folder / "whole.yaml"), folder / "whole.fmu")
     assert [(t.name, t.shape, t.start) for t in made.inputs] == [("action", (3,), [1.0, 2.0, 3.0])]
-    block = "rate: 100 Hz\nduration: 0.02 s\nblocks:\n  unit: {use: fmi.CoSimulation, with: {file: whole.fmu}"
+    block = "rate: 100 Hz\nduration: 0.02 s\nblocks:\n  unit: {use: export.CoSimulation, with: {file: whole.fmu}"
     alone = aloft.load(block + "}\n", path=folder / "g.yaml").run()
     assert alone.signal("unit.twice.y").tolist() == [[2.0, 4.0, 6.0]] * 2
     wired = block + ", in: {action: {value: {value: [5 N, 6 N, 7 N]}}}}\n"
@@ -241,7 +243,7 @@ def test_modules_and_files_travel_in_the_fmu(folder: Path, tmp_path_factory: Any
 
 def test_a_step_that_is_no_whole_number_of_ticks_is_refused(folder: Path) -> None:
     export(str(folder / "rail.yaml"), folder / "plant.fmu", "plant")
-    text = "rate: 300 Hz\nduration: 0.1 s\nblocks:\n  p: {use: fmi.CoSimulation, with: {file: plant.fmu}}\n"
+    text = "rate: 300 Hz\nduration: 0.1 s\nblocks:\n  p: {use: export.CoSimulation, with: {file: plant.fmu}}\n"
     result = aloft.load(text, path=folder / "g.yaml").run()
     assert "is no whole number of the graph's ticks of 0.01 s" in result.reason
 
@@ -272,7 +274,7 @@ def test_the_estimator_of_a_jump_as_an_fmu_beside_itself(tmp_path: Path) -> None
     """Fields of robots: quaternions, switches as booleans, and files and robots that are shipped."""
     export("aloft:jump", tmp_path / "estimator.fmu", "estimator")
     (tmp_path / "both.yaml").write_text(
-        "include: [jump.yaml]\nblocks:\n  unit:\n    use: fmi.CoSimulation\n"
+        "include: [jump.yaml]\nblocks:\n  unit:\n    use: export.CoSimulation\n"
         f"    with: {{file: {tmp_path / 'estimator.fmu'}}}\n"
         "    in: {robot_imu: robot.imu, robot_joints: robot.joints, contacts_state: contacts.state}\n"
     )
@@ -287,7 +289,7 @@ def test_the_estimator_of_a_jump_as_an_fmu_beside_itself(tmp_path: Path) -> None
 
 @pytest.mark.long
 def test_a_robot_without_feet_has_no_variable_for_its_switches(tmp_path: Path) -> None:
-    project = Path(__file__).parents[3] / "docs" / "projects" / "cart_pole" / "balance.yaml"
+    project = Path(__file__).parents[5] / "docs" / "projects" / "cart_pole" / "balance.yaml"
     whole = export(str(project), tmp_path / "balance.fmu", outputs=["robot.contacts", "robot.imu"])
     assert whole.problems == ()
     assert [t.name for t in whole.outputs] == [

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from aloft.extensions.studio.diagram.diagram import INTO, OUT, diagram, subgraphs
 from aloft.extensions.studio.diagram.layout import draw
 from aloft.extensions.studio.diagram.page import page, page_server, policy
 from aloft.extensions.studio.diagram.render import save_png, svg
-from aloft.runtime.drawing.diagram import INTO, OUT, diagram, subgraphs
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import load
 

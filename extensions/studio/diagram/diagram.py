@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from ..language.stages import CheckedGraph
-from ..loading.picture import BlockRow, InputRow, table
+from ....runtime.language.stages import CheckedGraph
+from ....runtime.loading.picture import BlockRow, InputRow, table
 
 INTO, OUT = "<in>", "<out>"
 """The names of the two nodes that stand for a box's own ports inside it."""
