@@ -198,8 +198,8 @@ def observer_of(
             clear which run is meant.
     """
     from ...runtime.links.observer import Observer
-    from ...runtime.loading import load
+    from ...runtime.loading import checked_file
     from ...runtime.placement.placed import place
 
-    placed = place(load(graph, [*settings_of(graph, process), *overrides]))
+    placed = place(checked_file(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, keys, name)

@@ -29,10 +29,10 @@ from ...language.fault import (
     chirp_lines,
     fault_block_type,
 )
+from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
+from ...language.selection import Selection, read_selection, select
 from ...language.signals import Field, Signal
 from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
-from ..reading.selection import Selection, read_selection, select
 from .block_check import BlockDraft
 from .inserted import part_signal
 from .parameters import check_parameters
