@@ -24,7 +24,7 @@ class SafetyParams(Parameters):
         None, unit="rad/s", gt=0.0, text="largest joint speed; none: twice what its motors reach"
     )
     joint_hold: float = parameter(
-        0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
+        0.02, unit="s", ge=0.0, text="time for which a joint may be further or faster"
     )
     torque_limit: PerJoint | None = parameter(
         None, unit="N m", gt=0.0,

@@ -58,7 +58,7 @@ class StatePredictor(Block):
     measured_joints = Input(JointState, text="joint angles and velocities")
     command = Input(WholeBodyCommand, text="the last whole-body command")
     phase = Input(PhaseState, text="the phase and the points in stance of that command")
-    delay = Input(DelayEstimate, text="the delay, and how far ahead to predict")
+    delay = Input(DelayEstimate, text="the delay, and the time to predict ahead")
     base = Output(BaseState, text="the base when the command takes effect")
     joints = Output(JointState, text="the joints then; torques as measured")
     memory = State(CommandMemory, text="the commands on their way")
