@@ -40,7 +40,7 @@ def blocks(
 
 
 def reference(name: str) -> BlockReference:
-    """The contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
+    """Return the contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
     from ..runtime.language.errors import UnknownBlockError
     from ..runtime.language.reference import block_reference
     from ..runtime.language.registry import find_block, nearest_names
@@ -55,7 +55,7 @@ def reference(name: str) -> BlockReference:
 
 
 def all_references(*, ours: bool = False) -> list[BlockReference]:
-    """The contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
+    """Return the contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
     from ..runtime.language.reference import block_reference
     from ..runtime.language.registry import PACKAGES, all_blocks
 
@@ -91,7 +91,7 @@ def print_contract(out: Console, block: BlockReference) -> None:
 
 
 def port_rows(ports: tuple[PortReference, ...]) -> list[tuple[str, str, str, str, str]]:
-    """A row for every port with its text, and one for every field of its signal."""
+    """Return a row for every port with its text, and one for every field of its signal."""
     rows = []
     for port in ports:
         text = f"{port.text} ({port.note})" if port.note else port.text
@@ -109,19 +109,19 @@ marked *live* can be changed while a graph runs: `aloft params set block.paramet
 
 
 def reference_page(blocks: Sequence[BlockReference]) -> str:
-    """The whole page: a list of all blocks, then a section for each."""
+    """Write the whole page: a list of all blocks, then a section for each."""
     listing = [f"- [`{b.name}`](#{anchor(b.name)}): {b.summary}" for b in blocks]
     sections = [section(block) for block in blocks]
     return "\n".join([HEAD, *listing, "", *sections]).rstrip() + "\n"
 
 
 def anchor(name: str) -> str:
-    """The anchor of a heading."""
+    """Return the anchor of a heading."""
     return name.lower().replace(".", "")
 
 
 def section(block: BlockReference) -> str:
-    """A block's heading, docstring and tables."""
+    """Write a block's heading, docstring and tables."""
     parts = [f"## {block.name}", "", f"*{block.machine}*", "", "```text", block.text, "```", ""]
     for title, ports in (
         ("Inputs", block.inputs),

@@ -131,7 +131,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
 
 
 def check(target: Target, robot: str) -> list[Row]:
-    """The checks of one block, one for each thing that every block promises.
+    """Run the checks of one block, one for each promise of every block.
 
     A ``robot`` that is named takes the place of the target's own.
     """

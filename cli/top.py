@@ -60,7 +60,7 @@ def top(
 
 
 def report(observer: Observer) -> dict[str, Any]:
-    """The status of each machine; of one that was never heard only its state."""
+    """Return the status of each machine; of one that was never heard only its state."""
     return {
         spec.name: {
             "state": observer.state_of(spec.name),

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
 from ...planner.solving.solver_process import cpu_time
@@ -136,7 +136,7 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
         try:
             library.add(solve_and_check(job.task, robot))
         except (InvalidPlanError, PlanError, JumpTaskError) as error:
-            reason = why_not(error)
+            reason = failure_text(error)
         found.append(("", Outcome(not reason, reason, metrics={"cpu_s": cpu_time() - started})))
         if reason:
             return found

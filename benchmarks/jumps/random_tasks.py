@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import PlanError
@@ -145,5 +145,5 @@ def plan_one(task: JumpTask, robot: RobotDescription) -> str:
     try:
         solve_and_check(task, robot)
     except (InvalidPlanError, PlanError) as error:
-        return why_not(error)
+        return failure_text(error)
     return ""

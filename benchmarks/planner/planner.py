@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError, check_plan, why_not
+from ...planner.checking.validity import InvalidPlanError, check_plan, failure_text
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.problem.guess import ballistic_guess
 from ...planner.problem.problem import FullProblem
@@ -82,7 +82,7 @@ def neighbour_rows(seed: int = SEED) -> list[Row]:
                 try:
                     plan = solve_and_check(task, robot, near[0] if near else None)
                 except (PlanError, InvalidPlanError) as error:
-                    failed = f"{task.name} ({why_not(error)})"
+                    failed = f"{task.name} ({failure_text(error)})"
                 else:
                     failed = ""
                 spent = cpu_time() - start

@@ -1,17 +1,16 @@
-"""Computations of the graph by a formula, a function, or from outside."""
+"""Computations of the graph by a formula, or values from outside."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import field_validator
 
 from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.elementwise import FUNCTIONS
 from ...mathematics.expression import parse_expression
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
@@ -29,65 +28,6 @@ from .vectors import (
     VectorParameters,
 )
 
-Name = Literal[
-    "abs", "sign", "negative", "reciprocal", "square", "sqrt", "exp", "log", "log10",
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "round",
-]  # fmt: skip
-_SAME = ("abs", "negative", "floor", "ceil", "round")
-_OF_ANGLES = ("sin", "cos", "tan")
-_TO_ANGLES = ("asin", "acos", "atan")
-
-
-def _quantity(name: str, inputs: InputQuantities) -> Quantity | None:
-    """Return the quantity of a function's result, from that of ``u``."""
-    u = inputs["u"]
-    if u is None or name in _SAME:
-        return u
-    if name == "reciprocal":
-        return Quantity(frame=u.frame).times(u.unit, -1)
-    if name == "square":
-        return u.times(u.unit)
-    if name == "sqrt":
-        try:
-            return Quantity(None if u.unit is None else root(u.unit), u.frame)
-        except UnitError as error:
-            inputs.refuse("u", str(error))
-            return Quantity(None)
-    if name in _OF_ANGLES:
-        inputs.demand("u", ("rad", ""), f"{name} takes angles in rad")
-    elif name != "sign":
-        inputs.demand("u", ("",), f"{name} takes plain numbers")
-    return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
-
-
-class Function(KernelBlock):
-    """A function of every element by itself: y = f(u).
-
-    Angles are in rad; ``round`` rounds halves to even. Outside a function's domain, such as the
-    square root of a negative number, an element is not finite, and that ends the run with the
-    block's name.
-    """
-
-    class Params(VectorParameters):
-        function: Name = parameter("abs", text="which function")
-
-    params: Params
-    u = Input(Vector, text="the arguments")
-    y = Output(Vector, text="the function's values")
-
-    @classmethod
-    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Angles go into sin, cos and tan; roots need even powers."""
-        assert isinstance(params, cls.Params)
-        return {"y": _quantity(params.function, inputs)}
-
-    def setup(self) -> None:
-        """Choose the function."""
-        self.kernel_calls = (
-            KernelCall(FUNCTIONS[self.params.function], self.u.value, self.y.value),
-        )
-
-
 INPUTS = ("a", "b", "c", "d", "e", "f", "g", "h")
 ABSENT = {"value": 0.0}
 
@@ -96,8 +36,8 @@ class Expression(KernelBlock):
     """A formula, element by element, of the inputs a to h, the time t [s] and named constants.
 
     It may hold numbers, ``+ - * / ** %``, comparisons (1 where they hold, else 0), brackets,
-    ``x if condition else y``, ``pi``, and abs, sign, sqrt, exp, log, sin, cos, tan, asin, acos,
-    atan, atan2, tanh, floor, ceil, min, max, hypot::
+    ``x if condition else y``, ``pi``, and abs, sign, sqrt, exp, log, log10, sin, cos, tan, asin,
+    acos, atan, atan2, sinh, cosh, tanh, floor, ceil, round (halves to even), min, max, hypot::
 
         with: {expression: "k * (a - b) if t > 1 else 0", constants: {k: 2.5}}
 
@@ -213,9 +153,10 @@ def _write_time(tick: Indices1D, base_period: float, time: Array1D) -> None:
 
 
 _RAD = parse_unit("rad")
-_EXPRESSION_UNITS_TO_ANGLES = ("asin", "acos", "atan", "atan2")
+_TO_ANGLES = ("asin", "acos", "atan", "atan2")
 _ALIKE = ("min", "max", "hypot", "atan2")
-_EXPRESSION_UNITS_SAME = ("abs", "floor", "ceil")
+_SAME = ("abs", "floor", "ceil", "round")
+_OF_ANGLES = ("sin", "cos", "tan")
 TIME = {"t": SECOND}
 """The unit of the variable that every expression has."""
 
@@ -287,9 +228,9 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
     first = arguments[0]
     if name in _ALIKE:
         found = _alike(first, arguments[1], units)
-        return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else found
+        return _RAD if name in _TO_ANGLES else found
     unit = unit_of(first, units)
-    if name in _EXPRESSION_UNITS_SAME:
+    if name in _SAME:
         return unit
     if name == "sqrt":
         return None if unit is None else root(unit)
@@ -300,7 +241,7 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
         raise UnitError(
             f"{name} takes {taken[0] if len(taken) > 1 else 'plain numbers'}, not {unit}"
         )
-    return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else ONE
+    return _RAD if name in _TO_ANGLES else ONE
 
 
 class External(UnitFromParameters, Block):

@@ -35,7 +35,7 @@ class RepairError(AloftError):
 
 @dataclass(frozen=True)
 class Repair:
-    """What was found and done.
+    """The findings and the result of a repair.
 
     Attributes:
         path: the file.
@@ -59,7 +59,7 @@ class Repair:
 
     @property
     def was_whole(self) -> bool:
-        """Whether there was nothing to repair."""
+        """True if there was nothing to repair."""
         return self.closed and not self.damage
 
 

@@ -40,12 +40,12 @@ _SKIP = 0
 
 
 def make_memory(capacity: int) -> int:
-    """A file descriptor of nameless memory for a ring of ``capacity`` bytes."""
+    """Open nameless memory for a ring of ``capacity`` bytes and return its file descriptor."""
     return nameless_memory(CONTROL + capacity, "aloft-ring")
 
 
 def fitting_capacity(wanted: int, least: int) -> int:
-    """The capacity of a ring, ``wanted`` or more where nothing limits it.
+    """Return the capacity of a ring, ``wanted`` or more where nothing limits it.
 
     A limit on the size of files (``ulimit -f``) holds for shared memory as well. Then the ring is as
     large as it may be, but not below ``least``: a smaller one could not do its work.
@@ -90,7 +90,7 @@ class _Ring:
 
 
 def space_of(size: int) -> int:
-    """The bytes in the ring of a record with ``size`` bytes."""
+    """Return the bytes in the ring of a record with ``size`` bytes."""
     return -(-(_HEAD.size + size + _TAIL.size) // ALIGNMENT) * ALIGNMENT
 
 

@@ -70,7 +70,7 @@ class _Watch:
 def capture(
     recorded: Replayable, path: str, first: int, last: int
 ) -> tuple[Stretch, dict[str, Any], Difference | None]:
-    """The block at ``path`` in the ticks from ``first`` up to, without, ``last``.
+    """Capture the block at ``path`` in the ticks from ``first`` up to, without, ``last``.
 
     The block's state is found by running the block on recorded inputs from the keyframe before.
 
@@ -204,7 +204,7 @@ def write_test(
 
 
 def _is_ours(robot: RobotDescription) -> bool:
-    """Whether the robot's name alone gives the same description."""
+    """Tell whether the robot's name alone gives the same description."""
     try:
         return find_robot(robot.name) == robot
     except LookupError:
@@ -212,7 +212,7 @@ def _is_ours(robot: RobotDescription) -> bool:
 
 
 def _names_files(parameters: Mapping[str, Any], folder: Path) -> bool:
-    """Whether any parameter is the name of a file relative to the graph's folder."""
+    """Tell whether any parameter is the name of a file relative to the graph's folder."""
     texts = [value for value in parameters.values() if isinstance(value, str) and value]
     return any((folder / text).exists() for text in texts)
 
@@ -231,7 +231,7 @@ def _relative(folder: Path, start: Path) -> str:
 
 
 def _import_of(spec: BlockSpec, folder: Path) -> tuple[str, str]:
-    """The import that the test needs, and how it names the class."""
+    """Return the import that the test needs, and its name for the class."""
     name = block_name(spec.block_type)
     if ":" not in name:
         module = f"aloft.{spec.block_type.__module__.removeprefix(f'{_OURS}.')}"

@@ -119,7 +119,8 @@ _TYPES: dict[tuple[type[Signal], int], type[WireDelay]] = {}
 
 
 def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
-    """Return the block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
+    """Return the block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output
+    ``y``."""
     if k < 1:
         raise ValueError(f"a delay is at least 1 run, not {k}")
     if (signal, k) in _TYPES:

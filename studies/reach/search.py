@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...planner.checking.plan_tests import active_limits
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import JumpTaskError, PlanError
@@ -167,7 +167,7 @@ def make_plan(job: PlanJob) -> Outcome:
         near = None if job.near is None else library.find(job.near)
         plan = solve_and_check(job.task, robot, near)
     except (InvalidPlanError, PlanError, JumpTaskError) as error:
-        return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
+        return Outcome(False, failure_text(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
     library.add(plan)
     return Outcome(True, "", metrics={"cpu_s": spent, "binds": list(active_limits(plan, robot))})

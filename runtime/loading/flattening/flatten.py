@@ -386,7 +386,8 @@ class _Flattener:
 
 
 def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
-    """Return the block, every wire of which comes from an output of a block that is no sub-graph."""
+    """Return the block, every wire of which comes from an output of a block that is no
+    sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []
     for name, link in draft.links.items():
