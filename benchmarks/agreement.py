@@ -506,7 +506,7 @@ class Methods:
 
 
 def _by_daqp(program: FullMatrices) -> tuple[Array | None, Flags]:
-    """DAQP's solution, and the inequalities that it says are active."""
+    """Solve with DAQP and return the solution, and the inequalities that it says are active."""
     import daqp
 
     cost, equality, inequality = program.cost, program.equality, program.inequality

@@ -42,7 +42,7 @@ def _target(rng: np.random.Generator) -> Command:
 
 
 def _beside(rng: np.random.Generator, target: Command, most: float, turn: float) -> Command:
-    """Another target at most so far from one [m, deg], in a drawn direction."""
+    """Draw another target at most so far from one [m, deg], in a drawn direction."""
     way, angle = rng.uniform(0.0, most), rng.uniform(0.0, 2.0 * math.pi)
     turned = math.radians(rng.uniform(-turn, turn))
     return {
@@ -82,7 +82,8 @@ def flight_changes(rng: np.random.Generator) -> list[Command]:
 
 
 def several_changes(rng: np.random.Generator) -> list[Command]:
-    """Place and heading change twice before lift-off, by up to 6 cm and 15 degrees each, and by up to 3 cm and 8 degrees in flight."""
+    """Draw two changes of place and heading before lift-off, by up to 6 cm and 15 degrees each, and
+    one by up to 3 cm and 8 degrees in flight."""
     first = _target(rng)
     second, third = _beside(rng, first, 0.06, 15.0), _beside(rng, first, 0.06, 15.0)
     return [
@@ -100,7 +101,7 @@ KINDS: Mapping[str, Callable[[np.random.Generator], list[Command]]] = {
 
 
 def changed_targets(seeds: Sequence[int] = SEEDS, kinds: Sequence[str] = tuple(KINDS)) -> list[Row]:
-    """Rows for each kind of change: the share of jumps that miss, and the errors."""
+    """Measure for each kind of change the share of jumps that miss, and the errors."""
     rows = []
     for kind in kinds:
         found = [run_changed(kind, seed) for seed in seeds]

@@ -110,7 +110,8 @@ def recorded() -> tuple[Driver, Talk]:
 
 @contextmanager
 def far_end(talk: Talk) -> Iterator[tuple[str, str]]:
-    """Another process answers as recorded; gives the paths of the bus's and the board's ports."""
+    """Start another process that answers as recorded; yield the paths of the bus's and the board's
+    ports."""
     with other_process("from aloft.benchmarks.driver import answer; answer()") as other:
         said = {"size": len(talk.request), "answers": [each.hex() for each in talk.answers],
                 "packets": [each.hex() for each in talk.packets]}  # fmt: skip

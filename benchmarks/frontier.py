@@ -27,7 +27,7 @@ def frontier(
     folder: Path = FOLDER,
     directions: Sequence[Direction] = DIRECTIONS,
 ) -> list[Row]:
-    """One row a direction; writes ``frontier.json`` and ``frontier.svg`` into ``folder``."""
+    """Measure one row a direction; write ``frontier.json`` and ``frontier.svg`` into ``folder``."""
     cpu = MOST_CPU if len(seeds) >= FIRST_LOOK else FIRST_LOOK_CPU
     effort = Effort(len(seeds), cpu, cpu)
     told = find_frontier(bruce_jumps(), directions, seeds, folder, effort)

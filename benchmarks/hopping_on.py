@@ -39,7 +39,8 @@ def speeds(seed: int, fastest: float = FASTEST) -> list[dict[str, float]]:
 
 
 def hopping_on(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows: the shares of rows with a fall and of those that fail a criterion, and the error of the speed."""
+    """Measure the shares of rows with a fall and of those that fail a criterion, and the error of
+    the speed."""
     found = [run_hops(seed, speeds(seed)) for seed in seeds]
     n, fallen = len(found), [one for one in found if fell(one)]
     low, high = wilson_interval(len(fallen), n)

@@ -30,7 +30,8 @@ KINDS = (
 
 
 def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows for each kind of stones: the share of courses that do not come to the last stone, and of those that fail a criterion."""
+    """Measure for each kind of stones the share of courses that do not come to the last stone, and
+    of those that fail a criterion."""
     rows = []
     for name, height, sensor in KINDS:
         found = [run_stones(seed, height, sensor) for seed in seeds]
@@ -63,7 +64,8 @@ STEP = (0.198, 0.4)
 
 
 def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
-    """Rows: the share of robots that do not come up a staircase, of those that fail a criterion, and how long it takes."""
+    """Measure the share of robots that do not come up a staircase, of those that fail a criterion,
+    and the time that it takes."""
     found = [run_staircase(seed) for seed in seeds]
     return _rows_of_stairs("staircase", found, STEPS, "4 cm")
 

@@ -56,7 +56,8 @@ Signals = Callable[[str], Array]
 
 
 def ladder(asked: Mapping[str, float], rise: float) -> list[dict[str, float]]:
-    """Smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and turned."""
+    """Return smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and
+    turned."""
     found = [{"rise": rung} for rung in RUNGS if rung < rise - 0.005]
     half = {
         name: 0.5 * asked[name] for name in ("distance_x", "distance_y", "twist") if name in asked
@@ -111,7 +112,8 @@ def flight(signals: Signals) -> tuple[Array, float, float, NDArray[np.bool_], in
 
 
 def landing_error(signals: Signals, measured_place: tuple[float, float] | None) -> Array | None:
-    """Actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad], (5,).
+    """Compute actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad],
+    (5,).
 
     The torso is planned to be level. ``None`` without a flight and a landing.
     """
@@ -143,7 +145,8 @@ def landing_error(signals: Signals, measured_place: tuple[float, float] | None) 
 
 
 def speed_error(signals: Signals) -> float:
-    """Actual minus planned vertical velocity at lift-off [m/s], of a run that flew and landed."""
+    """Compute actual minus planned vertical velocity at lift-off [m/s], of a run that flew and
+    landed."""
     time, lifted, landed, loaded, flying = flight(signals)
     ticks = int(np.argmax(loaded[flying:])) + int(np.argmax(loaded[:flying][::-1]))
     without_contact = ticks * float(time[1] - time[0])

@@ -98,7 +98,7 @@ def response(plan: PlannedJump, mass: float) -> Array:
 
 
 def angles_of(quaternions: Array) -> Array:
-    """Roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
+    """Compute roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))

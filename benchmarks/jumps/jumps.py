@@ -72,7 +72,7 @@ def jumps(
     trial: str = TRIAL,
     push: float = 0.0,
 ) -> list[Row]:
-    """Rows: the share of tasks without a plan, and what binds; of runs that do not land, with its
+    """Measure the share of tasks without a plan, and what binds; of runs that do not land, with its
     95 % interval; and the CPU time of planning, from nothing to checked."""
     tasks = random_tasks(count, seed, harder)
     code = code_fingerprint()
@@ -150,7 +150,7 @@ def run_key(trial: str, push: float, seed: int) -> str:
 
 
 def run_once(job: JumpJob, seed: int) -> Outcome:
-    """One run of a planned task."""
+    """Make one run of a planned task."""
     jumping = pushed_jumps(job, seed) if job.push else bruce_jumps(job.trial)
     return jumping.run(job.task, job.folder, seed)
 

@@ -116,8 +116,8 @@ _HARDER: dict[str, Any] = {
 
 
 def random_rows(count: int = COUNT, seed: int = SEED) -> list[Row]:
-    """Rows: the share of tasks without a valid plan, and the CPU time of a valid one, from nothing
-    to checked, refined where the check asked for it."""
+    """Measure the share of tasks without a valid plan, and the CPU time of a valid one, from
+    nothing to checked, refined where the check asked for it."""
     robot = find_robot("bruce")
     seconds, missed = [], list[str]()
     for task in random_tasks(count, seed):

@@ -48,7 +48,7 @@ def requests(kind: str, count: int = COUNT, seed: int = SEED) -> list[HopRequest
 
 
 def online_plans(count: int = COUNT) -> list[Row]:
-    """Rows for each kind: the median and 99 % of processor time, and where it goes."""
+    """Measure for each kind the median and 99 % of processor time, and its parts."""
     robot = find_robot("bruce")
     planner = HopPlanner(robot, samples_of_hops(robot), samples_of_hops(robot, steps=True))
     planner.prepare()

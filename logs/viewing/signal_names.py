@@ -54,7 +54,7 @@ def names_along(
 
 
 def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """One name for every element in C order, or none at all for a large matrix."""
+    """Return one name for every element in C order, or none at all for a large matrix."""
     if not field.shape:
         return [field.field_name]
     axes = [

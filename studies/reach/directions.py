@@ -108,7 +108,7 @@ class JumpSizes:
 
 
 def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[Direction, ...]:
-    """Up, ahead, back, aside, turned, and onto and off a step."""
+    """Return up, ahead, back, aside, turned, and onto and off a step."""
     rise, onto, off = sizes.rise, sizes.onto, sizes.off
     over = 0.5 * rise  # above a step; and so much of the rise is left off one
     down = rise / 1.5

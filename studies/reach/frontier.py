@@ -106,8 +106,8 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
 
 
 def _failed(tries: Tries, runs: int) -> dict[int, str]:
-    """Every rung that failed and why, in their order: the runs' most frequent reason, or what kept
-    the planner from a plan."""
+    """Return every rung that failed with its reason, in their order: the runs' most frequent one,
+    or the obstacle to a plan."""
     found = {
         rung: f"no plan: {outcome.reason}"
         for rung, outcome in tries.recipe.items()

@@ -107,6 +107,7 @@ def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
 
 
 def bruce_reach() -> dict[str, Any]:
-    """BRUCE's reach: what the benchmark ``frontier`` has found with 20 seeds, for jumps of the same sizes."""
+    """Read BRUCE's reach: the results of the benchmark ``frontier`` with 20 seeds, for jumps of the
+    same sizes."""
     found: dict[str, Any] = json.loads(BRUCE.read_text(encoding="utf-8"))
     return found

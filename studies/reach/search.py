@@ -110,7 +110,7 @@ class JumpGraph:
     settings: Mapping[str, Any]
 
     def run(self, task: JumpTask, plans: Path, seed: int) -> Outcome:
-        """One run of a task that is planned in a folder."""
+        """Make one run of a task that is planned in a folder."""
         given = task.model_dump(mode="json", exclude_unset=True)
         sets = {"plan.task": given, "plan.library": str(plans.absolute()), "robot.seed": seed}
         result = load(self.path, {**self.settings, **sets}).run(log=False)
@@ -188,7 +188,7 @@ def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:
 
 
 def do(job: PlanJob | RunJob) -> Outcome | list[tuple[int, Outcome]]:
-    """One job of either kind."""
+    """Do one job of either kind."""
     return make_plan(job) if isinstance(job, PlanJob) else run_rung(job)
 
 

@@ -104,7 +104,7 @@ class Mission(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Rotors that give the boost and the flip, with some to spare for steering."""
+        """Require rotors that give the boost and the flip, with some to spare for steering."""
         robot, about = context.robot, 0 if params.axis == "roll" else 1
         most = np.array([each.max_thrust for each in robot.thrusters.values()])
         speed = 0.5 * GRAVITY * params.flip
