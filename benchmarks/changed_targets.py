@@ -20,16 +20,16 @@ from .rows import Row
 SEEDS = range(34000, 34020)
 """Seeds of the robots and targets; nothing is tuned on them."""
 PLACE_GOAL, TURN_GOAL = 0.03, 5.0
-"""m, deg"""
+"""Largest error of place [m] and heading [deg] of a success."""
 MISSED_GOAL = 0.05
 LIFT_OFF = 1.39
-"""s; when the first jump of ``graphs/steer.yaml`` leaves the ground."""
+"""Lift-off of the first jump of ``graphs/steer.yaml`` [s]."""
 BEFORE = (0.12, 0.44)
-"""s before it"""
+"""Times of a change before lift-off [s]."""
 FLYING = (0.02, 0.14)
-"""s after it"""
+"""Times of a change after lift-off [s]."""
 DEPTH = 0.1
-"""m; by how much the floor is below the lower of the two levels."""
+"""Depth of the floor below the lower of the two levels [m]."""
 
 Command = dict[str, Any]
 

@@ -32,9 +32,9 @@ MISSED_GOAL = 0.05
 OTHERS_MISSED_GOAL = 0.1
 """The same for other robots."""
 PLACE_GOAL = 0.03
-"""m"""
+"""Goal of the median of the courses' largest errors of place [m]."""
 LONGEST = 40.0
-"""s of the graph's time"""
+"""Longest duration of a course in the graph's time [s]."""
 
 
 def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:

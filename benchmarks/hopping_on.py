@@ -19,12 +19,12 @@ SEEDS = range(34100, 34120)
 """Seeds of the robots and speeds; nothing is tuned on them."""
 HOPS = 30
 HOP_TIME = 0.512
-"""s"""
+"""Time from hop to hop [s]."""
 MISSED_GOAL = 0.05
 FASTEST = 0.4
-"""m/s"""
+"""Largest speed of a command [m/s]."""
 LASTS = (3, 6)
-"""hops"""
+"""Least and largest number of hops at one speed."""
 
 
 def speeds(seed: int, fastest: float = FASTEST) -> list[dict[str, float]]:

@@ -55,12 +55,12 @@ STEPS = 6
 STAIRCASE = [
     {"x": round(0.2 * step, 3), "top": round(0.04 * step, 3)} for step in range(1, STEPS + 1)
 ]
-"""m"""
+"""Position ahead and height of each step [m]."""
 GO2_STAIRS_SEEDS = range(33600, 33620)
 """Seeds of Go2 on its staircase (``graphs/robots/go2_stairs.yaml``); nothing is tuned on them."""
 GO2_STEPS = 7
 STEP = (0.198, 0.4)
-"""m; 2 mm less than their distance, as stones do not touch."""
+"""Length and width of a step [m]; 2 mm less than their distance, as stones do not touch."""
 
 
 def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:

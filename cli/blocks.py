@@ -1,4 +1,4 @@
-"""``aloft blocks``: which blocks there are, and the contract of one; also as a page of Markdown, docs/blocks.md."""
+"""``aloft blocks``: all blocks, and the contract of one; also as a page of Markdown, docs/blocks.md."""
 
 from __future__ import annotations
 

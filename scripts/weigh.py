@@ -1,4 +1,4 @@
-"""Weighs the package: what a maintainer has to read, and where one thing is said more than once.
+"""Weighs the package: the code that a maintainer has to read, and the declarations that repeat others.
 
     python scripts/weigh.py                     the working tree, folder by folder and in total
     python scripts/weigh.py --base a4c74fc      beside a git revision

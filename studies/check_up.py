@@ -29,21 +29,21 @@ SLENDER, WIDE = 0.1, 1.5
 AWAY = 1.5
 """A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
 FAR = 4.0
-"""A joint farther from the middle of its parent's shapes than this times what both links reach is elsewhere; of the robots of
+"""A joint farther from the middle of its parent's shapes than this times the reach of both links is misplaced; of the robots of
 ``example-robot-data`` it is at most 1.7 times."""
 NEARLY_ALONG = math.radians(5.0)
 """An axis closer to a coordinate axis than this, and not along it, was measured or typed."""
 NEAR_LIMIT = 0.05
-"""rad; the standing robot is closer to a limit than this."""
+"""Distance from a limit below which the standing robot is close to it [rad]."""
 SLOW = 2.0
-"""Hz; legs whose motors turn their joints more slowly than this cannot balance a robot."""
+"""Least bandwidth of the joints of legs that can balance a robot [Hz]."""
 STEP = 0.1
-"""rad; the step that a joint's bandwidth is told by."""
+"""Step by which a joint's bandwidth is measured [rad]."""
 
 
 @dataclass(frozen=True)
 class Remark:
-    """Something that looks wrong: the ``part``, what was ``found``, and what is ``usual``."""
+    """An oddity of a description: the ``part``, the value ``found``, and the ``usual`` one."""
 
     part: str
     found: str

@@ -1,4 +1,4 @@
-"""Jumps that nobody chose, in closed loop: random tasks are planned and run in the robust trial.
+"""Random jumping tasks, planned and run in closed loop in the robust trial.
 
 Each task of ``random_tasks`` is planned from nothing, with one recipe for all, and its plan is run in
 ``graphs/jump.yaml`` with the robust trial once a seed; ground and expectation follow from the task.
@@ -43,7 +43,7 @@ TRIAL = "robust"
 LANDED_GOAL = 0.05
 """The largest good share of planned jumps that do not land."""
 MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
-"""s; CPU time of planning: the median's, that of 95 % of the tasks, and the worst."""
+"""CPU time of planning [s]: the median's, that of 95 % of the tasks, and the worst."""
 
 
 LAST_PUSH, PUSH_TIME = 0.9, 0.01

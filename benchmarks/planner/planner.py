@@ -37,7 +37,7 @@ from ..rows import Row
 from .snopt import SnoptProgram, SnoptResult
 
 GOAL = 0.1
-"""s of processor time"""
+"""Processor time of a plan [s]."""
 CHANGES = {"rise": 0.01, "distance_x": 0.02, "distance_y": 0.02, "twist": math.radians(6.0)}
 """The most that each parameter changes by, where the task says it."""
 SEED = 1
@@ -146,7 +146,7 @@ def reach_rows() -> list[Row]:
 SNOPT = "SNOPT through Drake"
 SNOPT_GOAL = 1.0 / 30.0
 TIME_LIMIT = 120.0
-"""s of CPU that SNOPT is given for a task."""
+"""CPU time that SNOPT is given for a task [s]."""
 INSTALL = "Drake is not installed: pip install aloft-robotics[peers]"
 
 

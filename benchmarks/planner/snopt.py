@@ -73,7 +73,7 @@ class _Callback:
         return sorted(found | set(zip(*(x.tolist() for x in self.next), strict=True)))
 
     def constraint(self, variables: Any) -> Any:
-        """Return values, with derivatives where they are asked for."""
+        """Return values, with derivatives where they are requested."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
         started = self.owner.on_time()
@@ -95,7 +95,7 @@ class _Callback:
         return result
 
     def cost(self, variables: Any) -> Any:
-        """Return the piece's cost, with its gradient where it is asked for."""
+        """Return the piece's cost, with its gradient where it is requested."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
         started = self.owner.on_time()

@@ -173,7 +173,7 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
 
 
 MANY_KERNELS = 10
-"""Fewer are compiled in some seconds, of which nobody need be told."""
+"""Least number of kernels whose compilation is announced; fewer take some seconds only."""
 
 
 @contextmanager

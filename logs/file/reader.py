@@ -220,7 +220,7 @@ class RecordedRun:
 
     @cached_property
     def _asked(self) -> set[str]:
-        """The signals that were asked for; nothing depends on their order."""
+        """The requested signals; nothing depends on their order."""
         return set()
 
     def nearest(self, name: str) -> NoReturn:

@@ -141,7 +141,7 @@ class RingWriter(_Ring):
 
 @dataclass(frozen=True)
 class Record:
-    """One record; ``data`` is a view of the ring that is good until the next one is asked for."""
+    """One record; ``data`` is a view of the ring that is valid until the next one is requested."""
 
     kind: int
     tick: int

@@ -180,7 +180,7 @@ PIECE = 256
 
 
 class ReplayError(AloftError):
-    """Raised if a recording cannot be replayed in the way that was asked for."""
+    """Raised if a recording cannot be replayed as requested."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The frontier: how far jumps in every direction land at 95 %, against what the motors could give.
+"""The frontier: the reach of jumps that land at 95 % in every direction, against that of the motors.
 
 Along each of a robot's directions three ends are looked for on one ladder of values:
 

@@ -24,10 +24,10 @@ SEEDS = tuple(range(9000, 9004))
 MINUTES = 10.0
 """Minutes of two cores for all directions; the shares below are for these."""
 PLANNED_CPU, RUNS_CPU, THEORY_CPU = 45.0, 75.0, 30.0
-"""s; after so much processor time no further solve, or run, is begun along one direction. The rest of the ten minutes
+"""Processor time after which no further solve, or run, is begun along one direction [s]. The rest of the ten minutes
 is for those that are under way then, and for what is compiled first."""
 QUARTER_TURN = 90.0
-"""deg; counts as one length of a leg."""
+"""Turn that counts as one length of a leg [deg]."""
 BRUCE = Path(__file__).with_name("bruce.json")
 """Written by ``docs/refresh.py frontier``, with the table in docs/frontier.md."""
 

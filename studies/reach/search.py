@@ -1,4 +1,4 @@
-"""The search along one direction of the frontier: what is tried next, given the results so far.
+"""The search along one direction of the frontier: the next try, given the results so far.
 
 How far up a ladder something works is found with few tries. The searches are generators: they yield
 the rung to try, are sent whether it works, and return the highest that does, 0 for none. So they know

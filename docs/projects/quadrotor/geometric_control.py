@@ -53,7 +53,7 @@ class Airframe(Signal):
 
 
 class FlightScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     rotation = Field((3, 3), text="R")
     wanted = Field((3, 3), text="R_d")

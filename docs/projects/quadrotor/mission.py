@@ -57,7 +57,7 @@ class Flown(Signal):
 
 
 class MissionScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     goal = Field(3, text="where a motion ends")
     speed = Field(3, text="how fast it ends")
@@ -198,7 +198,7 @@ class Mission(Block):
 
 @kernel
 def advance(base: BaseState, p: Progress, params: Mission.Params) -> None:
-    """Go on to the next phase where the present one is over."""
+    """Enter the next phase where the present one has ended."""
     over = False
     if p.phase == FlightPhase.WAIT:
         over = p.time >= params.wait
