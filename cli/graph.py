@@ -45,7 +45,7 @@ class FormOptions:
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """Which running graph is shown."""
+    """The options that choose the running graph."""
 
     live: Annotated[
         bool,

@@ -180,7 +180,8 @@ def export(
 
 @contextmanager
 def _faults_reported(as_json: bool) -> Iterator[None]:
-    """As ``errors_reported``; a robot's faults are printed one by one, or listed in the JSON."""
+    """Report errors as ``errors_reported`` does; a robot's faults are printed one by one, or listed
+    in the JSON."""
     from ..robots.validation import RobotError
 
     with errors_reported(as_json):
@@ -221,8 +222,8 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 
 
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
-    """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
-    and ``AloftError`` for one that must not be written."""
+    """Return the path of the YAML, its text and its notes. Raises ``RobotError`` for a file that is
+    wrong and ``AloftError`` for one that must not be written."""
     from ..robots.description import MODEL_FILES, OTHER_FORMATS, read
     from ..robots.importing.new_yaml import new_yaml
 
@@ -286,7 +287,7 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
 
 
 def _of_joints(row: dict[str, Any]) -> str:
-    """The joints that a motor moves, where its name does not say it."""
+    """Name the joints that a motor moves, where its name does not say it."""
     return "" if row["joints"] == [row["motor"]] else f" ({', '.join(row['joints'])})"
 
 
@@ -455,7 +456,7 @@ def graph_values(
     delay: IdentifiedDelay,
     file: Path,
 ) -> str:
-    """The values as a graph's ``set``, for the blocks of the recorded graph that take them."""
+    """Return the values as a graph's ``set``, for the blocks of the recorded graph that take them."""
 
     def path(kind: str, usual: str) -> str:
         found = (b.path for b in run.header.blocks if b.type.rpartition(":")[2] == kind)

@@ -28,7 +28,7 @@ NOISE_SEEDS = 1000
 
 @dataclass(frozen=True)
 class LearningOptions:
-    """Whether the robot learns from its jumps."""
+    """The options of learning from jumps."""
 
     learn: Annotated[
         Path | None,
@@ -129,7 +129,7 @@ def learn_jumps(
 
 
 def known(file: Path, ready: PlannedGraph) -> LearntJumps:
-    """What the robot has learnt so far."""
+    """Read the corrections that the robot has learnt so far."""
     from ...planner.library.learnt import LearntJumps, read_learnt
 
     robot = ready.graph.checked.robot
@@ -148,7 +148,7 @@ def recorded_run(graph: Graph, record: Path, as_json: bool) -> RunResult:
 
 
 def taught(result: RunResult, plan: PlannedJump, learnt: LearntJumps) -> Attempt:
-    """What became of a jump that had the corrections in ``learnt``."""
+    """Judge a jump that had the corrections in ``learnt``."""
     from ...planner.library.learnt import launch_of
     from ...studies.jump_learning import lesson_of
 

@@ -24,7 +24,7 @@ TIMEOUT = 10.0
 
 @dataclass(frozen=True)
 class RemoteRunAddress:
-    """Where the parts of a graph are looked for: its file, overrides, the folder of keys and the
+    """The address of the parts of a graph: its file, overrides, the folder of keys and the
     observer's name for TLS, and the process of ``aloft run --local``, zero for the only one."""
 
     graph: Path
@@ -35,7 +35,7 @@ class RemoteRunAddress:
 
 
 def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedRun:
-    """The running graph called ``name``, or the only one; all parts of a graph on several
+    """Open the running graph called ``name``, or the only one; all parts of a graph on several
     machines.
 
     Args:
@@ -60,7 +60,7 @@ def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedR
 
 
 def _whole(run: LiveRun, path: Path, remote: RemoteRunAddress | None) -> WatchedRun:
-    """The whole of the graph of which ``run`` is the part that answers at ``path``."""
+    """Return the whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.placement.placed import place
     from ...runtime.transports.registry import transport_type
@@ -87,7 +87,7 @@ def _whole(run: LiveRun, path: Path, remote: RemoteRunAddress | None) -> Watched
 
 
 def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
-    """A graph whose parts answer over the network; ``None`` where it is for one process.
+    """Find a graph whose parts answer over the network; ``None`` where it is for one process.
 
     Raises:
         AloftError: the graph is wrong, or none of its parts was heard.
@@ -126,7 +126,8 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
 
 
 def _control(placed: PlacedGraph) -> Path | None:
-    """The socket of a part on this machine that takes changes of parameters by its usual name."""
+    """Return the socket of a part on this machine that takes changes of parameters by its usual
+    name."""
     from ...runtime.live.parameter_endpoint import answers
     from .running_graphs import path_of
 

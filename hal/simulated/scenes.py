@@ -18,7 +18,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, HeightField, Terrain
 from .tiles import TileParameters
 
-Span = tuple[float, float]
+Interval = tuple[float, float]
 
 MAX_CORNERS = 400
 """The most rows or columns of a height field."""
@@ -31,7 +31,7 @@ def flat() -> Terrain:
     return Terrain()
 
 
-def nowhere() -> Terrain:
+def no_ground() -> Terrain:
     """No ground: the floor is a kilometre below, out of reach of a robot on a fixed base."""
     return Terrain(floor=-1000.0)
 
@@ -63,11 +63,11 @@ class PieceParameters(Parameters):
 class BoxParameters(PieceParameters):
     """A box, as a graph describes it."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(text="height of the middle of its upper face", unit="m")
     bottom: float = parameter(0.0, unit="m", text="height of its lower face")
-    slope: Span = parameter(
+    slope: Interval = parameter(
         (0.0, 0.0), unit="rad", text="angles by which its upper face rises ahead and to the left"
     )
 
@@ -91,7 +91,7 @@ class StairParameters(PieceParameters):
     """Stairs that lead ahead, up or down."""
 
     x: float = parameter(text="the first edge; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     rise: float = parameter(text="height of each step; negative: they lead down", unit="m")
     run: float = parameter(text="depth of each step", unit="m", gt=0)
     steps: int = parameter(text="how many there are", ge=1, le=100)
@@ -112,8 +112,8 @@ class StairParameters(PieceParameters):
 class FieldParameters(PieceParameters):
     """A height field: heights over a grid, with straight edges between neighbours."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(0.0, unit="m", text="added to all heights")
     heights: list[list[float]] | None = parameter(
         None, unit="m", text="rows from right to left, each with heights from behind to ahead"

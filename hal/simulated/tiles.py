@@ -14,8 +14,8 @@ from ...robots.kinematics import ball_feet, standing_contacts
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, Terrain
 
-Span = tuple[float, float]
-Area = tuple[Span, Span]
+Interval = tuple[float, float]
+Area = tuple[Interval, Interval]
 """From, to in x; from, to in y [m]."""
 
 THICKNESS = 0.02
@@ -25,14 +25,14 @@ THICKNESS = 0.02
 class TileKind(Parameters):
     """How tiles differ from a level floor."""
 
-    size: Span = parameter((0.1, 0.2), unit="m", text="least and greatest side of a tile")
+    size: Interval = parameter((0.1, 0.2), unit="m", text="least and greatest side of a tile")
     height: float = parameter(
         0.01, unit="m", ge=0, le=0.2, text="no point of a tile is further above or below the mean"
     )
     slope: float = parameter(
         math.radians(5.0), unit="rad", ge=0, le=0.5, text="no tile leans by more, in any direction"
     )
-    friction: Span | None = parameter(
+    friction: Interval | None = parameter(
         (0.4, 1.0), text="least and greatest coefficient of a tile; none: that of the scene"
     )
     stiffness: float = parameter(
@@ -56,7 +56,7 @@ class TileKind(Parameters):
             for y in self._divide(area[1], rng):
                 yield self._tile(x, y, top, rng)
 
-    def _divide(self, span: Span, rng: np.random.Generator) -> Iterator[Span]:
+    def _divide(self, span: Interval, rng: np.random.Generator) -> Iterator[Interval]:
         """Parts of a span with sides from ``size``; the last one is what is left."""
         start, end = span
         while end - start > 1e-9:
@@ -65,7 +65,7 @@ class TileKind(Parameters):
             yield start, stop
             start = stop
 
-    def _tile(self, x: Span, y: Span, top: float, rng: np.random.Generator) -> Ground:
+    def _tile(self, x: Interval, y: Interval, top: float, rng: np.random.Generator) -> Ground:
         lean, heading, place, grip, give = rng.random(5).tolist()
         slope = [
             math.tan(self.slope * lean) * f(2.0 * math.pi * heading) for f in (math.cos, math.sin)
@@ -87,8 +87,8 @@ class TileKind(Parameters):
 class TileParameters(TileKind):
     """An area of tiles, as a graph describes it."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(unit="m", text="mean height of the tiles")
     seed: int | None = parameter(None, ge=0, text="what they are drawn by; none: the robot's seed")
 

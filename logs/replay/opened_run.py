@@ -31,10 +31,10 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import checked_again, flattened_text
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
-from ..file.surroundings import digests, files_read, named_file, other_files, unpacked
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
@@ -42,7 +42,7 @@ _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<nam
 
 @dataclass(frozen=True)
 class Restored:
-    """What was restored.
+    """The restored files of a recording.
 
     Attributes:
         overrides: by ``block.parameter`` the restored file or folder, and by ``robot`` the description.
@@ -95,7 +95,7 @@ def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
 
 
 def _entries(header: Header) -> Iterator[tuple[str, str, str, str, str]]:
-    """Entry, block, parameter, kind and name of each file that the recording carries."""
+    """Yield entry, block, parameter, kind and name of each file that the recording carries."""
     for entry, digest in header.files.items():
         match = _ENTRY.fullmatch(entry)
         if match is not None and digest in header.contents:
@@ -215,7 +215,7 @@ class OpenedRun:
 
     @property
     def failed(self) -> bool:
-        """Whether a block failed in the tick after the last row."""
+        """True if a block failed in the tick after the last row."""
         outcome = self.file.outcome or {}
         if outcome.get("exit_code") != ExitCode.RUN_FAILED:
             return False
@@ -224,16 +224,16 @@ class OpenedRun:
         return done == outcome.get("ticks")
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The ticks from ``first`` up to ``last``, and their rows."""
+        """Return the ticks from ``first`` up to ``last``, and their rows."""
         return self.file.window(first, last)
 
     def keyframe(self, tick: int) -> Snapshot:
-        """What the graph remembered before ``tick``. Raises ``KeyError``."""
+        """Return the graph's memory before ``tick``. Raises ``KeyError``."""
         return self.file.snapshot(tick)
 
     def changed_dependencies(self) -> list[str]:
-        """The versions, the processor, BLAS and its kernel, and the files and plans that computed the run
-        and are different here."""
+        """List the versions, the processor, BLAS and its kernel, and the files and plans that
+        computed the run and are different here."""
         header = self.file.header
         now = {**versions(), **machine()}
         then = {**header.versions, **header.machine}
@@ -248,7 +248,7 @@ class OpenedRun:
 
 
 def _folder(recording: Path, source: Path) -> Path:
-    """The graph file's folder: as the run named it, seen from here or from the recording."""
+    """Return the graph file's folder: as the run named it, seen from here or from the recording."""
     places = (Path(), recording.parent, recording.parent.parent)
     found = (place / source for place in places if (place / source).is_file())
     return next(found, source).parent
@@ -275,7 +275,7 @@ class TickValues:
         }
 
     def at(self, tick: int) -> Mapping[str, str]:
-        """The values of the last recorded tick up to this one."""
+        """Return the values of the last recorded tick up to this one."""
         first, last = self.ticks
         tick = min(max(tick, first), last)
         known = self._run.ticks

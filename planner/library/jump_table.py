@@ -121,13 +121,13 @@ def table_rows(table: JumpTable) -> TableRows:
 
 
 def _fed(widths: Sequence[int]) -> NDArray[np.bool_]:
-    """Which columns are fed forward, where those of ``COLUMNS`` are so wide."""
+    """Return which columns are fed forward, where those of ``COLUMNS`` are so wide."""
     names = zip(COLUMNS, widths, strict=True)
     return np.concatenate([np.full(width, name in _FED_FORWARD) for name, width in names])
 
 
 def fed_forward(n_feet: int, n_joints: int) -> NDArray[np.bool_]:
-    """Which columns of a robot's table are fed forward, (width,)."""
+    """Return which columns of a robot's table are fed forward, (width,)."""
     feet = (3 * n_feet, 3 * n_feet, n_feet, n_feet)
     return _fed((3, 3, 3, 4, 3, 3, 3, 3, *feet, *(n_joints,) * 4))
 
@@ -142,7 +142,7 @@ def row_dimensions(robot: RobotDescription | None) -> dict[str, int]:
 
 
 def lands_in_part(times: Array, contact: NDArray[np.bool_], touchdowns: Array) -> NDArray[np.bool_]:
-    """Whether some points carry load right after each of the ``touchdowns`` [s], and others do not."""
+    """Return whether some points carry load right after each of the ``touchdowns`` [s], and others do not."""
     if not len(contact):
         return np.zeros(len(touchdowns), np.bool_)
     after = np.searchsorted(times, touchdowns, side="right")
@@ -165,7 +165,7 @@ WHOLE = math.pi
 TUCKED = 0.9
 """The legs are tucked from when the rate is this share of its greatest."""
 OUT = 0.3
-"""They are out when this share of the rate's way from its greatest to its last value is left."""
+"""The legs are out when this share of the rate's way from its greatest to its last value is left."""
 ROUNDING = 1e-9
 
 

@@ -39,7 +39,7 @@ ADVICE = {
 
 
 def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
-    """How a problem on a fixed grid was solved, for the plan; the whole time comes to it later."""
+    """Return the solver's statistics of a problem on a fixed grid, for the plan; the whole time is added later."""
     return {
         "solver": solution.solver,
         "iterations": solution.iterations,
@@ -70,7 +70,7 @@ def failure(task: JumpTask, solution: Solution) -> PlanError:
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that decide what a plan is."""
+    """Return the versions of the packages on which a plan depends."""
     import casadi as ca
 
     return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}

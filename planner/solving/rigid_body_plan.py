@@ -67,7 +67,7 @@ class FeetPath:
         return com + offset + self._shape() @ _turned(heading).T, heading
 
     def _middle(self, which: int) -> Array:
-        """From the centre of mass to the middle of the points, on the ground."""
+        """Return the vector from the centre of mass to the middle of the points, on the ground."""
         return np.asarray(self.stances[which].points.mean(axis=0) - self.com[which])
 
     def _shape(self) -> Array:
@@ -148,7 +148,7 @@ class WholeBodyPose:
 def whole_body(
     model: SymbolicModel, path: FeetPath, times: Array, body: Array, rates: Array, first: Array
 ) -> tuple[Array, Array]:
-    """Coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
+    """Return the coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
 
     ``body`` and ``rates`` (N, 6) are centre of mass, pitch, roll and yaw, and their derivatives.
     """

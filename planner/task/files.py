@@ -35,7 +35,7 @@ class PlanError(AloftError):
 
 
 def need_planner() -> None:
-    """Raises ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
+    """Raise ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
     need_extra("casadi", "plan", "planning a jump")
 
 
@@ -44,15 +44,16 @@ Key = str | int
 
 @dataclass(frozen=True)
 class PlacedFile:
-    """What is in a file: ``values`` as plain data, and where each of them is."""
+    """Content of a file: ``values`` as plain data, and the place of each of them."""
 
     file: str
     values: dict[str, Any]
     tree: MapNode
 
     def place(self, keys: Sequence[Key], *, key: bool = False) -> str:
-        """``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest
-        where there is none."""
+        """Return ``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest where there
+        is none.
+        """
         node: Node = self.tree
         where = node.where
         for step in keys:
@@ -64,14 +65,15 @@ class PlacedFile:
         return str(where)
 
     def place_of_words(self, text: str) -> str:
-        """Where the last of the file's keys is that a message speaks of; the start of the file
-        where it speaks of none."""
-        describe_task = [
+        """Return the place of the last of the file's keys that a message names; the start of the file where it names
+        none.
+        """
+        named_keys = [
             entry.key_where
             for entry in self.tree
             if re.search(rf"\b{re.escape(entry.key)}\b", text)
         ]
-        return str(max(describe_task, default=self.tree.where))
+        return str(max(named_keys, default=self.tree.where))
 
 
 def read_placed(path: Path, example: str) -> PlacedFile:
@@ -103,7 +105,7 @@ def read_placed(path: Path, example: str) -> PlacedFile:
 
 
 ABANDONED = 3600.0
-"""After that many seconds nobody is still writing a part [s]."""
+"""Age from which a partial file counts as abandoned by its writer [s]."""
 
 
 def write_whole(path: Path, data: bytes) -> Path:

@@ -102,7 +102,8 @@ def _ranks(diagram: Diagram) -> dict[str, float]:
 def _longest_paths(
     diagram: Diagram, forward: Sequence[DiagramWire], rank: dict[str, float]
 ) -> dict[str, int]:
-    """Return the column of every node: behind all its sources, and no further right than necessary."""
+    """Return the column of every node: behind all its sources, and no further right than
+    necessary."""
     layer = dict.fromkeys(diagram.nodes, 0)
     sources: dict[str, list[str]] = {path: [] for path in diagram.nodes}
     targets: dict[str, list[str]] = {path: [] for path in diagram.nodes}

@@ -238,7 +238,8 @@ class Router:
 
 
 def column_gaps(router: Router) -> list[float]:
-    """Return the width of every gap: before the first column, between columns, and behind the last."""
+    """Return the width of every gap: before the first column, between columns, and behind the
+    last."""
     widths = []
     for number, gap in enumerate(router.gaps):
         count = 1 + max((hop.track for hop in gap.values() if not hop.is_straight()), default=-1)

@@ -45,7 +45,8 @@ UNCHECKED = Quantity(None)
 
 
 def quantity_of(field: Field) -> Quantity | None:
-    """Return the quantity that a field declares; ``None`` for one that carries whatever is wired."""
+    """Return the quantity that a field declares; ``None`` for one that carries whatever is
+    wired."""
     return None if field.inferred else Quantity(field.unit, field.frame)
 
 

@@ -51,7 +51,8 @@ WHOLE = Selection()
 
 
 def read_selection(text: str) -> tuple[str, Selection] | None:
-    """Read the ``block.port`` and the selection in a source's text; ``None`` if it is not a source."""
+    """Read the ``block.port`` and the selection in a source's text; ``None`` if it is not a
+    source."""
     match = _TEXT.match(text)
     if match is None:
         return None

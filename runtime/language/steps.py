@@ -160,7 +160,8 @@ def _line_of(cls: type, name: str) -> int | str:
 
 
 def step_in_file_of(cls: type, name: str, place: CodeType) -> Any:
-    """Make a method that makes a block's calls; stacks and reports of errors show the given place."""
+    """Make a method that makes a block's calls; stacks and reports of errors show the given
+    place."""
     method = _update if name == "update" else _step
     code = method.__code__.replace(
         co_filename=place.co_filename, co_firstlineno=place.co_firstlineno, co_name=name

@@ -54,7 +54,8 @@ class CommandWatch:
         return tuple(box.link.name for box in self._watched)
 
     def heard(self) -> int:
-        """Return the time [ns] of the most silent link's last new message; zero if none is watched."""
+        """Return the time [ns] of the most silent link's last new message; zero if none is
+        watched."""
         if not self._watched:
             return 0
         if not self._since:
@@ -65,7 +66,8 @@ class CommandWatch:
         return oldest
 
     def complaint(self) -> str:
-        """Return a complaint about the link that has been silent for too long; empty if none has."""
+        """Return a complaint about the link that has been silent for too long; empty if none
+        has."""
         if not self._watched:
             return ""
         silence = (self._clock() - self.heard()) * 1e-9

@@ -48,7 +48,8 @@ class PartClock(Clock):
         super().__init__(base_period)
 
     def commands_heard(self) -> int:
-        """Return the time [ns] of the last commands on the most silent link that brings commands."""
+        """Return the time [ns] of the last commands on the most silent link that brings
+        commands."""
         return 0 if self.heard is None else self.heard()
 
     def agree(self, reason: str, block: str) -> None:

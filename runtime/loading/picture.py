@@ -171,7 +171,8 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
 
 
 def _origin(specs: dict[str, BlockSpec], wire: Wire) -> str:
-    """Return the output a wire comes from, seen through the delay block that loading has inserted."""
+    """Return the output a wire comes from, seen through the delay block that loading has
+    inserted."""
     source = specs[wire.source_block]
     if wire.delay and issubclass(source.block_type, WireDelay):
         return source.wires["u"].source

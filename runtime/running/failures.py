@@ -20,7 +20,7 @@ class Hang(BaseException):
 
 
 def describe(error: BaseException) -> str:
-    """The text of an error, with its type unless it was raised for users to read."""
+    """Format an error, with its type unless it was raised for users to read."""
     if isinstance(error, AloftError | Hang):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
@@ -42,7 +42,7 @@ def place_of_frames(frames: traceback.StackSummary) -> str:
 
 
 def _is_installed(file: str) -> bool:
-    """Whether a file belongs to Python, to an installed package or to the runtime itself."""
+    """Return whether a file belongs to Python, to an installed package or to the runtime itself."""
     return file.startswith(INSTALLED) or "site-packages" in Path(file).parts
 
 

@@ -1,4 +1,4 @@
-"""Which transport carries the links of a graph, and what its endpoints look like.
+"""Registry of the transports that carry the links of a graph, and the form of their endpoints.
 
 An endpoint is ``SCHEME/ADDRESS:PORT``. All machines of a graph use one transport. Another transport is a
 class with the methods of ``NetworkTransport`` in a file of its own, and a line in ``TRANSPORTS``.
@@ -29,12 +29,12 @@ _ENDPOINT = re.compile(
 
 
 def endpoint_pattern() -> str:
-    """A regular expression for endpoints, as in a JSON Schema."""
+    """Return a regular expression for endpoints, as in a JSON Schema."""
     return f"^({'|'.join(TRANSPORTS)})/.+:[0-9]+$"
 
 
 def endpoint_fault(text: str) -> str:
-    """What is wrong with an endpoint; empty if nothing is."""
+    """Describe the fault of an endpoint; empty if there is none."""
     match = _ENDPOINT.match(text)
     if match is None or match["scheme"] not in TRANSPORTS:
         *most, last = [f"{scheme}/ADDRESS:PORT" for scheme in TRANSPORTS]
@@ -55,8 +55,8 @@ def endpoint_fault(text: str) -> str:
 
 
 def open_endpoints(machines: Sequence[MachineSpec]) -> list[str]:
-    """What should be known of machines that anybody in their network can reach: one text for each
-    whose endpoint is beyond the loopback and asks for no keys."""
+    """Return warnings on machines that anybody in their network can reach: one text for each whose
+    endpoint is beyond the loopback and requires no keys."""
     return [
         f"machine {spec.name!r} listens at {spec.endpoint}: whoever reaches it can read and command this "
         "graph; `aloft keys` makes certificates for tls/ endpoints"
@@ -81,8 +81,8 @@ def _is_loopback(endpoint: str) -> bool:
 
 
 def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
-    """What one can find out about a machine that was not heard: whether anybody listens at its
-    endpoint. Opens a connection and sends nothing."""
+    """Find the likely cause of a machine's silence: whether anybody listens at its endpoint. Opens
+    a connection and sends nothing."""
     scheme, host, port = _parts(endpoint)
     try:
         socket.create_connection((host, port), timeout).close()
@@ -93,12 +93,12 @@ def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
 
 
 def transport_type(machines: Sequence[MachineSpec]) -> type[NetworkTransport]:
-    """The transport that these machines use, of which there is one."""
+    """Return the transport that these machines use, of which there is one."""
     return TRANSPORTS[machines[0].endpoint.partition("/")[0]]
 
 
 def network_transport(placed: PlacedGraph, name: str, keys: Path | None = None) -> NetworkTransport:
-    """The transport of the machine or the observer ``name``, not yet connected.
+    """Return the transport of the machine or the observer ``name``, not yet connected.
 
     Args:
         placed: the graph.

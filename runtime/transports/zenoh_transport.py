@@ -50,7 +50,7 @@ class ZenohTransport(NetworkTransport):
 
     @classmethod
     def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
-        """The transport of a machine or an observer; ``tls`` endpoints need keys."""
+        """Return the transport of a machine or an observer; ``tls`` endpoints need keys."""
         if keys is not None:
             check_endpoints(placed)
         elif cls.needs_keys(placed):
@@ -67,7 +67,7 @@ class ZenohTransport(NetworkTransport):
 
     @classmethod
     def needs_keys(cls, placed: PlacedGraph) -> bool:
-        """Whether an endpoint is ``tls``."""
+        """Return whether an endpoint is ``tls``."""
         return any(spec.endpoint.startswith("tls/") for spec in placed.machines)
 
     @classmethod
@@ -134,11 +134,11 @@ class ZenohTransport(NetworkTransport):
 
     @property
     def is_open(self) -> bool:
-        """Whether it is connected."""
+        """True if it is connected."""
         return self._session is not None
 
     def background_publisher(self, key: str) -> MessageCallback:
-        """A publisher that never delays any other."""
+        """Return a publisher that never delays any other."""
         import zenoh
 
         publisher = self._session.declare_publisher(
@@ -157,7 +157,7 @@ class ZenohTransport(NetworkTransport):
         self._farewells.append(call)
 
     def publisher(self, key: str) -> MessageCallback:
-        """A publisher whose messages go out at once."""
+        """Return a publisher whose messages go out at once."""
         import zenoh
 
         publisher = self._session.declare_publisher(
@@ -175,7 +175,7 @@ class ZenohTransport(NetworkTransport):
         return put
 
     def subscribe(self, key: str, take: MessageCallback) -> None:
-        """A subscriber that is called on a thread of Zenoh."""
+        """Subscribe to a key; the call comes from a thread of Zenoh."""
         import zenoh
 
         def heard(sample: Any) -> None:

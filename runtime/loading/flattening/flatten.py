@@ -390,7 +390,8 @@ def _timing(block: WrittenBlock, scope: _Scope) -> dict[str, Any]:
 
 
 def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
-    """Return the block, every wire of which comes from an output of a block that is no sub-graph."""
+    """Return the block, every wire of which comes from an output of a block that is no
+    sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []
     for name, link in draft.links.items():
