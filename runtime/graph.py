@@ -17,7 +17,7 @@ from typing import Any
 
 from ..files.nodes import text_of
 from .language.errors import AloftError
-from .language.fault import FOLDER
+from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import load as load_checked
