@@ -61,7 +61,7 @@ class SubGraph:
 
     @property
     def moore(self) -> tuple[str, ...]:
-        """Those of the blocks whose state is updated after all outputs."""
+        """Blocks whose state is updated after all outputs."""
         return tuple(path for path in self.blocks if type(self.bound.blocks[path]).is_moore())
 
 

@@ -33,8 +33,9 @@ _CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])
 _FAR = 10.0
 """Targets are limited to this distance [m]: no square overflows."""
 _SLANT = 1e-3
-"""Below this sine of the angle between the foot's line and the line from hip to sole, the leg
-plane is undefined and blends into the upright one."""
+"""Sine of the angle between the foot's line and the line from hip to sole below which the leg plane is undefined and
+blends into the upright one.
+"""
 LEVEL = 1e-3
 """The least ``level`` of ``inverse``: nearer to gimbal lock the exact yaw would be noise."""
 

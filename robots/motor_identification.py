@@ -52,7 +52,7 @@ PERIODS = np.arange(20.0, 181.0, 2.0)
 RIPPLE = 0.01
 """The size of such torque beforehand, as a share of the peak torque."""
 MOST_PERIODS, EXPLAINED = 3, 0.1
-"""So many are fitted, each if it explains this share of what is left."""
+"""Greatest number of waves that are fitted, and the share of the residual that each must explain."""
 _DRAWS = 600
 _LINK = 10
 

@@ -50,7 +50,7 @@ TYPICAL = 1.4826
 OUTLYING = 1.5
 """Ticks with errors beyond so many standard deviations count less, as when a foot rocks on the ground."""
 NOISE_CUTOFF = 20.0
-"""Above this velocities are noise alone [Hz]."""
+"""Frequency above which velocities are noise alone [Hz]."""
 SAMPLED = 0.02
 """The time between samples of the angles that are fitted [s]."""
 HIDDEN_TORQUE = 0.1

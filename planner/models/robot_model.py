@@ -20,7 +20,7 @@ from .symbolic_model import SymbolicModel
 from .symmetry import Pair, mirrored_pairs, symmetrised, symmetrised_angles
 
 HARD, HARD_TURN = 40.0, 100.0
-"""m/s^2 and rad/s^2 of a link in a hard jump, gravity included."""
+"""Accelerations of a link in a hard jump, gravity included [m/s^2, rad/s^2]."""
 MATTERS = 0.5
 """Held joints that need less than this share of their motors in such a motion have no constraint."""
 TWIN = 10.0

@@ -15,7 +15,7 @@ MOST_KINDS = 64
 
 
 class HopProblems:
-    """Makes problems of one robot's hops."""
+    """Maker of the problems of one robot's hops."""
 
     def __init__(self, robot: RobotDescription) -> None:
         self.robot = robot

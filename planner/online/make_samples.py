@@ -105,7 +105,7 @@ Tell = Callable[[HopRequest, bool], None]
 def plan_level_hops(
     robot: RobotDescription, wanted: HopReach, tell: Tell, count: int
 ) -> PlanSamples:
-    """Plan those on level ground, lower than asked for where the motors are too weak.
+    """Plan hops on level ground, lower than wanted where the motors are too weak.
 
     Raises:
         PlanError: not even the lowest jump on the spot has a valid plan.

@@ -22,7 +22,7 @@ POSES = 6000
 FINEST = 61
 """Angles of a joint of an arm with few joints."""
 TURN = np.pi
-"""rad; how far joints without limits are looked at on either side."""
+"""Range examined on either side of a joint without limits [rad]."""
 
 
 @per_robot

@@ -491,7 +491,7 @@ class ProblemBuilder:
 
     @cached_property
     def _leg_gaps(self) -> list[float]:
-        """The least gaps [m] between fore and hind legs: those of the standing robot where it has less than asked for."""
+        """Least gaps [m] between fore and hind legs: the task's, or those of the standing robot where it has less."""
         count = self.structure.leg_pairs
         if not count:
             return []

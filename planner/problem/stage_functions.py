@@ -223,7 +223,7 @@ DRIFT_RATE = 10.0
 
 PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air", "obstacle")
 SLOPED = "sloped_"
-"""Before the names of these pieces where the ground leans."""
+"""Prefix of these pieces' names where the ground leans."""
 SLOPED_PIECES = ("stance", "free_stance", "impact", "contact", "air", "obstacle")
 
 

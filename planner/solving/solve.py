@@ -50,7 +50,7 @@ from .solver import LIMIT, NEAR, Solution, solve
 from .solver_process import cpu_time
 
 RELAXATIONS = (1.4, 2.0)
-"""Times the real motor limits that a first motion is looked for with."""
+"""Multiples of the real motor limits with which a first motion is sought."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02
 """Steps by which the limits come down; halved where the solver does not follow."""
 COLD_LIMIT, WARM_LIMIT = 250, 100
@@ -177,8 +177,9 @@ LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
 Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], PlannedJump]
-"""Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
-out the robot's held joints."""
+"""Maker of a plan of a task with one set of decision variables, cost and constraints; the plan leaves out the robot's
+held joints.
+"""
 
 
 def solve_jump(
@@ -296,7 +297,7 @@ FORMULATIONS: Mapping[str, Formulation] = {
 
 
 _coordinates = lru_cache(maxsize=16)(make_coordinates)
-"""Those of a model, made once."""
+"""Coordinates of a model, made once."""
 
 
 def make_problem(

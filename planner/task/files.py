@@ -105,7 +105,7 @@ def read_located(path: Path, example: str) -> LocatedFile:
 
 
 ABANDONED = 3600.0
-"""After that many seconds nobody is still writing a part [s]."""
+"""Age from which a partial file counts as abandoned by its writer [s]."""
 
 
 def write_whole(path: Path, data: bytes) -> Path:

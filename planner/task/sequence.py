@@ -43,7 +43,7 @@ Slope = tuple[float, float]
 """Angles [rad] by which ground rises along the world's x and y axes, as those of a scene's boxes."""
 LEVEL: Slope = (0.0, 0.0)
 STEEPEST = math.radians(45.0)
-"""rad; a scene's boxes lean no more."""
+"""Steepest slope [rad]; a scene's boxes lean no more."""
 SHORTEST_JUMP_OVER_AN_EDGE = 0.03
 """Start and landing closer together than this [m] have no room for a step's edge between them."""
 PHASES = {

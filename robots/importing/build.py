@@ -1,4 +1,4 @@
-"""Makes the links and joints of a description from the bodies of a file.
+"""Conversion of the bodies of a file to the links and joints of a description.
 
 Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may

@@ -28,7 +28,7 @@ FINEST = 5000.0
 COARSER = 1.15
 """Least factor by which the cells grow from one try to the next."""
 _PLACES = np.array([1 << 40, 1 << 20, 1])
-"""Makes one number of the three of a cell."""
+"""Factors that make one number of the three of a cell."""
 
 
 def mesh_triangles(path: Path) -> Array:

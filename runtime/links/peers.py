@@ -102,7 +102,7 @@ class PeerStates:
         placed: the graph.
         machine: the name of this part's machine.
         transport: an open transport.
-        wanted: called while waiting; a text says why this part must not wait any longer.
+        stop_reason: called while waiting; a text says why this part must not wait any longer.
         free: whether parts keep their own time. Then one that is gone may come back.
 
     Attributes:
