@@ -42,7 +42,7 @@ class StatusPublisher:
     Args:
         machine: of the part.
         transport: the part's own; it is open once the part has started.
-        others: the other parts, and the numbers by which the graph and the run are known.
+        peers: the other parts, and the numbers by which the graph and the run are known.
         receivers: the receiving ends of its links.
     """
 

@@ -119,7 +119,7 @@ class BoundPart(BoundGraph):
         machine: the machine.
         transport: what carries messages; the part opens it when it starts.
         timeout: the seconds to wait for a message.
-        connect_time: the seconds to wait for the others at the start.
+        connect_timeout: the seconds to wait for the others at the start.
         clock: the time [ns] by which free-running links and the watch of commands go.
 
     Raises:
