@@ -110,7 +110,7 @@ def jump(
                     "--seeds, --no-record and --rehearse"
                 )
             corrected_parameters(flatten(path, settings))  # refuses a graph without them
-            record = recording.place("jump")
+            record = recording.path_for("jump")
             assert record is not None
             rise = changes.get("rise") or usual_rise(path, own) or 0.0
             prepare = planner_of(path, own, running, planning.nearest, console(quiet=True))
@@ -135,7 +135,7 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            options = OneRunOptions(record=recording.place("jump"), as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json, times=False)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 

@@ -85,7 +85,7 @@ def export(
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
     from ..logs.exporting.export import export as write_export
-    from ..logs.recording.place import remedy
+    from ..logs.recording.output_file import remedy
 
     with errors_reported(as_json):
         asked = {"csv": csv, "parquet": parquet, "mcap": mcap, "bag": bag}
@@ -156,14 +156,14 @@ def compare(
 def repair(file: File, as_json: AsJson = False) -> None:
     """Repair a recording in place: what was cut off or is damaged is taken out, the rest is kept."""
     from ..logs.file.repair import repair as mend
-    from ..logs.recording.place import is_being_written, whole_of
+    from ..logs.recording.output_file import finished_name, is_being_written
 
     with errors_reported(as_json):
         try:
             if is_being_written(file):
                 raise AloftError(f"{file} is being written just now; wait for the end of the run")
             done = mend(file)
-            name = whole_of(file)
+            name = finished_name(file)
             if name is not None and not name.exists():
                 file = file.rename(name)
         except OSError as error:

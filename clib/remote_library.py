@@ -88,7 +88,7 @@ class RemoteLibrary:
         )
 
     def step(self) -> int:
-        """One tick, or in real time one exchange. Returns the status of the last tick.
+        """Make one tick, or in real time one exchange. Returns the status of the last tick.
 
         Raises:
             AloftError: the process does not answer.

@@ -11,9 +11,9 @@ from ..files.document import read_file
 from ..files.nodes import MapNode, plain
 from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
+from .element import Vector3
 from .importing.package_files import SCHEME, find_file, package_of
 from .importing.xacro_text import XACRO
-from .part import Vector3
 from .plausible_size import wrong_size
 from .robot_description import (
     BASE_VELOCITIES,
@@ -31,7 +31,7 @@ from .robot_description import (
     Sensors,
     Thruster,
     Transmission,
-    TurnedPart,
+    TurnedShape,
 )
 from .shapes import Capsule, Hull, Shape
 from .validation import RobotError, RobotFault, find_faults
@@ -89,8 +89,9 @@ class PlacedYaml:
         return cls(plain(tree) if tree.entries else None, tree, faults)
 
     def place(self, path: tuple[str | int, ...]) -> tuple[int, int]:
-        """Line and column of the value at a path, or of the nearest thing that holds it; (0, 0)
-        where the file holds nothing of it."""
+        """Return the line and column of the value at a path, or of the nearest thing that holds it; (0, 0) where the
+        file holds nothing of it.
+        """
         steps, node, _ = locate(self.tree, path)
         if not self.tree.entries or (path and not steps):
             return (0, 0)
@@ -310,7 +311,7 @@ __all__ = [
     "Shape",
     "Thruster",
     "Transmission",
-    "TurnedPart",
+    "TurnedShape",
     "Vector3",
     "find_robot",
     "read_description",

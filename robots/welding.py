@@ -63,8 +63,9 @@ class WeldedRobot:
     loads: tuple[HeldLoad, ...] = ()
 
     def expand(self, values: Array, *, held: Sequence[float] | None = None) -> Array:
-        """Values of all joints (..., n) from those of the welded robot's (..., n_moving); the held
-        joints get ``held``, or zero."""
+        """Return the values of all joints (..., n) from those of the welded robot's (..., n_moving); the held joints
+        get ``held``, or zero.
+        """
         whole = np.zeros((*values.shape[:-1], len(self.moving) + len(self.held)))
         whole[..., list(self.moving)] = values
         if held is not None:
@@ -231,7 +232,7 @@ def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Li
 
 
 def _lumped(places: dict[str, _Place], parts: Sequence[Link]) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and inertia about it of links that are welded to each other."""
+    """Return the mass, centre of mass and inertia about it of links that are welded to each other."""
     mass = float(sum(link.mass for link in parts))
     centres = [places[link.name].point(link.com) for link in parts]
     weighed = [link.mass * centre for link, centre in zip(parts, centres, strict=True)]

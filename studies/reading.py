@@ -58,7 +58,7 @@ def read_study(path: Path) -> Study:
     return study
 
 
-def part_of(study: Study, texts: Sequence[str]) -> CellFilter:
+def rows_where(study: Study, texts: Sequence[str]) -> CellFilter:
     """Return the filter that texts such as ``axis=value`` mean. Several values of one axis are
     alternatives.
 

@@ -132,7 +132,9 @@ def files(folder: str) -> list[Path]:
 
 def project_files() -> list[Path]:
     """All of the project's own Python files."""
-    own = [path for folder in (*PACKAGES, "tests", "docs", "scripts") for path in files(folder)]
+    own = [
+        path for folder in (*PACKAGES, "tests", "docs", "scripts", "lab") for path in files(folder)
+    ]
     return [*own, *sorted(ROOT.glob("*.py"))]
 
 

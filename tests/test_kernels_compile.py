@@ -167,7 +167,9 @@ def steer_alone():
     score = BlockBench(find_block("blocks.CourseScore"), robot=bruce, plain=True)
     plan.set("terms", foot_rotation=np.tile(np.eye(3), (2, 1, 1)))
     plan.set("command", number=1, ahead=0.1)
-    plan.set("part", number=1, parts=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2)
+    plan.set(
+        "segment", number=1, segments=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2
+    )
     score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
     for tick in range(400):
         plan.step()

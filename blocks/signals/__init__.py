@@ -54,8 +54,8 @@ from .steering import (
     JumpCommand,
     JumpFrame,
     PlanOutcome,
-    PlanPart,
     PlanRequest,
+    PlanSegment,
     SeenStones,
 )
 
@@ -88,8 +88,8 @@ __all__ = [
     "PhaseState",
     "PlaceMeasurement",
     "PlanOutcome",
-    "PlanPart",
     "PlanRequest",
+    "PlanSegment",
     "PointTarget",
     "RobotHealth",
     "RobotTruth",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from ...planner.online.plan_outcome import PlanOutcome
 from ...runtime.language.signals import Field, Signal
 
-PART_ROWS = 20
+SEGMENT_ROWS = 20
 """Rows of a plan that are handed over at a time."""
 PLAN_ROWS = 240
 """Rows of a plan at most."""
@@ -75,15 +75,15 @@ class PlanRequest(Signal):
     up = Field(unit="m", text="how much higher the ground is there")
 
 
-class PlanPart(Signal):
+class PlanSegment(Signal):
     """A few rows of a plan, which is handed over part by part; see ``JumpTable``."""
 
     number = Field(dtype="int64", text="of the request; zero: no plan yet")
-    part = Field(dtype="int64", text="number of this part, from 0")
-    parts = Field(dtype="int64", text="how many parts the plan has")
-    time = Field(PART_ROWS, unit="s", text="of each row, since the plan begins")
-    rows = Field((PART_ROWS, "plan_width"), text="columns of the reference, side by side")
-    contact = Field((PART_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
+    segment = Field(dtype="int64", text="number of this segment, from 0")
+    segments = Field(dtype="int64", text="how many segments the plan has")
+    time = Field(SEGMENT_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((SEGMENT_ROWS, "plan_width"), text="columns of the reference, side by side")
+    contact = Field((SEGMENT_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
     marks = Field(2, unit="s", text="when squat and recovery begin")
     jump = Field(3, unit="s", text="when thrust, flight and landing begin")
     toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")

@@ -50,7 +50,7 @@ class RecordOptions:
     ] = None
     no_record: NoRecord = False
 
-    def place(self, verb: str) -> Path | None:
+    def path_for(self, verb: str) -> Path | None:
         """Return the path of the recording; ``None`` without one."""
         return None if self.no_record else self.record or Path("recordings") / f"{verb}.rrd"
 

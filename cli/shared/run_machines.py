@@ -79,7 +79,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
         AloftError: a part said nothing when it ended.
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
-    from ...logs.recording.place import cause_of, remedy
+    from ...logs.recording.output_file import cause_of, remedy
     from .viewing import how_to_view
 
     placed = place(load(path, options.settings))

@@ -109,12 +109,12 @@ def how_to_view(recording: Path) -> str:
 def read(file: Path, *, damaged: bool = False) -> RecordedRun:
     """Read the recording. Raises ``AloftError`` if it cannot be read."""
     from ...logs.file import reader
-    from ...logs.recording.place import part_of
+    from ...logs.recording.output_file import unfinished_name
 
     try:
         return reader.read(file, damaged=damaged)
     except FileNotFoundError:
-        part = part_of(file)
+        part = unfinished_name(file)
         also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
         raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
     except OSError as error:

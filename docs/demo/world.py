@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from aloft.clib.cut import Cut
 from aloft.clib.module import Module
-from aloft.clib.part import NeedsPython, Part, needs_python
+from aloft.clib.part import NeedsPython, SubGraph, needs_python
 from aloft.clib.targets import TARGETS, compile_module, link
 from aloft.hal.simulated.mujoco_model import body_name, mujoco_spec
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
@@ -122,7 +122,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
-    part = Part(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
+    part = SubGraph(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
     module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
 
     def told(each: str | LibraryCall) -> Any:

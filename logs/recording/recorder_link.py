@@ -14,7 +14,7 @@ from select import select
 from typing import Any
 
 from ...processes.child_process import ChildProcess
-from .place import RecordingPlace
+from .output_file import OutputFile
 from .recorder_protocol import HEADER, RecorderReport, RecorderTask
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
@@ -73,13 +73,13 @@ class RecorderLink:
         self._seen, self._since = (0, 0), time.monotonic()
 
     def begin(
-        self, task: RecorderTask, place: RecordingPlace | None, header: str, least: int = 1 << 16
+        self, task: RecorderTask, output: OutputFile | None, header: str, least: int = 1 << 16
     ) -> None:
         """Tell the process what to record.
 
         Args:
             task: with the least capacity of the ring [bytes], and without descriptors.
-            place: the file's place, if there is to be a file. The process takes it over.
+            output: the file, locked, if there is to be a file. The process takes it over.
             header: of the recording, as text.
             least: the size with which the ring makes do where files may not be larger.
 
@@ -95,18 +95,18 @@ class RecorderLink:
             self.ring = RingWriter(descriptor, capacity)
             self.ring.write(HEADER, 0, text)
             message = json.dumps(asdict(replace(task, capacity=capacity))).encode()
-            handed = [descriptor, *([place.descriptor] if place is not None else [])]
+            handed = [descriptor, *([output.descriptor] if output is not None else [])]
             socket.send_fds(self._tasks, [message], handed)
         except BaseException:
-            if place is not None:
-                place.discard()
+            if output is not None:
+                output.discard()
             raise
         finally:
             self._tasks.close()
             if descriptor >= 0:
                 os.close(descriptor)
-            if place is not None:
-                place.close()  # the process holds the file and its lock
+            if output is not None:
+                output.close()  # the process holds the file and its lock
 
     def close(self) -> None:
         """End the process if it was not told what to record."""

@@ -30,7 +30,7 @@ from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
-from .place import RecordingPlace, cause_of, split_name, take_place
+from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
 from .writer import RecordingWriter
@@ -78,17 +78,17 @@ class RecorderProcess:
         self._files: list[str] = []
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
-        self._place: RecordingPlace | None = None
+        self._output: OutputFile | None = None
         if file is not None:
-            self._place = RecordingPlace(Path(task.path), file, task.keep)
+            self._output = OutputFile(Path(task.path), file, task.keep)
             self._guard(lambda: self._open(header))
         self.feed = _live_feed(task.live, header) if task.live else None
         self._fed_rows = self._rewinds = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
-        assert self._place is not None
-        self._writer = RecordingWriter(self._place.target, header, place=self._place)
+        assert self._output is not None
+        self._writer = RecordingWriter(self._output.target, header, output=self._output)
 
     def _go_back(self, tick: int) -> None:
         """Go on with ``tick``, which has been run before, in a new file and as a new run of the viewer."""
@@ -104,8 +104,8 @@ class RecorderProcess:
 
     def _split(self, tick: int, *, back: bool = False) -> None:
         """Close the file, and go on in a new one with the tick ``tick``, or ``back`` with it."""
-        writer, place = self._writer, self._place
-        if writer is None or place is None:
+        writer, output = self._writer, self._output
+        if writer is None or output is None:
             return
         following = split_name(Path(self._task.path), len(self._files) + 2)
         self._write_batch()
@@ -116,9 +116,9 @@ class RecorderProcess:
         self._guard(self._close)
         if self.report.problem:
             return
-        self._files.append(str(place.target))
+        self._files.append(str(output.target))
         self._rows_before += writer.recorded
-        self._size_before += place.target.stat().st_size
+        self._size_before += output.target.stat().st_size
         self._writer = None
         self._header = replace(self._header, first_tick=tick, run_begin=self._begun_at())
         self._guard(lambda: self._open_following(following))
@@ -130,7 +130,7 @@ class RecorderProcess:
         return header.first_tick if header.run_begin is None else header.run_begin
 
     def _open_following(self, path: Path) -> None:
-        self._place = take_place(path, self._task.keep)
+        self._output = reserve_output(path, self._task.keep)
         self._open(self._header)
 
     def take(self) -> None:
@@ -190,7 +190,7 @@ class RecorderProcess:
         """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
         seconds, and the ring must be emptied meanwhile."""
         if self._writer is not None and not self._syncing.is_alive():
-            own = os.dup(self._writer.place.descriptor)  # which a split may close meanwhile
+            own = os.dup(self._writer.output.descriptor)  # which a split may close meanwhile
             self._syncing = threading.Thread(target=self._sync, args=(own,), daemon=True)
             self._syncing.start()
 
@@ -227,10 +227,10 @@ class RecorderProcess:
             self.feed.finish(outcome)
             self.report.live_problem = self.feed.problem
         self.report.size = self._size_before
-        if self._place is not None and self._place.target.is_file():
-            self.report.size += self._place.target.stat().st_size
+        if self._output is not None and self._output.target.is_file():
+            self.report.size += self._output.target.stat().st_size
             if self._files:
-                self._files.append(str(self._place.target))
+                self._files.append(str(self._output.target))
         self.report.files = tuple(self._files)
         self.report.memory = _memory()
         return self.report
@@ -241,12 +241,12 @@ class RecorderProcess:
         if self._writer is not None:
             odd = self._writer.close()
             self.report.odd = "; ".join(filter(None, (self.report.odd, odd)))
-        elif self._place is not None:
+        elif self._output is not None:
             if self._failed is not None and self._failed.recorded:
-                self._place.publish()
+                self._output.publish()
             else:
-                self._place.discard()
-                self._place = None
+                self._output.discard()
+                self._output = None
 
     def _count(self) -> None:
         """Count the ticks in the file, and those that are not."""

@@ -26,7 +26,7 @@ class RecorderTask:
         split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
             never.
 
-    The descriptor of the ring comes with it, and that of the file, which is locked; see ``place``.
+    The descriptor of the ring comes with it, and that of the file, which is locked; see ``output_file``.
     """
 
     capacity: int

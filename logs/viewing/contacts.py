@@ -18,7 +18,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
-from .drawing import ChangedRows, Moments, ScenePart, ThinnedRows
+from .drawing import ChangedRows, Moments, SceneDisplay, ThinnedRows
 from .robot_shapes import reach_of
 
 WEIGHT_ARROW = 0.6
@@ -63,7 +63,7 @@ def thruster_forces(
     return np.stack(places, axis=1), np.stack(forces, axis=1)
 
 
-class ContactPart(ScenePart):
+class ContactDisplay(SceneDisplay):
     """``contact_forces``, ``friction_cones`` and ``support_polygon``.
 
     A cone stands on each point that carries load; its half angle is the arc tangent of the

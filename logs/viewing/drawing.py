@@ -219,8 +219,8 @@ class Moments:
         return link_poses(robot, base, turn, self[source.joint_position])
 
 
-class ScenePart:
-    """One part of the scene. ``write_static`` is called once, ``write`` for every batch.
+class SceneDisplay:
+    """What draws one thing of the scene. ``write_static`` is called once, ``write`` for every batch.
 
     ``scale`` is the factor by which the sizes of marks and lines suit the robot.
     """

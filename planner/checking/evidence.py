@@ -161,7 +161,7 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
 
 @per_robot
 def _asymmetric(robot: RobotDescription) -> bool:
-    """See ``Evidence.asymmetric``."""
+    """Return ``Evidence.asymmetric``."""
     robot = welded(robot).robot
     pairs = mirrored_pairs(robot)
     return pairs is not None and symmetrised(robot, pairs) != robot

@@ -34,7 +34,7 @@ from .evidence import (
 from .replay import replay
 
 HIT_TOLERANCE = 0.05
-"""m/s by which feet may be faster at touchdown than the margins say."""
+"""Margin by which feet may be faster at touchdown than the task's margins [m/s]."""
 SHORTEST_IMPACT = 0.004
 """s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
 bounds its impulse at touchdown."""
@@ -400,7 +400,7 @@ PLAN_TESTS: tuple[Callable[[Evidence], Iterator[PlanTestResult]], ...] = (
 NEAR = 0.985
 """The share of a limit from which it counts as reached."""
 NEAR_LIMIT = 0.01
-"""rad; the same for a joint's limit."""
+"""Distance from a joint's limit at which it counts as reached [rad]."""
 LEAST_TIME = 0.02
 """Share of the plan's instants that must be at a limit for it to be named."""
 LEAST_GAP = 0.002

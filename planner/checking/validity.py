@@ -73,7 +73,7 @@ class ValidityReport:
         }
 
     def explain(self) -> str:
-        """One line for every test that failed."""
+        """Return one line for every test that failed."""
         return "\n".join(
             f"{test.name}: {test.text} is {test.value:.4g} {test.unit}, at most {test.limit:.4g} "
             f"{test.unit} is allowed{f' ({test.where})' if test.where else ''}"

@@ -38,7 +38,7 @@ NEAR, FAR = 0.25, 1.5
 NOISE = 0.5
 """Scatter of one lesson, as a share of what robots need."""
 FORGETTING = 0.9
-"""With each further jump a lesson counts as if its noise had grown by this share's inverse."""
+"""Factor by whose inverse a lesson's variance of noise grows with each further jump."""
 MOST = 40
 """Lessons that are kept, the last ones."""
 LARGEST = 0.15

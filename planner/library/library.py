@@ -65,7 +65,7 @@ ALIKE = 2.0
 """Greatest distance between two tasks at which the plan of one is evidence for the other."""
 
 Solver = Callable[[JumpTask, RobotDescription, PlannedJump | None], PlannedJump]
-"""Makes a plan of a task, starting from another plan where one is given."""
+"""Maker of a plan of a task, from another plan where one is given."""
 
 
 def user_folder() -> Path:

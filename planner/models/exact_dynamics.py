@@ -59,8 +59,9 @@ class JointMotion(NamedTuple):
     duration: float | Array
 
     def at(self, time: float | Array) -> Motion:
-        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n
-        times (n, 1) each is (n, n_joints)."""
+        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
+        each is (n, n_joints).
+        """
         t, u = self.duration, time / self.duration
         way = self.end - self.start
         bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
@@ -149,8 +150,7 @@ class ExactDynamics:
         return found
 
     def contact_jacobians(self, q: Array) -> tuple[Array, Array]:
-        """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
-        axes."""
+        """Return the contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world axes."""
         pin = self.pin
         points = self.evaluated_points(q)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -254,8 +254,9 @@ class ExactDynamics:
         return found
 
     def foot_angles(self) -> tuple[Array, Array]:
-        """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
-        last. A ball has none of its own: it has the base's heading and no pitch."""
+        """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
+        has none of its own: it has the base's heading and no pitch.
+        """
         turns = [self.data.oMf[frame].rotation for frame in self.sole_frames]
         yaw, pitch = self._angles(
             np.array(turns).reshape(1, -1, 3, 3), np.array(self.data.oMi[1].rotation)[None]
@@ -287,7 +288,7 @@ class ExactDynamics:
         return np.array(self.pin.centerOfMass(self.model, self.data, q))
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
+        """Return the centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
         momentum = self.pin.computeCentroidalMomentum(self.model, self.data, q, v)
         com = np.array(self.data.com[0])
         return com, np.array(momentum.linear) / self.mass, np.array(momentum.angular)
@@ -401,7 +402,7 @@ class ExactDynamics:
         return found
 
     def _pushed(self, q: Array, force: Array) -> Array:
-        """J' F: the generalised force of the contacts."""
+        """Return J' F, the generalised force of the contacts."""
         pushed = np.zeros(self.model.nv)
         if not force.any():
             return pushed

@@ -111,7 +111,7 @@ def _middle(shape: Shape) -> Vector3:
 
 @lru_cache(maxsize=512)
 def _solid(shape: Shape) -> tuple[Any, Any, float]:
-    """Coal's shape, where its frame is in the link's, and how far it reaches from the middle of its corners [m]."""
+    """Return Coal's shape, the place of its frame in the link's, and its reach from the middle of its corners [m]."""
     import coal
 
     middle = np.array(_middle(shape))

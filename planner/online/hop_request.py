@@ -11,7 +11,7 @@ from ..task.task import JumpTask, Knots, make_task
 
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 STEP_KNOTS = Knots(squat=9, thrust=10, flight=12, landing=10)
-"""Those of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
+"""Knots of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
 RISE_SHARE = 0.5
 """Added height of a jump for each metre that it lands higher: with a half, flights take equally long."""
 TOE_KNOTS = 4

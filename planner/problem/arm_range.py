@@ -22,7 +22,7 @@ POSES = 6000
 FINEST = 61
 """Angles of a joint of an arm with few joints."""
 TURN = np.pi
-"""rad; how far joints without limits are looked at on either side."""
+"""Range examined on either side of a joint without limits [rad]."""
 
 
 @per_robot
@@ -47,7 +47,7 @@ def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float,
 def _ranges(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float
 ) -> dict[int, tuple[float, float]]:
-    """Those of one arm."""
+    """Return the ranges of one arm."""
     count = min(FINEST, int(POSES ** (1.0 / len(joints))))
     angles, start = list[Array](), list[int]()
     for k in joints:

@@ -76,8 +76,9 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
 
 
 def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
-    """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
-    is nearer to the ground than the gap that is kept."""
+    """Return points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the
+    other half is nearer to the ground than the gap that is kept.
+    """
     corners, _ = corners_of(link.shapes)
     half = 0.5 * max((math.dist(corner, ball) for corner in corners), default=0.0)
     for shape in link.shapes:
@@ -101,8 +102,9 @@ def _between(start: Vector3, end: Vector3, share: float) -> Vector3:
 
 
 def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, float]:
-    """Centre [m, link frame] and radius [m] of what touches the ground at a contact point: the
-    point itself, without a radius, unless its foot is a ball."""
+    """Return the centre [m, link frame] and radius [m] of what touches the ground at a contact point: the point itself,
+    without a radius, unless its foot is a ball.
+    """
     for ball in ball_feet(robot):
         if ball.point == contact:
             x, y, z = (float(value) for value in ball.centre)

@@ -42,7 +42,7 @@ Rows = tuple[str, int, float, float]
 
 
 def rows_of_each(family: str, low: Array, high: Array) -> list[Rows]:
-    """One row for each pair of bounds."""
+    """Return one row for each pair of bounds."""
     return [(family, 1, float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
@@ -198,12 +198,12 @@ class ProblemBuilder:
         return other.problem
 
     def _fill(self, name: str, k: int) -> None:
-        """Bounds and parameters of a piece on a knot."""
+        """Set the bounds and parameters of a piece on a knot."""
         fill = self._fill_stance if name == "free_stance" else getattr(self, f"_fill_{name}")
         fill(k)
 
     def _give(self, k: int) -> None:
-        """Bounds of the rows of a knot's variables that are given."""
+        """Set the bounds of the rows of a knot's variables that are given."""
         for row, (_, value, family) in zip(
             self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
         ):
@@ -275,7 +275,7 @@ class ProblemBuilder:
     # What a piece's rows ask for, and its parameters
 
     def _rows(self, name: str, k: int, families: list[Rows]) -> None:
-        """Bounds and families of a piece's rows, given for all rows after the gap in turn."""
+        """Set the bounds and families of a piece's rows, given for all rows after the gap in turn."""
         start, kept = self.assembly.rows_of(name, k)
         key = name, tuple(families)
         if key not in self._tables:  # many knots have the same
@@ -451,9 +451,10 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _fill_air(self, k: int) -> None:
-        """Feet and calves are above the ground. At a step they are above the higher ground while
-        it is under them, and at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the
-        flight's time, also on the lower side of the edge."""
+        """Keep feet and calves above the ground. At a step they are above the higher ground while it is under them, and
+        at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the flight's time, also on the lower side of the
+        edge.
+        """
         task, points = self.task, self._body_points
         n_feet, place = len(self.coordinates.contacts), self.of_knot[k].place
         here = self.structure.places[place]
@@ -490,7 +491,7 @@ class ProblemBuilder:
 
     @cached_property
     def _leg_gaps(self) -> list[float]:
-        """The least gaps [m] between fore and hind legs: those of the standing robot where it has less than asked for."""
+        """Least gaps [m] between fore and hind legs: the task's, or those of the standing robot where it has less."""
         count = self.structure.leg_pairs
         if not count:
             return []

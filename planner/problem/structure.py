@@ -41,7 +41,7 @@ TOLERANCE = 1e-2
 
 
 def reduced_contacts(coordinates: Coordinates, points: Iterable[int]) -> set[int]:
-    """Those of the coordinates' own contact points that are among the robot's ``points``."""
+    """Return those of the coordinates' own contact points that are among the robot's ``points``."""
     chosen = set(points)
     return {i for i, c in enumerate(coordinates.contacts) if c in chosen}
 
@@ -73,17 +73,18 @@ class ContactRows:
         self._errors = self._each * len(self._foot)
 
     def velocities(self, points: set[int]) -> Indices:
-        """Rows of the velocities of points on the ground."""
+        """Return the rows of the velocities of points on the ground."""
         return self._rows(points, set())
 
     def speeds(self, points: set[int], axes: Iterable[int]) -> Indices:
-        """Rows of the velocities of points that hit the ground, in those of their axes: the last
-        one is upwards, those before it along the foot and across it."""
+        """Return the rows of the velocities of points that hit the ground, in those of their axes: the last one is
+        upwards, those before it along the foot and across it.
+        """
         rows = [self._each * i + axis for i in sorted(points) for axis in axes]
         return np.array(rows, dtype=np.int64)
 
     def places(self, points: set[int], held: set[int]) -> Indices:
-        """Rows of the places of points that come to the ground while others are ``held`` there."""
+        """Return the rows of the places of points that come to the ground while others are ``held`` there."""
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
@@ -98,7 +99,7 @@ def _independent(
     of_foot: tuple[str, ...], places: tuple[tuple[float, ...], ...], axes: tuple[int, ...],
     points: frozenset[int], others: frozenset[int],
 ) -> tuple[int, ...]:  # fmt: skip
-    """Those rows. Few sets occur, but at every knot of a problem, and robots begin in few stances."""
+    """Return the independent rows. Few sets occur, but at every knot of a problem, and robots begin in few stances."""
     rows = list[int]()
     place = np.array(places)
     for foot in dict.fromkeys(of_foot):
@@ -219,8 +220,9 @@ class Structure:
         return [*knots, last]
 
     def _given_at_the_end(self) -> list[tuple[int, float, str]]:
-        """There the robot stands still, its base and what is in no leg where they are in the stance; the legs follow
-        from base and feet."""
+        """Return what is given at the end: the robot stands still, its base and what is in no leg where they are in the
+        stance; the legs follow from base and feet.
+        """
         at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
         base = len(self.coordinates.free_base)
         free = [base + i for i, k in enumerate(self.coordinates.moving) if k not in self._in_legs]

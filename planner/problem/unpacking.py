@@ -51,8 +51,9 @@ def matching_times(time: Array, phases: Phases, steps: Array, others: Phases) ->
 
 
 def states_at(instants: Array, time: Array, place: Array, rate: Array) -> tuple[Array, Array]:
-    """Places and rates at those instants between knots: places by the cubic through both ends'
-    places and rates, rates linearly."""
+    """Return places and rates at those instants between knots: places by the cubic through both ends' places and rates,
+    rates linearly.
+    """
     k = np.clip(np.searchsorted(time, instants + 1e-12, side="right") - 1, 0, len(time) - 2)
     h = (time[k + 1] - time[k])[:, None]
     u = (instants[:, None] - time[k][:, None]) / h
@@ -154,7 +155,7 @@ def _middles_in_flight(
     problem: FullProblem, values: Array, steps: Array,
     q: Array, v: Array, middle: Array, moving: Array,
 ) -> None:  # fmt: skip
-    """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
+    """Compute the angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
     coordinates, assembly = problem.coordinates, problem.assembly
     own = list(coordinates.turning)
     base = slice(3, 6)
@@ -189,7 +190,7 @@ def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
 
 
 def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) -> Array:
-    """Variables near a plan of a task like this one.
+    """Return variables near a plan of a task like this one.
 
     The plan may have other numbers of knots: it is followed phase by phase, and must go through
     the same phases. Only then the interval lengths of a ``guess`` are needed.
@@ -274,8 +275,9 @@ def _evaluate(
     model: SymbolicModel, q: Array, v: Array, middle: Array, moving: Array, bend: Array,
     force: Array,
 ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-    """Centre of mass, its velocity and the angular momentum at the knots; joint torques in the
-    middle of the intervals."""
+    """Return the centre of mass, its velocity and the angular momentum at the knots; joint torques in the middle of the
+    intervals.
+    """
     key = id(model), len(q)
     if key not in _evaluators:
         if len(_evaluators) >= KEPT:

@@ -50,7 +50,7 @@ from .solver import LIMIT, NEAR, Solution, solve
 from .solver_process import cpu_time
 
 RELAXATIONS = (1.4, 2.0)
-"""Times the real motor limits that a first motion is looked for with."""
+"""Multiples of the real motor limits with which a first motion is sought."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02
 """Steps by which the limits come down; halved where the solver does not follow."""
 COLD_LIMIT, WARM_LIMIT = 250, 100
@@ -134,8 +134,9 @@ def relaxable(plan: PlannedJump) -> bool:
 
 
 def finer_knots(plan: PlannedJump) -> Knots:
-    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
-    with the most counts."""
+    """Return numbers of intervals for solving a plan's task again; of several phases of a kind the one with the most
+    counts.
+    """
     count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
     for phase, start, stop in segments(plan.phase[:-1].tolist()):
         name = Phase(phase).name.lower()
@@ -176,8 +177,9 @@ LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
 Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], PlannedJump]
-"""Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
-out the robot's held joints."""
+"""Maker of a plan of a task with one set of decision variables, cost and constraints; the plan leaves out the robot's
+held joints.
+"""
 
 
 def solve_jump(
@@ -295,7 +297,7 @@ FORMULATIONS: Mapping[str, Formulation] = {
 
 
 _coordinates = lru_cache(maxsize=16)(make_coordinates)
-"""Those of a model, made once."""
+"""Coordinates of a model, made once."""
 
 
 def make_problem(
@@ -336,7 +338,9 @@ def _builder(
     task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
     *, twin: bool = False,
 ) -> ProblemBuilder:  # fmt: skip
-    """See ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left and right."""
+    """Return the builder of ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left
+    and right.
+    """
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)

@@ -25,7 +25,7 @@ from ...processes.child_process import ChildProcess
 
 
 def cpu_time() -> float:
-    """Processor time [s] of this process, of those it has waited for, and what others counted."""
+    """Return the processor time [s] of this process, of those it has waited for, and what others counted."""
     if not hasattr(os, "fork"):
         return time.process_time()
     import resource
@@ -149,7 +149,7 @@ class _Helper:
     def call(
         self, function: Any, arguments: Mapping[str, Array], limit: int
     ) -> tuple[bool, Answer | None]:
-        """See ``call_bounded``."""
+        """Call a solver; see ``call_bounded``."""
         with self._lock:
             try:
                 ended, error, answer, used = self._ask(function, arguments, limit)

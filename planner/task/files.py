@@ -51,8 +51,9 @@ class PlacedFile:
     tree: MapNode
 
     def place(self, keys: Sequence[Key], *, key: bool = False) -> str:
-        """``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest
-        where there is none."""
+        """Return ``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest where there
+        is none.
+        """
         node: Node = self.tree
         where = node.where
         for step in keys:
@@ -104,7 +105,7 @@ def read_placed(path: Path, example: str) -> PlacedFile:
 
 
 ABANDONED = 3600.0
-"""After that many seconds nobody is still writing a part [s]."""
+"""Age from which a partial file counts as abandoned by its writer [s]."""
 
 
 def write_whole(path: Path, data: bytes) -> Path:

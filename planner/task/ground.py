@@ -65,7 +65,7 @@ class _Edges:
 
 
 def _everywhere(place: StanceLocation, axis: int = 0) -> _Edges:
-    """Ground without edges: that of a place, going on."""
+    """Return ground without edges: that of a place, going on."""
     return _Edges(axis, ((-math.inf, math.inf, place),))
 
 

@@ -69,9 +69,10 @@ KNEE_SAG = 0.06
 mrad off. With 4 % the thighs of Solo12 touched, as long as its mesh is.
 """
 TOE_PUSH = 2.5
-"""Times the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8. At its
-margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on straight
-knees and swung its torso by 50 degrees, and fell."""
+"""Multiple of the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8.
+At its margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on
+straight knees and swung its torso by 50 degrees, and fell.
+"""
 LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
@@ -85,12 +86,14 @@ rise, and that share. Without it such a jump is hardly more than standing up ont
 the ground some milliseconds late, take away more of its speed than the plan has to spare.
 """
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, TOUCHDOWN_ROLL = 1.7, 0.6, 1.2
-"""m/s of the feet at touchdown, downwards and along the ground, of soles and of balls, which roll on, for a robot of
-BRUCE's size."""
+"""Speeds of the feet at touchdown [m/s], downwards and along the ground, of soles and of balls, which roll on, for a
+robot of BRUCE's size.
+"""
 FALL, LEVEL_FALL = 0.9, 1.1
-"""Up to which fall from the apex, as a multiple of the centre of mass's height, slow feet are asked for:
-in general, and in a jump on level ground that ends where it began. From higher up the motors stop the
-robot only if its legs are nearly stretched, and then flat feet are fast."""
+"""Greatest fall from the apex, as a multiple of the centre of mass's height, for which slow feet are required: in
+general, and in a jump on level ground that ends where it began. From higher up the motors stop the robot only if its
+legs are nearly stretched, and then flat feet are fast.
+"""
 TOES_LAND, TOE_LANDING_KNOTS = 0.04, 6
 """s; for how long before the heels the toes touch down in a jump straight ahead from higher up."""
 TOES_SPEEDS = ((1.37, 1.8), (1.46, 2.3))
@@ -104,11 +107,13 @@ LANDING_EFFORT = 1.0
 is not followed.
 """
 SQUAT_LEAN, FAR = 0.9, 1.2
-"""rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
+"""Lean in the squat [rad], and the distance ahead from which on it holds, as a multiple of the centre of mass's
+height.
+"""
 HIGH_AND_FAR = (0.42, 0.6)
 """Rise and distance ahead, as multiples of that height, beyond both of which the same holds."""
 STEP_LEAN = 0.85
-"""rad, in front of a step, whatever its distance."""
+"""Lean in the squat in front of a step, whatever its distance [rad]."""
 
 
 class RecipeInputs(Protocol):
@@ -182,7 +187,7 @@ def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, An
 
 
 def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
-    """Impact, effort and phases."""
+    """Yield the choices of impact, effort and phases."""
     given_fields, slow = task.model_fields_set, size_of(robot).slow
     if "impact" not in given_fields:
         yield Choice("impact", True, "feet that stop before they touch cost joint speed")
@@ -419,9 +424,9 @@ def _share(value: float, between: tuple[float, float]) -> float:
 
 
 def take_off_energy_ratio(task: RecipeInputs, robot: RobotDescription) -> float:
-    """Return the demand of a jump: its kinetic energy at lift-off by m g times the height of the centre of mass, half
-    of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of what is a
-    fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
+    """Return the take-off energy ratio of a jump: its kinetic energy at lift-off by m g times the height of the centre
+    of mass, half of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of
+    what is a fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
     """
     height = size_of(robot).height
     found = 0.0

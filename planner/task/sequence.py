@@ -43,7 +43,7 @@ Slope = tuple[float, float]
 """Angles [rad] by which ground rises along the world's x and y axes, as those of a scene's boxes."""
 LEVEL: Slope = (0.0, 0.0)
 STEEPEST = math.radians(45.0)
-"""rad; a scene's boxes lean no more."""
+"""Steepest slope [rad]; a scene's boxes lean no more."""
 SHORTEST_JUMP_OVER_AN_EDGE = 0.03
 """Start and landing closer together than this [m] have no room for a step's edge between them."""
 PHASES = {
@@ -181,8 +181,9 @@ class StanceLocation:
 
 
 def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
-    """Axes along feet of that ``heading``, across them and normal to ground that leans, as the
-    columns of a matrix (3, 3)."""
+    """Return the axes along feet of that ``heading``, across them and normal to ground that leans, as the columns of a
+    matrix (3, 3).
+    """
     cosine, sine = np.cos(heading), np.sin(heading)
     if slope == LEVEL:
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

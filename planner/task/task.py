@@ -361,11 +361,11 @@ class JumpTask(FreeTimes):
         return found
 
     def start_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""
+        """Return the joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.initial, "initial")
 
     def end_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the end. Raises ``JumpTaskError`` for an unknown joint."""
+        """Return the joint angles [rad] by name at the end. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.final, "final")
 
     def equipped(self, robot: RobotDescription) -> RobotDescription:
@@ -473,7 +473,7 @@ def make_task(
 
 
 def _explain(problem: Any) -> str:
-    """One of pydantic's problems as a line: the key, what is expected and what was found."""
+    """Return one of pydantic's problems as a line: the key, what is expected and what was found."""
     location = problem["loc"]
     if problem["type"] == "extra_forbidden":
         near = nearest(str(location[-1]), names_at(JumpTask, location[:-1]), 1, 0.0)

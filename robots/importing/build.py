@@ -1,4 +1,4 @@
-"""Makes the links and joints of a description from the bodies of a file.
+"""Conversion of the bodies of a file to the links and joints of a description.
 
 Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
@@ -67,7 +67,7 @@ class LinkTree:
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
-    """Plain numbers without rounding errors, so that every machine reads the same robot."""
+    """Return plain numbers without rounding errors, so that every machine reads the same robot."""
     return [float(value) for value in np.round(np.asarray(values, dtype=float), digits) + 0.0]
 
 

@@ -124,7 +124,7 @@ class Overlay:
         return None
 
     def feet(self, built: LinkTree) -> tuple[list[Any], list[Any]]:
-        """Feet and contact points as in a full description, from both ways to write them."""
+        """Return the feet and contact points as in a full description, from both ways to write them."""
         feet, contacts = [], []
         given = self.data.get("feet") or []
         if not isinstance(given, list):
@@ -192,7 +192,7 @@ class Overlay:
         return None
 
     def points(self, built: LinkTree) -> dict[str, Any]:
-        """Named points, each on a link of the description or in the frame of a body of the file."""
+        """Return named points, each on a link of the description or in the frame of a body of the file."""
         found: dict[str, Any] = {}
         links = [link["name"] for link in built.links]
         for name, value in self.mapping("points").items():
@@ -205,8 +205,9 @@ class Overlay:
         return found
 
     def thrusters(self, built: LinkTree, model: RawModel) -> dict[str, Any]:
-        """Thrusters as in a full description: those of the file, with what the YAML changes, and the YAML's
-        own, each on a link of the description or in the frame of a body of the file."""
+        """Return the thrusters as in a full description: those of the file, with what the YAML changes, and the YAML's
+        own, each on a link of the description or in the frame of a body of the file.
+        """
         found: dict[str, Any] = {
             name: {
                 "link": raw.body, "position": raw.position.tolist(), "axis": raw.axis.tolist(),

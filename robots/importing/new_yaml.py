@@ -109,7 +109,7 @@ def guess_feet(model: RawModel, built: LinkTree) -> list[dict[str, Any]]:
 
 
 def _limb_ends(built: LinkTree) -> list[str]:
-    """Links at the end of a chain of two joints or more."""
+    """Return the links at the end of a chain of two joints or more."""
     parent = {joint["child"]: joint["parent"] for joint in built.joints}
     ends = [link for link in parent if link not in parent.values()]
     return [link for link in ends if parent[link] != built.base]
@@ -170,8 +170,9 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
 def _sole(
     model: RawModel, built: LinkTree, link: str, bottom: float, foot: BodyFrame
 ) -> list[list[float]]:
-    """Four corners [m, body of the foot] around what of a link's shapes is near the ground, where a leg of so
-    many joints has an ankle and the shapes are wide; else none."""
+    """Return four corners [m, body of the foot] around what of a link's shapes is near the ground, where a leg of so
+    many joints has an ankle and the shapes are wide; else none.
+    """
     carrier = {joint["child"]: joint["parent"] for joint in built.joints}
     count, above = 0, link
     while above in carrier:

@@ -93,7 +93,7 @@ class XmlFile:
         return any(element.get("name") == name for element in self.root.findall(tag))
 
     def place(self, tag: str, name: str) -> tuple[int, int]:
-        """Line and column of the element of that tag and name; (0, 0) if it is not found."""
+        """Return the line and column of the element of that tag and name; (0, 0) if it is not found."""
         pattern = rf"<{tag}\s(?:[^>]*?\s)?name\s*=\s*[\"']{re.escape(name)}[\"']"
         found = re.search(pattern, self.text)
         if not found:

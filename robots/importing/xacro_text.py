@@ -18,7 +18,7 @@ XACRO = ".xacro"
 
 
 class _NoPackage(Exception):
-    """There is no package of that name; its argument is the name."""
+    """Error: there is no package of that name; its argument is the name."""
 
 
 def expand_xacro(path: Path) -> str:

@@ -87,7 +87,7 @@ def vector(values: Iterable[float]) -> str:
     return f"[{', '.join(number(value) for value in values)}]"
 
 
-Part = TypeVar("Part", bound=BaseModel)
+ElementType = TypeVar("ElementType", bound=BaseModel)
 
 
 class Draft:
@@ -116,7 +116,7 @@ class Draft:
             right,
         )  # fmt: skip
 
-    def parts(self, key: str, kind: type[Part]) -> list[tuple[int, Part]]:
+    def parts(self, key: str, kind: type[ElementType]) -> list[tuple[int, ElementType]]:
         """Return the readable elements of the list under ``key``, each with its index."""
         found = self.data.get(key)
         if not isinstance(found, Sequence) or isinstance(found, str):
@@ -139,7 +139,7 @@ class Draft:
         return [name for name in named if isinstance(name, str)]
 
 
-def read(kind: type[Part], value: Any) -> Part | None:
+def read(kind: type[ElementType], value: Any) -> ElementType | None:
     """Return the value as that part of a description; None where it cannot be read."""
     try:
         return kind.model_validate(value)

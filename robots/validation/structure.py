@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...files.problems import listing
-from ..part import Vector3
+from ..element import Vector3
 from ..robot_description import Appearance, Box, Joint, Link, Mesh
 from ..shapes import THINNEST, Hull, is_body
 from .faults import Draft, Path, nearest, number, read, vector

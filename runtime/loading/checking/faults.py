@@ -31,10 +31,10 @@ from ...language.fault import (
 )
 from ...language.signals import Field, Signal
 from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
+from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WireSlice
 from ..reading.selection import Selection, read_selection, select
 from .block_check import BlockDraft
-from .inserted import part_signal
+from .inserted import selected_signal
 from .parameters import check_parameters
 from .settings import Settings
 
@@ -175,7 +175,7 @@ class _FaultReader:
                 return None
             return port, (draft, draft.outputs[name].signal), selection
         wire = draft.flat.wires.get(name)
-        if wire is None or wire.constant is not None or wire.parts:
+        if wire is None or wire.constant is not None or wire.slices:
             what = "not wired" if wire is None else "a constant" if wire.constant is not None else "composed of parts"  # fmt: skip
             self._report(f"{self.at} is on the input {port}, which is {what}", where, found=what,
                          expected="an input that is wired to one output, or an output")  # fmt: skip
@@ -375,9 +375,9 @@ class _FaultReader:
         where = entry.value.where
         element = WireElement(where, FlatWire(port, where, truth=output.truth), Selection(field_name, selection.indices))  # fmt: skip
         wire = FlatWire(
-            "", where, delay=1, parts=(WirePart("", where, (element,)),), truth=output.truth
+            "", where, delay=1, slices=(WireSlice("", where, (element,)),), truth=output.truth
         )
-        signal = part_signal("Event", {field_name: ((), field.dtype_name)})
+        signal = selected_signal("Event", {field_name: ((), field.dtype_name)})
         return Comparison(SIGNS.index(match["sign"]), number), signal, wire, output.truth
 
     def _report(self, message: str, where: Position, code: Code = Code.BAD_VALUE, **details: Any) -> None:  # fmt: skip
@@ -386,15 +386,15 @@ class _FaultReader:
 
 def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
     """Return the wire, or its parts, from another output where it came from ``source``."""
-    if wire.parts:
-        parts = tuple(
-            replace(part, items=tuple(
+    if wire.slices:
+        slices = tuple(
+            replace(wire_slice, items=tuple(
                 item if item.wire is None else replace(item, wire=_moved(item.wire, source, target))
-                for item in part.items
+                for item in wire_slice.items
             ))
-            for part in wire.parts
+            for wire_slice in wire.slices
         )  # fmt: skip
-        return replace(wire, parts=parts)
+        return replace(wire, slices=slices)
     if wire.constant is not None or wire.source != source:
         return wire
     return replace(wire, source=target, shown=wire.shown or source)

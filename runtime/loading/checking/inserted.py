@@ -131,7 +131,7 @@ def gather_block_type(
     return type("Gather", (Gather,), body)
 
 
-def part_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
+def selected_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
     """Return a signal whose fields have these shapes and types, and carry their units."""
     body: dict[str, Any] = {
         field: Field(shape, dtype=dtype, inferred=True, text="what was selected")

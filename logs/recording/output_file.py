@@ -1,4 +1,4 @@
-"""The place of a recording: written under a name of its own that is locked, then renamed.
+"""The file of a recording: written under a name of its own that is locked, then renamed.
 
 While ``jump.rrd`` is written it is called ``jump.part.rrd``, and whoever writes it holds an
 exclusive lock on it. Anybody may read it meanwhile. What was called ``jump.rrd`` before stays there
@@ -20,20 +20,20 @@ try:
 except ImportError:  # on Windows; there another writer is not noticed
     fcntl = None  # type: ignore[assignment]  # not on Windows
 
-PART = ".part"
+UNFINISHED = ".part"
 _MOST_NAMES = 100
 
 
-def part_of(path: Path) -> Path:
+def unfinished_name(path: Path) -> Path:
     """Return the name under which the recording ``path`` is written."""
-    return path.with_name(f"{path.stem}{PART}{path.suffix}")
+    return path.with_name(f"{path.stem}{UNFINISHED}{path.suffix}")
 
 
-def whole_of(path: Path) -> Path | None:
+def finished_name(path: Path) -> Path | None:
     """Return the recording that is written under the name ``path``; ``None`` if it is no such name."""
-    if not path.stem.endswith(PART):
+    if not path.stem.endswith(UNFINISHED):
         return None
-    return path.with_name(f"{path.stem.removesuffix(PART)}{path.suffix}")
+    return path.with_name(f"{path.stem.removesuffix(UNFINISHED)}{path.suffix}")
 
 
 def is_being_written(path: Path) -> bool:
@@ -60,8 +60,8 @@ def _lock(descriptor: int) -> bool:
 
 
 @dataclass
-class RecordingPlace:
-    """A recording's place, locked by this process and by those that inherit ``descriptor``.
+class OutputFile:
+    """The file of a recording, locked by this process and by those that inherit ``descriptor``.
 
     Attributes:
         target: the name that the recording will have.
@@ -76,9 +76,9 @@ class RecordingPlace:
     said: tuple[str, ...] = ()
 
     @property
-    def part(self) -> Path:
+    def unfinished(self) -> Path:
         """The private name."""
-        return part_of(self.target)
+        return unfinished_name(self.target)
 
     def close(self) -> None:
         """Close the file; the lock goes when the last process has closed it."""
@@ -89,7 +89,7 @@ class RecordingPlace:
         """Remove the file, into which nothing has come; what had its name before stays."""
         with suppress(OSError):
             if self._is_there():
-                self.part.unlink()
+                self.unfinished.unlink()
 
     def publish(self) -> str:
         """Give the file its name. Returns a warning if it had been removed, else nothing.
@@ -101,30 +101,30 @@ class RecordingPlace:
         if not self._is_there():
             self._write_again()
             warning = (
-                f"somebody removed {self.part} while the run went on; it was written again when "
+                f"somebody removed {self.unfinished} while the run went on; it was written again when "
                 "the run ended"
             )
         for number in range(self.keep, 0, -1):
             older = self.target if number == 1 else _numbered(self.target, number - 1)
             if older.exists():
                 os.replace(older, _numbered(self.target, number))
-        os.replace(self.part, self.target)
+        os.replace(self.unfinished, self.target)
         return warning
 
     def _is_there(self) -> bool:
         try:
-            return os.path.samestat(os.fstat(self.descriptor), os.stat(self.part))
+            return os.path.samestat(os.fstat(self.descriptor), os.stat(self.unfinished))
         except FileNotFoundError:
             return False
 
     def _write_again(self) -> None:
         """Copy the file, which has no name any more, to its private name."""
-        self.part.parent.mkdir(parents=True, exist_ok=True)
-        with self.part.open("wb") as file:
-            place = 0
-            while piece := os.pread(self.descriptor, 1 << 20, place):
+        self.unfinished.parent.mkdir(parents=True, exist_ok=True)
+        with self.unfinished.open("wb") as file:
+            offset = 0
+            while piece := os.pread(self.descriptor, 1 << 20, offset):
                 file.write(piece)
-                place += len(piece)
+                offset += len(piece)
 
 
 def split_name(path: Path, number: int) -> Path:
@@ -137,7 +137,7 @@ def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.{number}{path.suffix}")
 
 
-def take_place(path: Path, keep: int = 0) -> RecordingPlace:
+def reserve_output(path: Path, keep: int = 0) -> OutputFile:
     """Make and lock the file in which the recording ``path`` is written.
 
     If another run writes that recording, this one gets the next free name, ``jump-2.rrd``. A file
@@ -155,12 +155,12 @@ def take_place(path: Path, keep: int = 0) -> RecordingPlace:
     path.parent.mkdir(parents=True, exist_ok=True)
     for number in range(1, _MOST_NAMES):
         target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
-        place = _take(target, keep)
-        if place is not None:
+        output = _take(target, keep)
+        if output is not None:
             if number > 1:
                 text = f"another run is being recorded in {path}; this one goes to {target}"
-                place.said = (text, *place.said)
-            return place
+                output.said = (text, *output.said)
+            return output
     raise OSError(errno.EBUSY, f"{_MOST_NAMES} runs are being recorded under this name", str(path))
 
 
@@ -171,23 +171,25 @@ def _kind_of(path: Path) -> str:
     return "a socket" if path.is_socket() else "a device"
 
 
-def _take(target: Path, keep: int) -> RecordingPlace | None:
+def _take(target: Path, keep: int) -> OutputFile | None:
     """Take the place of ``target``; return ``None`` if another run has it."""
-    part, said = part_of(target), ""
+    unfinished, said = unfinished_name(target), ""
     while True:
-        descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
             if not _lock(descriptor):
                 os.close(descriptor)
                 return None
-            there = part.exists() and os.path.samestat(os.fstat(descriptor), os.stat(part))
+            there = unfinished.exists() and os.path.samestat(
+                os.fstat(descriptor), os.stat(unfinished)
+            )
             if there and not os.fstat(descriptor).st_size:
-                return RecordingPlace(target, descriptor, keep, (said,) if said else ())
+                return OutputFile(target, descriptor, keep, (said,) if said else ())
             if there:
                 moved = _free(target)
-                os.replace(part, moved)
+                os.replace(unfinished, moved)
                 said = (
-                    f"{part} was left by a run whose recorder was killed; it is kept as {moved} "
+                    f"{unfinished} was left by a run whose recorder was killed; it is kept as {moved} "
                     f"('aloft log repair {moved}' mends it)"
                 )
         except BaseException:
