@@ -46,7 +46,7 @@ FILES = (
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of files: the content of good ones by name, and what is made wrong in them."""
+    """A kind of files: the content of good ones by name, and the mistakes made in them."""
 
     files: Mapping[str, bytes]
     mistakes: Mapping[str, Change]

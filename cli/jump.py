@@ -1,4 +1,4 @@
-"""``aloft jump``: plans a jump that is asked for in words and runs it, in one line."""
+"""``aloft jump``: plans and runs a jump that its options describe, in one line."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ FIELDS = {
 
 @dataclass(frozen=True)
 class JumpOptions:
-    """The jump that is asked for."""
+    """The requested jump."""
 
     rise: Annotated[str, typer.Option(help=HELP["rise"])] = ""
     forward: Annotated[str, typer.Option(help=HELP["forward"])] = ""
@@ -226,7 +226,7 @@ def usual_rise(path: Path, own: Sequence[str]) -> float | None:
 
 
 def settings_for(asked: Mapping[str, float], running: TrialOptions) -> list[str]:
-    """Return the overrides of a graph for the task, the trial and what else is asked for."""
+    """Return the overrides of a graph for the task, the trial and the other options."""
     task = [f"plan.task.{key}={value!r}" for key, value in asked.items()]
     return [*trial_settings_of(running), *task, *(running.overrides or [])]
 

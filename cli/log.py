@@ -154,7 +154,7 @@ def compare(
 
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
-    """Repair a recording in place: what was cut off or is damaged is taken out, the rest is kept."""
+    """Repair a recording in place: remove cut or damaged messages, and keep the rest."""
     from ..logs.file.repair import repair as mend
     from ..logs.recording.output_file import finished_name, is_being_written
 

@@ -81,7 +81,7 @@ def twin(
 
 
 def _wait(seconds: float) -> None:
-    """Until SIGINT or SIGTERM, or the end of the time."""
+    """Wait until SIGINT or SIGTERM, or the end of the time."""
     ended = False
 
     def end(number: int, frame: object) -> None:
@@ -99,7 +99,7 @@ def _wait(seconds: float) -> None:
 
 
 def _settings(texts: list[str]) -> dict[str, object]:
-    """``name=value`` texts as parameters. Raises ``AloftError``."""
+    """Parse ``name=value`` texts as parameters. Raises ``AloftError``."""
     import yaml
 
     from ..hal.simulated.simulated_robot import SimulatorParameters

@@ -74,7 +74,7 @@ class Job:
 
 
 def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
-    """Every cell, by task, then by arm, then by the axes with the last one fastest.
+    """Yield every cell, by task, then by arm, then by the axes with the last one fastest.
 
     ``common`` is applied after the study's ``set`` and before all other overrides.
     """

@@ -20,11 +20,11 @@ from ..robots.description import RobotDescription
 from ..runtime.graph import Graph
 
 CONSUMER = "controllers/late_sensors.yaml"
-"""The file that a graph includes so that its controller takes what is told."""
+"""The file that a graph includes so that its controller takes the values of a calibration."""
 
 
 class CalibrationErrors(NamedTuple):
-    """Standard deviations of what is told: shares of friction and of torque constants, ages [s], the IMU's
+    """Standard deviations of a calibration's values: shares of friction and of torque constants, ages [s], the IMU's
     place [m] and angle [rad]."""
 
     friction: float = 0.0

@@ -132,7 +132,7 @@ class _Trace:
                 )  # fmt: skip
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def first_difference(self, path: str, start: Snapshot) -> int:
         """Find the first tick in which a block, with its present parameters and on its inputs in

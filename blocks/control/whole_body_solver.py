@@ -42,7 +42,7 @@ def solver_call(
     reduction: Reduction,
     solution: WholeBodySolution,
 ) -> KernelCall | PythonCall:
-    """The call that writes the solution of the program that ``reduce_program`` has reduced."""
+    """Return the call that writes the solution of the program that ``reduce_program`` has reduced."""
     if name != ACTIVE_SET:
         return PythonCall(LibrarySolver(name, cones, program, reduction, solution).solve, ())
     n, n_contacts = len(solution.acceleration), len(solution.force)
@@ -62,7 +62,7 @@ def fallback_call(
     reduction: Reduction,
     solution: WholeBodySolution,
 ) -> KernelCall | None:
-    """The call that solves the program where the solver ``name`` finds no solution.
+    """Return the call that solves the program where the solver ``name`` finds no solution.
 
     After a library's solver that is the own method. After the own method there is none with pyramids: of 59,000
     programs it solved all that DAQP could solve. With round cones its search fails in 2 of 50,000; then the

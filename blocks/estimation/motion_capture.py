@@ -25,10 +25,10 @@ class CaptureLine(StreamState):
     """The measurements under way, and the random stream."""
 
     number = Field(LINE, dtype="int64", text="of each measurement; zero: dropped")
-    time = Field(LINE, unit="s", text="when it was taken")
+    time = Field(LINE, unit="s", text="time of the measurement")
     position = Field((LINE, 3), unit="m", frame="world", text="base origin")
     heading = Field(LINE, unit="rad", frame="world", text="heading of the base")
-    taken = Field(dtype="int64", text="how many have been taken")
+    taken = Field(dtype="int64", text="number of measurements taken")
 
 
 class MotionCapture(Block):
@@ -53,7 +53,7 @@ class MotionCapture(Block):
         seed: int = parameter(0, ge=0, text="of the noise")
 
     params: Params
-    truth = Input(RobotTruth, text="where the robot is")
+    truth = Input(RobotTruth, text="true place of the robot")
     place = Output(PlaceMeasurement, text="the last measurement that has come")
     line = State(CaptureLine, text="measurements under way")
     last = State(PlaceMeasurement, text="the last measurement that has come")
@@ -105,7 +105,7 @@ class PlaceHistory(Signal):
     position = Field((LINE, 2), unit="m", text="places of the base by the estimator")
     heading = Field(LINE, unit="rad", text="headings of the base by the estimator")
     last = Field(dtype="int64", text="number of the last measurement that was used")
-    used = Field(dtype="int64", text="how many were used")
+    used = Field(dtype="int64", text="number of measurements used")
     offset = Field(2, unit="m", text="origin of the estimator's world in that of the measurements")
     turn = Field(unit="rad", text="its heading there")
 
@@ -125,7 +125,7 @@ class PlaceCorrection(Block):
         )
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         turn = Field(4, text="quaternion of the rotation")
 

@@ -30,7 +30,7 @@ class LibraryState(Signal):
 
 
 class LibraryParameters(Parameters):
-    """Which library to run, and how."""
+    """The library to run, and the way to run it."""
 
     folder: str = parameter(
         text="the folder that aloft export c has written, relative to that of the graph"
@@ -48,9 +48,9 @@ class LibraryBlock(Block):
 
     Params = LibraryParameters
     params: LibraryParameters
-    state = State(LibraryState, text="what the library remembers")
+    state = State(LibraryState, text="state of the library")
     about: ClassVar[Mapping[str, Any]] = {}
-    """What the library's description says."""
+    """The content of the library's description."""
 
     files_folder = "folder"
 
@@ -85,7 +85,7 @@ class LibraryBlock(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The numbers that hold the library's state."""
+        """Return the size of the library's state, in numbers of 8 bytes."""
         return {"library_state": -(-int(cls.about["state_bytes"]) // 8)}
 
     def setup(self) -> None:
@@ -107,7 +107,7 @@ class LibraryBlock(Block):
     def _pairs(
         self, kind: str, views: Mapping[str, NDArray[Any]]
     ) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-        """The field of a port and the terminal of the library that belong together."""
+        """Return the pairs of a port's field and the library's terminal that belong together."""
         return [
             (getattr(self, port).views()[each["field"]], views[each["name"]])
             for port, fields in _ports(self.about)[kind].items()
@@ -155,7 +155,7 @@ class LibraryBlock(Block):
         self._instance.restore(self.state.data.view(np.uint8)[:size].tobytes())
 
     def warnings(self) -> Sequence[str]:
-        """What the library asked for, and how often."""
+        """Return the codes with which the library asked for attention, and the number of ticks."""
         return [
             f"{self.about['name']} returned {key} in {n} ticks" for key, n in self._asked.items()
         ]
@@ -173,7 +173,7 @@ class Library(LibraryBlock):
 
     Loading compares the shared library with its digest in the description. Both travel in the recording, and
     a snapshot has the library's state. Where a block of the library asks for attention, the run goes on, and its
-    end says how often; see the codes in docs/c_library.md.
+    end reports how often; see the codes in docs/c_library.md.
 
     With ``memory`` the library runs in a process of its own, the program ``main`` that was exported with it:
     in lockstep the bytes are the same; in real time the block gives the newest inputs and takes the newest outputs.
@@ -193,7 +193,7 @@ class Library(LibraryBlock):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with the ports of the library."""
+        """Make the class with the ports of the library."""
         assert isinstance(params, LibraryParameters)
         try:
             return _class_for(_read(params, folder), remote=bool(params.memory))
@@ -202,7 +202,7 @@ class Library(LibraryBlock):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A library has to be written first, for this computer."""
+        """Return the folder of a library, which has to be written first, for this computer."""
         return {"folder": "controller"}
 
     def step(self) -> None:
@@ -237,7 +237,7 @@ def _read(params: LibraryParameters, folder: Path) -> Mapping[str, Any]:
 
 
 def _ports(about: Mapping[str, Any]) -> dict[str, dict[str, list[Mapping[str, Any]]]]:
-    """The terminals of inputs and of outputs by the names of their ports."""
+    """Return the terminals of inputs and of outputs by the names of their ports."""
     found: dict[str, dict[str, list[Mapping[str, Any]]]] = {"outputs": {}, "inputs": {}}
     for kind, ports in found.items():
         for each in about[kind]:
@@ -252,7 +252,7 @@ _CLASSES: dict[str, type[Block]] = {}
 
 
 def _class_for(about: Mapping[str, Any], *, remote: bool) -> type[Block]:
-    """The class of a library; the same one for the same library, so that graphs compare equal."""
+    """Return the class of a library; the same one for the same library, so that graphs compare equal."""
     key = repr((about, remote))
     if key not in _CLASSES:
         direct = remote or any(each["depends"] for each in about["outputs"])

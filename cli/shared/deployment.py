@@ -180,7 +180,8 @@ def _wheels(folder: Path | None, problems: list[str]) -> dict[str, Path]:
 
 
 def _requirements(graph: CheckedGraph) -> list[str]:
-    """aloft, what it needs, the extras of which something is imported, and what blocks are installed in."""
+    """Return the requirements of the deployment: aloft, its own, the extras of which something is
+    imported, and the distributions that blocks are installed in."""
     imported = {name.partition(".")[0] for name in sys.modules}
     distributions = packages_distributions()
     loaded = {name for module in imported for name in distributions.get(module, ())}

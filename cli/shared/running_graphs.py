@@ -100,7 +100,7 @@ class LocalRun:
 
 @contextmanager
 def registered(graph: Path, settings: Sequence[str]) -> Iterator[None]:
-    """While the context lasts, the run of ``graph`` with these settings can be found.
+    """Make the run of ``graph`` with these settings one that can be found while the context lasts.
 
     Raises:
         AloftError: the user's folder cannot be used.

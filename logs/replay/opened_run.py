@@ -97,7 +97,7 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
 
 
 def _entries(header: Header) -> Iterator[tuple[str, str, str, str, str]]:
-    """Entry, block, parameter, kind and name of each file that the recording carries."""
+    """Yield entry, block, parameter, kind and name of each file that the recording carries."""
     for entry, digest in header.files.items():
         match = _ENTRY.fullmatch(entry)
         if match is not None and digest in header.contents:

@@ -152,7 +152,7 @@ def is_main(lane: Lane) -> bool:
 
 
 def states_view(header: Header, shown: Sequence[ShownRun]) -> Any:
-    """One lane each for phases, contacts and whether the quadratic program was solved."""
+    """Make one lane each for phases, contacts and whether the quadratic program was solved."""
     import rerun.blueprint as rrb
 
     lanes = [
@@ -230,8 +230,8 @@ def read_layout(path: Path, header: Header) -> ViewLayout:
 def _unknown_signals(
     layout: ViewLayout, header: Header
 ) -> Iterator[tuple[tuple[str | int, ...], str, tuple[str, ...]]]:
-    """Signals that the run has not, that are too large to be drawn, or of another unit, each with the names nearest
-    to it."""
+    """Yield signals that the run has not, that are too large to be drawn, or of another unit, each
+    with the names nearest to it."""
     fields = _fields(header)
     for i, tab in enumerate(layout.tabs):
         for j, plot in enumerate(tab.plots):

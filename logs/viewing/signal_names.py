@@ -11,7 +11,7 @@ from ...robots.description import RobotDescription
 from ..file.format import RecordedField
 
 MOST_NAMES = 48
-"""A matrix with more elements than this has no names, and so no plot: nobody could read it."""
+"""Largest number of elements of a matrix that has names, and so a plot: more are unreadable."""
 
 BASE_NAMES = {
     "floating": ("base x", "base y", "base z", "base roll", "base pitch", "base yaw"),
@@ -54,7 +54,7 @@ def names_along(
 
 
 def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """One name for every element in C order, or none at all for a large matrix."""
+    """Return one name for every element in C order, or none at all for a large matrix."""
     if not field.shape:
         return [field.field_name]
     axes = [

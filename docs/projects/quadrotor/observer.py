@@ -32,7 +32,7 @@ class Observed(Signal):
 
 
 class ObserverScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     rate = Field(3, text="angular velocity without bias")
     force = Field(3, text="specific force in the world")

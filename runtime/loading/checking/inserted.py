@@ -117,7 +117,7 @@ def gather_block_type(
     ``wire_text`` is the wire as the graph has it, and ``reads_truth`` whether its reader may do that.
     """
     ports: dict[str, Any] = {
-        name: Input(signal, text="what is selected from", reads_truth=reads_truth)
+        name: Input(signal, text="the vector to select from", reads_truth=reads_truth)
         for name, signal in inputs.items()
     }
     body = {
