@@ -400,7 +400,7 @@ def signal_error_type(
 
     Args:
         signal: of the wire.
-        target: where it is, as the graph says it.
+        target: where it is, as written in the graph.
         elements: the places that change, by field, in row order.
         params: what goes wrong.
         delay: of a delayed value, in runs.

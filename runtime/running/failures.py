@@ -68,7 +68,7 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
     """Turn whatever a block raises before a run into one ``RunError`` that names the block.
 
     The message begins with the block's place in the graph file, where it has one. An error that was
-    not raised for users to read also says where in the code it was raised.
+    not raised for users to read also has the place in the code where it was raised.
 
     Raises:
         RunError: something was raised inside.
