@@ -29,11 +29,11 @@ _AXES = 6
 """The axes of the gyroscope and of the accelerometer."""
 
 
-class ImuPlace(NamedTuple):
-    """Place of the unit: its ``place`` [m, base frame], and the rotation vector ``to_axes`` [rad] from the base's axes
-    to its own."""
+class ImuPose(NamedTuple):
+    """Pose of the unit: its ``position`` [m, base frame], and the rotation vector ``to_axes`` [rad] from the
+    base's axes to its own."""
 
-    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     to_axes: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -44,15 +44,15 @@ class ImuPlace(NamedTuple):
         return out
 
 
-NOMINAL = ImuPlace()
+NOMINAL = ImuPose()
 """The base's origin, with the base's axes."""
 
 
-def draw_place(effects: ImuEffects, seed: int) -> ImuPlace:
-    """Draw the place of the unit, by the seed."""
+def draw_imu_pose(effects: ImuEffects, seed: int) -> ImuPose:
+    """Draw the pose of the unit, by the seed."""
     place = draw_spread(effects.position, effects.position_spread, seed, Purpose.IMU_POSITION)
     angle = draw_spread(effects.rotation, effects.rotation_spread, seed, Purpose.IMU_ROTATION)
-    return ImuPlace((place[0], place[1], place[2]), (angle[0], angle[1], angle[2]))
+    return ImuPose((place[0], place[1], place[2]), (angle[0], angle[1], angle[2]))
 
 
 def draw_spread(
@@ -144,7 +144,7 @@ class ImuModel:
                 row += 1
         self.delays = draw_delays(effects, seed)
         self._chain = ImuChain(
-            draw_place(effects, seed).quaternion, 1.0 + scale,
+            draw_imu_pose(effects, seed).quaternion, 1.0 + scale,
             effects.acceleration_sensitivity * sensitivity, filters,
             np.repeat([round(delay / timestep) for delay in self.delays], 3),
         )  # fmt: skip
