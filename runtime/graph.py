@@ -17,7 +17,7 @@ from typing import Any
 
 from ..files.nodes import text_of
 from .language.errors import AloftError
-from .language.fault import FOLDER
+from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import checked_again, checked_file, checked_text
@@ -67,9 +67,9 @@ class Graph:
         """Run the graph from start to close.
 
         Args:
-            duration: how long [s of the graph's time]; by default as the graph says.
-            seed: the value of every parameter called ``seed``; by default as the graph says.
-            clock: how to pace it; by default as the graph says.
+            duration: how long [s of the graph's time]; by default that of the graph.
+            seed: the value of every parameter called ``seed``; by default that of the graph.
+            clock: how to pace it; by default that of the graph.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
             plain: whether to run all kernels as plain Python: slower, with the same bytes.
@@ -104,7 +104,7 @@ class Graph:
         """Return a run that is stepped from Python, for a ``with`` statement; see ``SteppedRun``.
 
         Args:
-            seed: the value of every parameter called ``seed``; by default as the graph says.
+            seed: the value of every parameter called ``seed``; by default that of the graph.
             plain: whether to run all kernels as plain Python.
 
         Raises:

@@ -201,7 +201,7 @@ def observer_of(
     """
     from ...runtime.links.observer import Observer
     from ...runtime.loading import checked_file
-    from ...runtime.placement.placed import place
+    from ...runtime.placement.placed import split_over_machines
 
-    placed = place(checked_file(graph, [*settings_of(graph, process), *overrides]))
+    placed = split_over_machines(checked_file(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, keys, name)

@@ -71,7 +71,7 @@ def select(
     selected.
 
     Raises:
-        ValueError: an index cannot be read, is outside, or selects nothing; the text says which.
+        ValueError: an index cannot be read, is outside, or selects nothing; the text tells which.
     """
     places = np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
     own_names: Sequence[str] = names

@@ -234,9 +234,9 @@ def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[s
         return layout, "", [spec.path for spec in graph.blocks]
     if graph.machines:
         from ..links.part import part_graph
-        from ..placement.placed import place
+        from ..placement.placed import split_over_machines
 
-        placed = place(graph)
+        placed = split_over_machines(graph)
         for machine in placed.machines:
             part = part_graph(placed, machine.name)
             layout = Memory(part.blocks, part.robot).bus.layout

@@ -181,16 +181,16 @@ def _places(graph: CheckedGraph) -> dict[str, str]:
     except LoadError:
         return found
     for block in flat.blocks:
-        _add_places(block.path, block.parameters, found)
+        _add_locations(block.path, block.parameters, found)
     return found
 
 
-def _add_places(path: str, node: MapNode, found: dict[str, str]) -> None:
+def _add_locations(path: str, node: MapNode, found: dict[str, str]) -> None:
     for entry in node:
         key = f"{path}.{entry.key}"
         found[key] = str(entry.key_where)
         if isinstance(entry.value, MapNode):
-            _add_places(key, entry.value, found)
+            _add_locations(key, entry.value, found)
 
 
 FIRST_LINE = "# Values that were tuned while the graph ran; `aloft run` takes this file."

@@ -23,13 +23,13 @@ from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
-from .faults import insert_faults
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_references import resolve_references
 from .parameters import check_parameters
 from .settings import Settings, read_settings
+from .signal_errors import insert_signal_errors
 from .wire_check import WireCheck
 
 LONGEST_RING = 8
@@ -48,7 +48,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
-    drafts = insert_faults(graph, drafts, settings, problems)
+    drafts = insert_signal_errors(graph, drafts, settings, problems)
     drafts = resolve_composite_wires(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
@@ -154,7 +154,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
         str(unknown),
         flat.use_where,
         at=flat.path,
-        expected=_places_of_modules(flat, graph)
+        expected=_folders_of_modules(flat, graph)
         if isinstance(unknown, UnknownModuleError)
         else "a block of `aloft blocks`, module:Class, or a file.yaml",
         found=flat.use,
@@ -164,7 +164,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
     return None
 
 
-def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
+def _folders_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
     """Return the places where the module of a ``module:Class`` may lie."""
     file = f"{flat.use.partition(':')[0].replace('.', '/')}.py"
     folders = dict.fromkeys(str(folder) for folder in (flat.folder, graph.folder, Path()))
