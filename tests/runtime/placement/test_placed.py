@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.loading import checked_text
+from aloft.runtime.loading import checked_file, checked_text
 from aloft.runtime.placement.placed import (
     PlacementError,
     link_rows,
