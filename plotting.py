@@ -223,7 +223,7 @@ def draw_panels(panels: Sequence[tuple[Axes, Panel]]) -> None:
 
 
 def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
-    """Panels one below the other, each as wide as a page."""
+    """Draw panels one below the other, each as wide as a page."""
     figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     draw_panels(list(zip(axes, panels, strict=True)))
@@ -231,7 +231,7 @@ def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
 
 
 def panels_svg(panels: Sequence[Panel], title: str) -> str:
-    """Panels one below the other, as the text of an SVG file."""
+    """Draw panels one below the other, as the text of an SVG file."""
     with style():
         return svg_text(panels_figure(panels, title))
 
@@ -322,7 +322,7 @@ def label_ends(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
 
 
 def spread(wanted: Sequence[float], gap: float) -> list[float]:
-    """Places near the wanted ones, in the same order, between 0 and 1 and ``gap`` apart.
+    """Spread places near the wanted ones, in the same order, between 0 and 1 and ``gap`` apart.
 
     Where there is no room for all between 0 and 1, the lowest ones go below 0.
     """

@@ -1,4 +1,4 @@
-"""``aloft blocks``: which blocks there are, and the contract of one; also as a page of Markdown, docs/blocks.md."""
+"""``aloft blocks``: all blocks, and the contract of one; also as a page of Markdown, docs/blocks.md."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def section(block: BlockReference) -> str:
 
 
 def port_table(ports: Sequence[PortReference]) -> list[str]:
-    """One row a port, its fields in the last column."""
+    """Write one row a port, its fields in the last column."""
     lines = ["| port | signal | what it is | fields |", "|---|---|---|---|"]
     for port in ports:
         text = f"{port.text} ({port.note})" if port.note else port.text
@@ -151,5 +151,5 @@ def port_table(ports: Sequence[PortReference]) -> list[str]:
 
 
 def row(cells: Sequence[str]) -> str:
-    """One row of a table, with what would end a cell escaped."""
+    """Write one row of a table, with what would end a cell escaped."""
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

@@ -1,4 +1,4 @@
-"""``aloft jump``: plans a jump that is asked for in words and runs it, in one line."""
+"""``aloft jump``: plans and runs a jump that its options describe, in one line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.learning import LearningOptions, PlannedGraph, Prepare, learn_jumps
+from .shared.learning import LearningOptions, Prepare, ReadyJump, learn_jumps
 from .shared.options import JsonBesideTables, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, rehearsal
@@ -54,7 +54,7 @@ FIELDS = {
 
 @dataclass(frozen=True)
 class JumpOptions:
-    """The jump that is asked for."""
+    """The requested jump."""
 
     rise: Annotated[str, typer.Option(help=HELP["rise"])] = ""
     forward: Annotated[str, typer.Option(help=HELP["forward"])] = ""
@@ -157,7 +157,7 @@ def planner_of(
     """Return a function that plans a task and loads its graph, with the trial and settings of the
     command line."""
 
-    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
+    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> ReadyJump:
         chosen = settings_for(changes, running)
         settings = [*own, *chosen, *further]
         loaded = load_jump(path, settings, None)
@@ -166,7 +166,7 @@ def planner_of(
         plan = library_of(loaded).find(task)
         if plan is None:
             raise AloftError(f"{task.name}: {planned['reason']}")
-        return PlannedGraph(loaded, plan)
+        return ReadyJump(loaded, plan)
 
     return prepare
 
@@ -226,7 +226,7 @@ def usual_rise(path: Path, own: Sequence[str]) -> float | None:
 
 
 def settings_for(asked: Mapping[str, float], running: TrialOptions) -> list[str]:
-    """Return the overrides of a graph for the task, the trial and what else is asked for."""
+    """Return the overrides of a graph for the task, the trial and the other options."""
     task = [f"plan.task.{key}={value!r}" for key, value in asked.items()]
     return [*trial_settings_of(running), *task, *(running.overrides or [])]
 

@@ -47,12 +47,12 @@ def plot(
 
 
 def panels_of(run: RecordedRun, name: str, start: float | None, end: float | None) -> list[Panel]:
-    """One panel for every field that ``name`` says.
+    """Make one panel for every field that ``name`` says.
 
     Raises:
         AloftError: there is no such signal or element, or nothing was recorded in that time.
     """
-    from ..runtime.loading.reading.selection import Selection, read_selection, select
+    from ..runtime.language.selection import Selection, read_selection, select
 
     known = run.signals()
     source, selection = read_selection(name) or (name, Selection())

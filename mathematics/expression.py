@@ -53,7 +53,7 @@ def parse_expression(text: str, known: Iterable[str]) -> ParsedExpression:
     """Parse the expression ``text``, in which the names ``known`` may occur.
 
     Raises:
-        ValueError: it cannot be read, or holds something that is not allowed; the text says what.
+        ValueError: it cannot be read, or holds something that is not allowed; the text names it.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval").body

@@ -54,7 +54,7 @@ def expand(function: Any) -> None:
     """Replace the equations of a kernel by loops, if that has not been done.
 
     Raises:
-        EquationError: a statement cannot be rewritten; the text says where and why.
+        EquationError: a statement cannot be rewritten; the text gives place and reason.
     """
     if id(function) not in _expanded and is_kernel(function) and function.__closure__ is None:
         code = written_code(function)

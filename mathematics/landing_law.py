@@ -8,11 +8,11 @@ q', and the centroidal momentum matrix A,
     k = A_kw w + A_kq q'          so  w = W k - B q',               W = A_kw^-1, B = W A_kq
     p_i' - c' = D_i w + E_i q'    so  p_i' - c' = D_i W k + G_i q',  G_i = E_i - D_i B
 
-where p_i is a contact point, D_i = J_i,w - A_lw / m and E_i = J_i,q - A_lq / m. G is the generalised
-Jacobian of robots that float in space. It says by which joint motion the feet go where they should,
-and thus how far the base turns on the way. BRUCE's legs are two thirds of its mass: feet that keep
-their place in the world move by 33 mm in the base for every 0.1 rad that the base turns, and that
-turns it by 0.07 rad more.
+where p_i is a contact point, D_i = J_i,w - A_lw / m and E_i = J_i,q - A_lq / m. G is the
+generalised Jacobian of robots that float in space. It gives the joint motion that moves the feet
+where they should go, and thus how far the base turns on the way. BRUCE's legs are two thirds of its
+mass: feet that keep their place in the world move by 33 mm in the base for every 0.1 rad that the
+base turns, and that turns it by 0.07 rad more.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ WIDE = 200
 
 
 def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
-    """Rich's console on standard output, or on standard error where JSON goes to the former."""
+    """Return Rich's console on standard output, or on standard error where JSON goes to the former."""
     from rich.console import Console
 
     made = Console(stderr=to_stderr, quiet=quiet, highlight=False)
@@ -69,7 +69,7 @@ def number(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """``value`` as JSON can hold it: numbers that are not finite become null."""
+    """Convert ``value`` to one that JSON can hold: numbers that are not finite become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -173,7 +173,7 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
 
 
 MANY_KERNELS = 10
-"""Fewer are compiled in some seconds, of which nobody need be told."""
+"""Least number of kernels whose compilation is announced; fewer take some seconds only."""
 
 
 @contextmanager

@@ -150,7 +150,7 @@ def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One line for every task of the command line."""
+    """Make one line for every task of the command line."""
     cells = []
     for row in rows:
         figures = row.get("figures", {})
@@ -181,7 +181,7 @@ def listed_row(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def listing(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One line for every kept plan."""
+    """Make one line for every kept plan."""
     cells = []
     for row in rows:
         asked = [f"{100 * (row['asked'].get(name) or 0.0):.4g}" for name in

@@ -56,13 +56,13 @@ class RecordOptions:
 
 
 def require_one_or_many(running: TrialOptions, recording: RecordOptions) -> None:
-    """Raise ``AloftError`` where many seeds are to be run, and something is asked for one run only."""
+    """Raise ``AloftError`` where many seeds are to be run with an option for one run only."""
     if running.seeds and (recording.record is not None or running.seed):
         raise AloftError("--seeds runs many seeds and records nothing: leave out --seed, --record")
 
 
 def trial_settings_of(running: TrialOptions) -> list[str]:
-    """Return the overrides of a graph for the trial that is asked for, before the user's own."""
+    """Return the overrides of a graph for the requested trial, before the user's own."""
     from ...files.nodes import text_of
     from ...studies.rehearsal import trial_settings
 

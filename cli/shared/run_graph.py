@@ -276,13 +276,13 @@ class CrashReporter:
         self._as_json = as_json
 
     def open(self, bound: BoundGraph) -> None:
-        """Nothing to prepare."""
+        """Prepare nothing."""
 
     def record(self, tick: int) -> None:
-        """Nothing to record."""
+        """Record nothing."""
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Close nothing."""
 
     def abandoned(self, result: RunResult) -> None:
         """Print the result."""

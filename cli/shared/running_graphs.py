@@ -100,7 +100,7 @@ class LocalRun:
 
 @contextmanager
 def registered(graph: Path, settings: Sequence[str]) -> Iterator[None]:
-    """While the context lasts, the run of ``graph`` with these settings can be found.
+    """Make the run of ``graph`` with these settings one that can be found while the context lasts.
 
     Raises:
         AloftError: the user's folder cannot be used.
@@ -200,8 +200,8 @@ def observer_of(
             clear which run is meant.
     """
     from ...runtime.links.observer import Observer
-    from ...runtime.loading import load
-    from ...runtime.placement.placed import place
+    from ...runtime.loading import checked_file
+    from ...runtime.placement.placed import split_over_machines
 
-    placed = place(load(graph, [*settings_of(graph, process), *overrides]))
+    placed = split_over_machines(checked_file(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, keys, name)

@@ -35,8 +35,8 @@ class Setting(NamedTuple):
 
 
 def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
-    """Every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``, ``default``, what the trial
-    sets (``trial``, ``None`` if nothing) and ``source``.
+    """Return every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``,
+    ``default``, the trial's value (``trial``, ``None`` if it sets nothing) and ``source``.
 
     Groups are those of the simulator's parameters that ``hal/simulated/effects.py`` declares. Of its other
     parameters those count as effects that the trial sets.

@@ -49,7 +49,7 @@ class RunMaker:
         self._successes = 0
 
     def __call__(self, runs: Sequence[Run]) -> list[Run]:
-        """All runs with their outcomes."""
+        """Make all runs and return them with their outcomes."""
         from ...studies.execution import make_runs
 
         self.asked += runs

@@ -145,7 +145,7 @@ class MountedSensor(Sensor):
 
     Args:
         name: of the sensor, and of the robot's output.
-        part: the sensor's entry in the description.
+        mount: the sensor's entry in the description.
 
     Raises:
         SensorError: the entry sets something that this kind of sensor does not have.

@@ -1,4 +1,4 @@
-"""``aloft bench``: how fast the runtime is, as ratios to peers in the same process."""
+"""``aloft bench``: the speed of the runtime, as ratios to peers in the same process."""
 
 from __future__ import annotations
 

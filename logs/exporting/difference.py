@@ -1,4 +1,4 @@
-"""The differences between two recordings: which signals differ most, where, and by how much."""
+"""The differences between two recordings: the signals that differ most, with place and size."""
 
 from __future__ import annotations
 

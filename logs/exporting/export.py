@@ -160,7 +160,7 @@ def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
 
 
 def _rgba(color: int) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha of 0xRRGGBB."""
+    """Return red, green, blue and alpha of 0xRRGGBB."""
     red, green, blue = (byte / 255.0 for byte in color.to_bytes(3, "big"))
     return red, green, blue, 1.0
 
@@ -340,7 +340,7 @@ def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
 
 
 def _json_messages(fields: Sequence[RecordedField], batch: RecordedRows) -> Iterator[Timed]:
-    """One message a tick with all fields of a port."""
+    """Yield one message a tick with all fields of a port."""
     instants = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
     lists = {field.field_name: batch.signal(field.name).tolist() for field in fields}
     for k, instant in enumerate(instants):

@@ -29,7 +29,7 @@ MOST_CARRIED = 1 << 24
 
 
 def parameter_files(graph: CheckedGraph) -> dict[str, Path]:
-    """Every file that a parameter names, by its entry.
+    """Return every file that a parameter names, by its entry.
 
     A file is looked for beside the graph, and then among the shipped graphs.
     """

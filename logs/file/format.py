@@ -120,7 +120,8 @@ class RecordedLayout:
         return Layout(slots, dict(self.lengths), dict(self.offsets), self.size)
 
     def schema_hash(self) -> str:
-        """16 hexadecimal digits that are equal for equal names, types, shapes, units and frames."""
+        """Return 16 hexadecimal digits that are equal for equal names, types, shapes, units and
+        frames."""
         parts = [[f.name, f.dtype, f.start, f.shape, f.unit, f.frame] for f in self.fields]
         return blake2b(json.dumps(parts).encode(), digest_size=8).hexdigest()
 
@@ -262,11 +263,11 @@ class RecordedRows:
     layout: Layout
 
     def fields(self) -> list[RecordedField]:
-        """Every field of every output, in file order."""
+        """Return every field of every output, in file order."""
         return [entry for entry in self.header.bus.fields if not entry.constant]
 
     def signal(self, name: str) -> NDArray[Any]:
-        """One field at every tick, (n, ...). Raises ``KeyError``."""
+        """Return one field at every tick, (n, ...). Raises ``KeyError``."""
         return self.layout.view(self.rows, name)
 
 
@@ -283,7 +284,8 @@ def nanoseconds(base_rate: float, ticks: NDArray[np.int64]) -> NDArray[np.int64]
 
 
 def spans(ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in order."""
+    """Return first and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in
+    order."""
     ends = np.flatnonzero(np.diff(ticks) != 1)
     first = np.concatenate([ticks[:1], ticks[ends + 1]])
     return np.stack([first, np.concatenate([ticks[ends], ticks[-1:]])], axis=1)
@@ -298,6 +300,6 @@ def time_columns(header: Header, ticks: NDArray[np.int64]) -> list[Any]:
 
 
 def timed(header: Header, ticks: NDArray[np.int64], texts: Sequence[str]) -> list[str]:
-    """Texts with the time before each, as the viewer's own column of times is too narrow for them."""
+    """Write the time before each text, as the viewer's own column of times is too narrow for them."""
     times = (ticks / header.base_rate).tolist()
     return [f"{time:.3f} s  {text}" for time, text in zip(times, texts, strict=True)]

@@ -103,14 +103,14 @@ def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
 
 
 def recorded_signals(bound: BoundGraph) -> tuple[RecordedField, ...]:
-    """All fields of the bus."""
+    """Return all fields of the bus."""
     graph = bound.graph
     declared = {**dict(_outputs(graph)), **dict(_constants(graph))}
     return _recorded(bound.memory.bus.layout, declared, _carried(graph)).fields
 
 
 def recorded_states(bound: BoundGraph) -> tuple[RecordedField, ...]:
-    """All fields of the declared state."""
+    """Return all fields of the declared state."""
     return _recorded(bound.memory.state.layout, dict(_states(bound.graph))).fields
 
 

@@ -154,7 +154,8 @@ def closing(place: int, index: bytes, number: int) -> bytes:
 
 
 def split(data: bytes) -> Iterator[tuple[int, bytes, bytes]]:
-    """Places, heads and bodies of the messages of a Rerun file in memory; the closing one is last."""
+    """Yield places, heads and bodies of the messages of a Rerun file in memory; the closing one is
+    last."""
     place = FILE_HEAD
     kind = ARROW
     while kind != END and place + HEAD.size <= len(data):
@@ -353,7 +354,7 @@ def index_of(file: BinaryIO, found: Scan) -> bytes:
 
 
 def table_of(body: bytes) -> tuple[str, Any]:
-    """Entity and Arrow record batch that a message of kind ``ARROW`` holds.
+    """Read entity and Arrow record batch that a message of kind ``ARROW`` holds.
 
     Raises:
         ValueError: it is not what Rerun writes.
@@ -421,7 +422,8 @@ def expect_intact(found: Scan) -> None:
 def tables(
     found: Scan, content: Content, entity: str, *, static: bool = False
 ) -> Iterator[tuple[str, Any]]:
-    """Entity and Arrow record batch of all tables of an entity, or of those below ``entity/**``.
+    """Yield entity and Arrow record batch of all tables of an entity, or of those below
+    ``entity/**``.
 
     Raises:
         RecordingError: a message holds something else than Rerun writes.
@@ -433,7 +435,7 @@ def tables(
 
 
 def located(found: Scan, content: Content) -> Iterator[tuple[FileMessage, str, Any]]:
-    """Message, entity and record batch of all messages with that content."""
+    """Yield message, entity and record batch of all messages with that content."""
     with found.path.open("rb") as file:
         for message in found.of(content):
             try:
@@ -451,7 +453,7 @@ def unreadable(found: Scan, message: FileMessage, error: Exception) -> Recording
 
 
 def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
-    """Entity and record batch of one message. Raises ``RecordingError``."""
+    """Read entity and record batch of one message. Raises ``RecordingError``."""
     assert message.kind == ARROW
     with found.path.open("rb") as file:
         try:
@@ -461,7 +463,7 @@ def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
 
 
 def all_tables(path: Path, entity: str, *, static: bool = False) -> Iterator[tuple[str, Any]]:
-    """Entity and record batch of all tables of an entity of any Rerun file; see ``tables``."""
+    """Yield entity and record batch of all tables of an entity of any Rerun file; see ``tables``."""
     found = scanned(path)
     for message in found.messages:
         if message.kind == ARROW:

@@ -100,7 +100,7 @@ class PackedRows:
     def _unpacked(
         self, message: FileMessage, batch: Any, row: int, part: tuple[int, int] | None = None
     ) -> tuple[int, NDArray[np.uint8]]:
-        """First tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
+        """Unpack first tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
         try:
             packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
@@ -133,7 +133,7 @@ class PackedRows:
         return self._all()
 
     def signal(self, field: RecordedField) -> NDArray[Any]:
-        """One field at every tick, (ticks, ...), unpacked by several threads."""
+        """Read one field at every tick, (ticks, ...), unpacked by several threads."""
         found = self._all(self._header.bus.layout().byte_range(field.name))
         return found.view(field.dtype).reshape(len(found), *field.shape)
 
@@ -199,12 +199,12 @@ class RecordedRun:
         return PackedRows(self.scan, self.header)
 
     def signals(self) -> Mapping[str, RecordedField]:
-        """Every recorded signal by ``block.port.field``, with unit, frame, shape and text."""
+        """Return every recorded signal by ``block.port.field``, with unit, frame, shape and text."""
         return {field.name: field for field in self.header.bus.fields if not field.constant}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """One signal at every recorded tick, (ticks, ...), in its own dtype. A port of one field
-        may stand for its field, as in wires.
+        """Return one signal at every recorded tick, (ticks, ...), in its own dtype. A port of one
+        field may stand for its field, as in wires.
 
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
@@ -220,7 +220,7 @@ class RecordedRun:
 
     @cached_property
     def _asked(self) -> set[str]:
-        """The signals that were asked for; nothing depends on their order."""
+        """The requested signals; nothing depends on their order."""
         return set()
 
     def nearest(self, name: str) -> NoReturn:
@@ -264,8 +264,8 @@ class RecordedRun:
         return self._source.rows()
 
     def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[TickRows]:
-        """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
-        a time and each read from the file when it is asked for."""
+        """Yield ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some
+        hundred at a time and each read from the file when it is asked for."""
         ticks = self.ticks
         if not len(ticks):
             return iter(())
@@ -273,7 +273,8 @@ class RecordedRun:
         return self._source.pieces(low, int(ticks[-1]) + 1 if last is None else last)
 
     def batches(self, least: int = 1) -> Iterator[RecordedRows]:
-        """All ticks in order, at least ``least`` at a time but for the last batch; none is kept."""
+        """Yield all ticks in order, at least ``least`` at a time but for the last batch; none is
+        kept."""
         waiting: list[TickRows] = []
         for piece in self.pieces():
             waiting.append(piece)

@@ -1,4 +1,4 @@
-"""Repairs a recording in place: what is not intact is taken out, and the file is closed.
+"""Repairs a recording in place: removes messages that are not intact, and closes the file.
 
 Nothing of this needs room on the disk, except the sixteen bytes that close the file. What stands
 behind damage is moved forward, message by message. A file that had an index has one afterwards; one

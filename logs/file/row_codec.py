@@ -82,7 +82,7 @@ def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uin
 
 
 def _head(data: bytes) -> tuple[bytes, int, int, int, int]:
-    """Mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
+    """Read mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
     if len(data) < _HEAD.size + _SIZES.size or data[:4] != _MARK:
         raise ValueError("these bytes are no packed rows")
     mark, count, size, first, crc = _HEAD.unpack_from(data)

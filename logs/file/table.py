@@ -36,11 +36,11 @@ class SignalSource(Protocol):
         """Raise the ``KeyError`` that names the signals nearest to a wrong name."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """One signal at every tick, (ticks, ...)."""
+        """Return one signal at every tick, (ticks, ...)."""
 
 
 def flat_columns(run: SignalSource, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
-    """``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
+    """Return ``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
 
     Args:
         run: the recording.

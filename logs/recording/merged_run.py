@@ -180,7 +180,7 @@ def merge_recordings(
 
 
 def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
-    """Ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
+    """Yield ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
     whole = _whole_bus(placed, parts)
     first, *others = (part.ticks for part in parts.values())
     common = first

@@ -370,7 +370,7 @@ class Recorder:
 
 
 def _no_room(kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
-    """Stands for the ring of a recorder that is given up."""
+    """Stand in for the ring of a recorder that is given up."""
     return False
 
 

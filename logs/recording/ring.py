@@ -141,7 +141,7 @@ class RingWriter(_Ring):
 
 @dataclass(frozen=True)
 class Record:
-    """One record; ``data`` is a view of the ring that is good until the next one is asked for."""
+    """One record; ``data`` is a view of the ring that is valid until the next one is requested."""
 
     kind: int
     tick: int
@@ -156,7 +156,8 @@ class RingReader(_Ring):
         self._tail = self._sequence = 0
 
     def records(self) -> Iterator[Record]:
-        """All records there are now, each given back to the writer when the next is asked for."""
+        """Yield all records there are now, each given back to the writer when the next is asked
+        for."""
         head = self._counters[0]
         with self._fence:
             pass

@@ -61,7 +61,7 @@ class RecordingWriter:
         path: the file; its folder is made.
         header: what is known before the first tick.
         recording_id: by default the graph's name; recordings of one run hold the same data.
-        place: where to write, if that was settled before.
+        output: the file reserved for it, if that was done before.
 
     Attributes:
         recorded: the number of ticks in the file.

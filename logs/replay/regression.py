@@ -146,7 +146,7 @@ def _setting(recorded: Replayable, spec: BlockSpec, first: int, last: int) -> Se
 def _columns(
     layout: Layout, rows: Any, sources: Mapping[str, str], fields: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Every field of some ports over all rows, by ``port.field``."""
+    """Return every field of some ports over all rows, by ``port.field``."""
     return {
         f"{port}.{name}": np.ascontiguousarray(layout.view(rows, f"{source}.{name}"))
         for port, source in sources.items()
@@ -218,7 +218,7 @@ def _names_files(parameters: Mapping[str, Any], folder: Path) -> bool:
 
 
 def _as_code(value: Any, indent: str = "") -> str:
-    """Plain data as readable Python, with each entry of a mapping on its own line."""
+    """Write plain data as readable Python, with each entry of a mapping on its own line."""
     if not isinstance(value, dict) or not value:
         return json.dumps(value) if isinstance(value, str) else repr(value)
     inner = f"{indent}    "

@@ -134,7 +134,7 @@ class Keyframes:
             self.snapshots[tick + 1] = Snapshot(tick + 1, taken.bus, taken.state)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 def late_blocks(notes: Iterable[Note]) -> tuple[str, ...]:
@@ -180,7 +180,7 @@ PIECE = 256
 
 
 class ReplayError(AloftError):
-    """Raised if a recording cannot be replayed in the way that was asked for."""
+    """Raised if a recording cannot be replayed as requested."""
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ def replay(
 
 
 def default_inputs(graph: CheckedGraph) -> Inputs:
-    """``seed`` if the run can be repeated from its seed, ``recorded`` otherwise."""
+    """Return ``seed`` if the run can be repeated from its seed, ``recorded`` otherwise."""
     real = any(spec.block_type.outside == "real" for spec in graph.blocks)
     return "recorded" if real else "seed"
 
@@ -459,7 +459,7 @@ class Follower:
             self._before_tick(self._bound, tick)
 
     def _restore(self, keyframe: Snapshot) -> None:
-        """Bus and state of a keyframe, as far as this graph has the same."""
+        """Restore bus and state of a keyframe, as far as this graph has the same."""
         memory = self._bound.memory
         bus = np.frombuffer(keyframe.bus, np.uint8)
         state = np.frombuffer(keyframe.state, np.uint8)

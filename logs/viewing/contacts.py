@@ -132,7 +132,7 @@ class ContactDisplay(SceneDisplay):
 
 
 def cone_lines(friction: float, height: float) -> Array:
-    """One line (n, 3) that draws a friction cone on its tip: a ring with four sides to the tip."""
+    """Draw one line (n, 3) of a friction cone on its tip: a ring with four sides to the tip."""
     angles = np.linspace(0.0, 2.0 * np.pi, CONE_SIDES + 1)
     ring = np.column_stack([np.cos(angles), np.sin(angles), np.full(len(angles), 1.0 / friction)])
     ring *= friction * height

@@ -1,4 +1,4 @@
-"""Serves the page of Rerun's web viewer so that a browser which shows it calls nobody outside.
+"""Server of the page of Rerun's web viewer, which makes no browser call another machine.
 
 Rerun's page asks for fonts from Google, and the viewer in it for usage statistics and the newest
 version. This server hands the page on without those links, and with a Content-Security-Policy that

@@ -47,7 +47,7 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
 
 
 def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
-    """Each value with both signs."""
+    """Return each value with both signs."""
     signed = (
         (f"{sign}{name}", factor * v) for v in values for sign, factor in (("+", 1), ("-", -1))
     )
@@ -55,7 +55,7 @@ def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
 
 
 def _once(named: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
-    """Each value once, with the name it had first. What is not finite limits nothing."""
+    """Return each value once, with the name it had first. What is not finite limits nothing."""
     found: dict[float, tuple[str, float]] = {}
     for name, value in named:
         if np.isfinite(value):
@@ -102,7 +102,7 @@ class PlotLine:
 
 
 def plot(header: Header, name: str, lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> Any:
-    """One plot of several fields of the same unit, for all runs."""
+    """Make one plot of several fields of the same unit, for all runs."""
     import rerun.blueprint as rrb
 
     if len(shown) > 1 and len(lines) > 1:
@@ -239,7 +239,7 @@ def _named(line: PlotLine) -> PlotLine:
 
 
 def block_tabs(header: Header, shown: Sequence[ShownRun]) -> list[Any]:
-    """One tab a block, in it all its signals but for large matrices.
+    """Make one tab a block, in it all its signals but for large matrices.
 
     A block with more plots than fit has a tab in its tab for each port, or for each few plots.
     """

@@ -380,7 +380,7 @@ class TerrainDisplay(SceneDisplay):
         self.log(name, mesh)
 
     def write(self, moments: Moments) -> None:
-        """Nothing: the ground does not move."""
+        """Write nothing: the ground does not move."""
 
 
 DISPLAYS = (

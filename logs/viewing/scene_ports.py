@@ -46,7 +46,7 @@ ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IM
 OTHERS = (
     "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
     "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
-    "PhaseState", "PlaceMeasurement", "PlanSegment", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
+    "PhaseState", "PoseMeasurement", "PlanSegment", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
     "SwitchHealth", "ThrustCommand", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
@@ -64,8 +64,8 @@ class PoseSource:
     joint_position: str
 
     def base(self, values: Callable[[str], Array], count: int) -> tuple[Array, Array]:
-        """Positions (count, 3) and quaternions (count, 4) of the base by a signal's ``values``; a fixed one is at
-        the origin."""
+        """Return positions (count, 3) and quaternions (count, 4) of the base by a signal's
+        ``values``; a fixed one is at the origin."""
         if self.base_position is None or self.base_orientation is None:
             return np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
         return values(self.base_position), values(self.base_orientation)
@@ -112,7 +112,7 @@ Ports = Mapping[str, Mapping[str, RecordedField]]
 
 
 def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
-    """Every output as ``block.port``, with its fields by their own names.
+    """Return every output as ``block.port``, with its fields by their own names.
 
     They have the order in which their blocks are executed, so that what is measured comes before what
     is computed from it, a prediction for example. What a wire has delayed comes last.
@@ -202,7 +202,7 @@ def _contacts(
 
 
 def block_of(port: str) -> str:
-    """``wbc.command`` -> ``wbc``."""
+    """Return the block of a port: ``wbc`` of ``wbc.command``."""
     return port.rpartition(".")[0]
 
 

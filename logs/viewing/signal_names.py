@@ -12,7 +12,7 @@ from ...robots.description import RobotDescription
 from ..file.format import RecordedField
 
 MOST_NAMES = 48
-"""A matrix with more elements than this has no names, and so no plot: nobody could read it."""
+"""Largest number of elements of a matrix that has names, and so a plot: more are unreadable."""
 
 MOST_NUMBERS = 16
 """Numbers of one field in a text; of a longer one the first, and the count."""
@@ -58,7 +58,7 @@ def names_along(
 
 
 def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """One name for every element in C order, or none at all for a large matrix."""
+    """Return one name for every element in C order, or none at all for a large matrix."""
     if not field.shape:
         return [field.field_name]
     axes = [

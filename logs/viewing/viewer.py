@@ -182,7 +182,7 @@ def _listens(port: int) -> bool:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports of this machine on which nothing listens at the moment."""
+    """Find ports of this machine on which nothing listens at the moment."""
     sockets = [socket.socket() for _ in range(count)]
     try:
         for one in sockets:

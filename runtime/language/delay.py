@@ -131,7 +131,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
         (WireDelay,),
         {
             "__doc__": WireDelay.__doc__,
-            "u": Input(signal, text="what is delayed"),
+            "u": Input(signal, text="the signal to delay"),
             "y": Output(signal, text=f"the input {k} runs ago"),
             "past": State(past, text="the last inputs"),
             "delay_runs": k,

@@ -15,7 +15,7 @@
 * ``clock``: the ``tick`` and the ``base_period`` [s] of the graph; ``period``: that of the block [s];
 * an array, a number or a named tuple that ``setup`` has stored in the block under that name.
 
-A kernel step that returns ``bool`` says whether ``Block.on_event`` is to be called after it, for what
+A kernel step that returns ``bool`` decides whether ``Block.on_event`` is called after it, for what
 happens rarely and needs Python.
 
 What differs from the declarations is refused when the class is made. A kernel gets of each signal the

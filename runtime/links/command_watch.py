@@ -1,6 +1,6 @@
 """Watches the links that bring commands to actuators: silence on one of them ends in damping.
 
-It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` says
+It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` is
 and whatever the estimate of the other clock is. What it finds is used twice: a driver hands it to
 the process that watches it (``hal/bear/watchdog.py``), which damps the drives although this process
 may hang, be stopped or be killed; and a part that runs free ends its run.

@@ -35,7 +35,7 @@ class Executor:
 
     Args:
         graph: a checked graph, or a bound one.
-        clock: how to pace it; by default as the graph says.
+        clock: how to pace it; by default that of the graph.
         sinks: what records the run, beside the log and the hash.
         log: whether to keep every tick in memory.
         run_hash: whether to hash every tick.
@@ -113,7 +113,7 @@ class Executor:
         """Run the graph through its whole life: start, ticks, stop cycles, close.
 
         The run lasts ``ticks`` ticks, by default the graph's duration. SIGINT, SIGTERM and a block
-        that asks for it end the run after the present tick. The result says what ended the run,
+        that asks for it end the run after the present tick. The result has what ended the run,
         also if it was an error: see ``RunResult.raise_if_failed``.
 
         Raises:

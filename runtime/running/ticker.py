@@ -169,7 +169,7 @@ class Ticker:
         (SIGINT, SIGTERM) requests it, or when it is paused.
 
         Raises:
-            RunError: a block failed, a value is not finite or the overrun policy says stop.
+            RunError: a block failed, a value is not finite or the overrun policy is to stop.
         """
         clock = self.bound.clock
         first = tick = clock.tick

@@ -1,4 +1,4 @@
-"""``aloft robot calibrate``: what sensors, motors and joints of a robot are like, from how it sways."""
+"""``aloft robot calibrate``: the properties of a robot's sensors, motors and joints, from its swaying."""
 
 from __future__ import annotations
 

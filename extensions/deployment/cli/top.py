@@ -1,4 +1,4 @@
-"""``aloft top`` and ``aloft watch``: what the machines of a running graph do, as a table or in the viewer."""
+"""``aloft top`` and ``aloft watch``: the machines of a running graph, as a table or in the viewer."""
 
 from __future__ import annotations
 

@@ -39,14 +39,14 @@ class PlanAnswer(PlanRows):
 
 
 class OnlinePlanner(Block):
-    """Plans the jump that was asked for, and hands the plan over, a part in every run.
+    """Plans the requested jump, and hands the plan over, a part in every run.
 
     It belongs in the background (``background: {latency: 250 ms}``): a plan takes a tenth of a second on a busy machine.
     A motion is interpolated from the robot's stored plans of hops (``extensions/hopping/planner/plan_samples``), and corrected in a few steps
     until it fulfils all constraints of the whole-body problem of ``aloft plan``, on 44 knots with all coordinates
     (``extensions/hopping/planner/correction``). The plan must pass the check with exact dynamics that every plan passes. A jump out of
     reach is replaced by the nearest within it; where no motion is found, or it fails the check, the
-    nearest stored plan is the answer. ``part.outcome`` says so, and the metrics count it.
+    nearest stored plan is the answer. ``segment.outcome`` reports that, and the metrics count it.
 
     A plan follows from its request alone: the same requests give the same bytes on the same machine.
     The metrics have the times of planning.

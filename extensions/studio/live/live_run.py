@@ -29,7 +29,7 @@ from ....runtime.live.window import (
     WindowReader,
     digest,
 )
-from ....runtime.loading import LoadError, load, load_text
+from ....runtime.loading import LoadError, checked_file, checked_text
 from ....runtime.running.memory import Memory
 from .texts import ValueTexts, tick_text, time_texts
 
@@ -240,9 +240,9 @@ def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[s
         return layout, "", [spec.path for spec in graph.blocks]
     if graph.machines:
         from ....runtime.links.part import part_graph
-        from ....runtime.placement.placed import place
+        from ....runtime.placement.placed import split_over_machines
 
-        placed = place(graph)
+        placed = split_over_machines(graph)
         for machine in placed.machines:
             part = part_graph(placed, machine.name)
             layout = Memory(part.blocks, part.robot).bus.layout
@@ -262,10 +262,10 @@ def _load(about: dict[str, Any]) -> CheckedGraph:
         file = file.relative_to(Path.cwd())  # so that places in it are short
     if file.is_file():
         try:
-            graph = load(file, about["overrides"])
+            graph = checked_file(file, about["overrides"])
         except LoadError:
             pass
         else:
             if graph.text == text:
                 return graph
-    return load_text(text, file)
+    return checked_text(text, file)

@@ -1,4 +1,4 @@
-"""The planner's success on jumps that nobody chose: tasks that are drawn by a seed.
+"""The planner's success on random jumping tasks, drawn by a seed.
 
 The range, uniform and independent unless said; all is for BRUCE's real actuators and the usual recipe:
 
@@ -40,7 +40,7 @@ from ..rows import Row
 
 COUNT, SEED = 200, 1
 MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
-"""s of processor time"""
+"""Processor time of planning [s]: the median's, that of 95 % of the tasks, and the worst."""
 MISSED_GOAL = 0.05
 """The largest good share of tasks without a valid plan."""
 
@@ -116,8 +116,8 @@ _HARDER: dict[str, Any] = {
 
 
 def random_rows(count: int = COUNT, seed: int = SEED) -> list[Row]:
-    """Rows: the share of tasks without a valid plan, and the CPU time of a valid one, from nothing
-    to checked, refined where the check asked for it."""
+    """Measure the share of tasks without a valid plan, and the CPU time of a valid one, from
+    nothing to checked, refined where the check asked for it."""
     robot = find_robot("bruce")
     seconds, missed = [], list[str]()
     for task in random_tasks(count, seed):

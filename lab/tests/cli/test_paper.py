@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from aloft.lab.cli import paper
-from aloft.lab.figures import offscreen
 from aloft.lab.figures.paper import page
+from aloft.studies import offscreen
 from aloft.studies.reading import read_study
 
 CallJson = Callable[..., dict[str, Any]]

@@ -15,7 +15,7 @@ import quadprog
 
 import aloft
 from aloft.blocks.control.whole_body_controller import WholeBodyController
-from aloft.blocks.control.whole_body_solver import LibrarySolver
+from aloft.blocks.control.whole_body_solver import ExternalSolver
 from aloft.lab.benchmarks.full_program import FullProgram
 from aloft.mathematics.active_set import INFEASIBLE
 from aloft.mathematics.quadratic_program import QuadraticProgramSolver
@@ -79,7 +79,7 @@ class Solvers:
         self.block, self.full = block, FullProgram(block)
         self.daqp, self.clarabel = map(QuadraticProgramSolver, ("daqp", "clarabel"))
         program, reduction, *_, solution = block._solve.arguments
-        self.reduced = LibrarySolver("daqp", "pyramid", program, reduction, solution)
+        self.reduced = ExternalSolver("daqp", "pyramid", program, reduction, solution)
 
     def set(self, state: State, stance: np.ndarray) -> None:
         block = self.block
