@@ -20,7 +20,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.capture_step import support_margin
 from ..mathematics.constants import GRAVITY
 from ..mathematics.rotations import matrices_of_quaternions
-from ..runtime.language.fault import Fault, FaultParameters
+from ..runtime.language.signal_error import SignalError, SignalErrorParameters
 from .robot_run import RobotRun
 
 Kind = Literal[
@@ -158,7 +158,9 @@ def length(vectors: Array) -> Array:
 def _faults(run: RobotRun) -> Iterator[Measure]:
     """Yield the faults that the graph declares."""
     for spec in run.run.graph.blocks:
-        if issubclass(spec.block_type, Fault) and isinstance(spec.params, FaultParameters):
+        if issubclass(spec.block_type, SignalError) and isinstance(
+            spec.params, SignalErrorParameters
+        ):
             active = run(f"{spec.path}.state", "active").astype(float)
             name = f"{spec.block_type.target} is {spec.params.kind} ({spec.path})"
             yield Measure("fault", name, active, 0.5, "")

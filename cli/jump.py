@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.learning import LearningOptions, PlannedGraph, Prepare, learn_jumps
+from .shared.learning import LearningOptions, Prepare, ReadyJump, learn_jumps
 from .shared.options import JsonBesideTables, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, rehearsal
@@ -157,7 +157,7 @@ def planner_of(
     """Return a function that plans a task and loads its graph, with the trial and settings of the
     command line."""
 
-    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
+    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> ReadyJump:
         chosen = settings_for(changes, running)
         settings = [*own, *chosen, *further]
         loaded = load_jump(path, settings, None)
@@ -166,7 +166,7 @@ def planner_of(
         plan = library_of(loaded).find(task)
         if plan is None:
             raise AloftError(f"{task.name}: {planned['reason']}")
-        return PlannedGraph(loaded, plan)
+        return ReadyJump(loaded, plan)
 
     return prepare
 

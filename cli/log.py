@@ -207,12 +207,12 @@ def merge(
         run_hash_of,
     )
     from ..logs.replay.opened_run import OpenedRun
-    from ..runtime.placement.placed import place
+    from ..runtime.placement.placed import split_over_machines
     from ..runtime.running.memory import BoundGraph
 
     with errors_reported(as_json):
         runs = {file: read(file) for file in files}
-        placed = place(OpenedRun.of(files[0]).graph)
+        placed = split_over_machines(OpenedRun.of(files[0]).graph)
         paths: dict[str, Path] = {}
         for file, run in runs.items():
             machine = machine_of(placed, run)

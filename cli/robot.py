@@ -59,7 +59,7 @@ def show(
     """Print the tree, masses, limits, motors, feet and sensors of a robot, and what is missing."""
     from ..robots.report import report
 
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         found = _read(name)
         about = report(found)
         if picture is not None:
@@ -79,7 +79,7 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
     """Look for what seems wrong: masses, inertias, axes, limits, sides, standing torque, bandwidth."""
     from ..studies import check_up as looking
 
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         found = looking.check_up(_read(name).description)
     if as_json:
         print_json({"success": True, **found})
@@ -128,7 +128,7 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Write the short YAML beside a URDF or MJCF file, filled with what can be found or guessed."""
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         target, text, notes = _imported(file, out, force)
         try:
             target.write_text(text, encoding="utf-8")
@@ -153,7 +153,7 @@ def export(
     urdf: Annotated[bool, typer.Option("--urdf", help="As a URDF, which is the default.")] = True,
 ) -> None:
     """Write a robot as a URDF: links, joints, shapes, contact points, effort and speed limits."""
-    with _faults_reported(False):
+    with _description_errors_reported(False):
         from ..robots.urdf_export import hull_meshes, urdf_of
 
         described = _read(name).description
@@ -179,8 +179,8 @@ def export(
 
 
 @contextmanager
-def _faults_reported(as_json: bool) -> Iterator[None]:
-    """Report errors as ``errors_reported`` does; a robot's faults are printed one by one, or listed
+def _description_errors_reported(as_json: bool) -> Iterator[None]:
+    """Report errors as ``errors_reported`` does; a robot's errors are printed one by one, or listed
     in the JSON."""
     from ..robots.validation import RobotError
 
@@ -193,16 +193,16 @@ def _faults_reported(as_json: bool) -> Iterator[None]:
             if not as_json:
                 print_error(str(error))
                 raise typer.Exit(ExitCode.BAD_INPUT) from error
-            faults = [
+            errors = [
                 {
-                    "file": fault.file or error.file, "line": fault.line, "column": fault.column,
-                    "path": list(fault.path), "message": fault.message,
-                    "expected": fault.expected, "found": fault.found, "fix": fault.fix,
+                    "file": description_error.file or error.file, "line": description_error.line, "column": description_error.column,
+                    "path": list(description_error.path), "message": description_error.message,
+                    "expected": description_error.expected, "found": description_error.found, "fix": description_error.fix,
                 }
-                for fault in error.faults
+                for description_error in error.errors
             ]  # fmt: skip
             headline = str(error).splitlines()[-1]
-            print_json({"success": False, "reason": headline, "faults": faults})
+            print_json({"success": False, "reason": headline, "errors": errors})
             raise typer.Exit(ExitCode.BAD_INPUT) from error
 
 

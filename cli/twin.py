@@ -47,7 +47,7 @@ def twin(
     """
     from ..hal.bear.configuration import Hardware
     from ..hal.simulated.simulated_robot import SimulatorParameters
-    from ..hal.twin.faults import read_fault
+    from ..hal.twin.injected_faults import read_fault
     from ..hal.twin.server import TwinServer
     from ..hal.twin.twin import standing_twin
     from ..robots.description import RobotError, find_robot
@@ -103,7 +103,7 @@ def _settings(texts: list[str]) -> dict[str, object]:
     import yaml
 
     from ..hal.simulated.simulated_robot import SimulatorParameters
-    from ..robots.validation.faults import nearest
+    from ..robots.validation.errors import nearest
 
     found: dict[str, object] = {}
     for text in texts:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..runtime.language.errors import AloftError
 
 
-class Library:
+class SharedLibrary:
     """One instance of a library, in memory of its own.
 
     Args:

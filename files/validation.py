@@ -311,7 +311,7 @@ def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, E
     return tuple(steps), node, entry
 
 
-def place_of(root: MapNode, path: Sequence[str | int]) -> Position:
+def location_of(root: MapNode, path: Sequence[str | int]) -> Position:
     """Return the place of the value at a path, or of the nearest thing that holds it."""
     return locate(root, path)[1].where
 

@@ -133,7 +133,7 @@ def move_bodies(tree: BodyTree, speed: Array1D, motion: BodyMotion) -> None:
 
 
 @kernel
-def place_of(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> None:
+def point_position(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> None:
     """Compute the place (3,) of a body's point that is at ``local`` (3,) in the body's frame
     [m]."""
     x, y, z = local[0], local[1], local[2]
@@ -248,7 +248,7 @@ def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: 
     """Compute a body's own inertia, and the force that gives it its acceleration: f = I a + v x* I
     v."""
     mass = tree.mass[body]
-    place_of(motion, body, tree.com[body], own.centre)
+    point_position(motion, body, tree.com[body], own.centre)
     x, y, z = own.centre[0], own.centre[1], own.centre[2]
     own.mass[body] = mass
     own.moment[body, 0], own.moment[body, 1], own.moment[body, 2] = mass * x, mass * y, mass * z

@@ -36,7 +36,7 @@ from .body_dynamics import (
     momentum_of,
     move_bodies,
     place_bodies,
-    place_of,
+    point_position,
     velocity_at,
 )
 from .constants import GRAVITY
@@ -188,7 +188,7 @@ def point_terms(
     """Places and velocities of the points in the world at instant ``i``."""
     for k in range(fixed.body.shape[0]):
         body, point = fixed.body[k], out.points[i, k]
-        place_of(motion, body, fixed.place[k], point)
+        point_position(motion, body, fixed.place[k], point)
         point[2] = point[2] - fixed.below[k]
         velocity_at(motion, body, point, out.point_velocity[i, k])
         for axis in range(3):

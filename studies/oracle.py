@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..hal.random_streams import Purpose, stream
-from ..hal.simulated.imu_effects import draw_delays, draw_place
+from ..hal.simulated.imu_effects import draw_delays, draw_imu_pose
 from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..hal.simulated.variation import draw_variation
 from ..mathematics.arrays import Array
@@ -66,7 +66,7 @@ def oracle_values(
 def _imu(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    place, angle = map(np.array, draw_place(params.imu, params.seed))
+    place, angle = map(np.array, draw_imu_pose(params.imu, params.seed))
     return {
         "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
         "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),

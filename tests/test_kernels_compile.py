@@ -54,7 +54,7 @@ NOT_HOT = {
     "mathematics.linear_algebra.product": "before a run, when tables are made",
     "mathematics.compiling.expressions.cross": "stands for loops in an equation",
     "mathematics.compiling.chain_code.rows_of": "a view, when calls are bound",
-    "mathematics.compiling.library_call._caller": "makes machine code, when calls are bound",
+    "mathematics.compiling.foreign_call._caller": "makes machine code, when calls are bound",
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",
     "mathematics.body_dynamics.inertias": "memory, when a block is set up",
     "mathematics.body_dynamics.body_motion": "memory, when a block is set up",

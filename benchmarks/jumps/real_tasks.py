@@ -102,7 +102,7 @@ def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
         RANDOM: AskedJump(random_task(seed), times=4),
         PUSH: AskedJump({"rise": 0.12}, "push_12cm.yaml", 1, {"push.angle": angle}),
         TEN: AskedJump(ten, "hops.yaml", 1),
-        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/place_sensor.yaml"),
+        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/pose_sensor.yaml"),
     }
 
 

@@ -30,8 +30,8 @@ from ...runtime.links.free_link import LatestReceiver, LinkHealth
 from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
-from ...runtime.loading import load_text
-from ...runtime.placement.placed import MachineLink, PlacedGraph, place
+from ...runtime.loading import checked_text
+from ...runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from ...runtime.running.memory import Memory
 from ...runtime.transports.transport import Transport, data_key
 from ...runtime.transports.zenoh_transport import ZenohTransport
@@ -89,7 +89,7 @@ blocks:
 {there}
   end: {{use: blocks.Gain, with: {{n: {NUMBERS}}}, in: {{u: reader0.y}}}}
 """
-    return place(load_text(text, Path("links.yaml")))
+    return split_over_machines(checked_text(text, Path("links.yaml")))
 
 
 class _Known:

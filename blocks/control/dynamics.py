@@ -20,8 +20,8 @@ from ...mathematics.body_dynamics import (
     momentum_of,
     move_bodies,
     place_bodies,
-    place_of,
     point_jacobian,
+    point_position,
     velocity_at,
 )
 from ...mathematics.compiling.equations import cross
@@ -440,11 +440,11 @@ def write_contacts(
         if radius >= 0.0:
             lowest_point(constants.centre[point], radius, motion.rotation[body], local)
             scratch.sole[foot, :] = local
-        place_of(motion, body, local, place)
+        point_position(motion, body, local, place)
         velocity_at(motion, body, place, terms.contact_velocity[point])
         acceleration_at(motion, body, place, terms.contact_drift[point])
         if radius >= 0.0:
-            place_of(motion, body, constants.centre[point], centre)
+            point_position(motion, body, constants.centre[point], centre)
             rolling_drift(motion, body, centre, place, terms.contact_drift[point])
         point_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
         terms.contact_position[point, :] = terms.base_position + place
@@ -460,6 +460,6 @@ def write_soles(
     """Write the places and rotations of the soles."""
     for foot in range(constants.foot_body.shape[0]):
         body = constants.foot_body[foot]
-        place_of(motion, body, scratch.sole[foot], scratch.place)
+        point_position(motion, body, scratch.sole[foot], scratch.place)
         terms.foot_position[foot, :] = terms.base_position + scratch.place
         terms.foot_rotation[foot, :, :] = motion.rotation[body]

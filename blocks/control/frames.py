@@ -14,8 +14,8 @@ from ...mathematics.body_dynamics import (
     body_motion,
     move_bodies,
     place_bodies,
-    place_of,
     point_jacobian,
+    point_position,
     rotation_jacobian,
     velocity_at,
 )
@@ -120,7 +120,7 @@ def update_frame(
 ) -> None:
     """Update the motion and the Jacobian of the point ``local`` [m] of a body that ``move_model`` has moved."""
     place = frame.position
-    place_of(motion, body, local, place)
+    point_position(motion, body, local, place)
     velocity_at(motion, body, place, frame.velocity[0:3])
     acceleration_at(motion, body, place, frame.drift[0:3])
     point_jacobian(tree, motion, body, place, frame.jacobian[0:3, :])

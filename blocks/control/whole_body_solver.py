@@ -44,7 +44,7 @@ def solver_call(
 ) -> KernelCall | PythonCall:
     """Return the call that writes the solution of the program that ``reduce_program`` has reduced."""
     if name != ACTIVE_SET:
-        return PythonCall(LibrarySolver(name, cones, program, reduction, solution).solve, ())
+        return PythonCall(ExternalSolver(name, cones, program, reduction, solution).solve, ())
     n, n_contacts = len(solution.acceleration), len(solution.force)
     if cones == "round":
         own = active_set_program(n, n_contacts, PLANES)
@@ -82,7 +82,7 @@ def fallback_call(
     return KernelCall(solve_with_pyramids, inside, reduction, pyramids, solution)
 
 
-class LibrarySolver:
+class ExternalSolver:
     """A library's solver on the reduced program, see ``whole_body_reduction``."""
 
     def __init__(

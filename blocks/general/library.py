@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clib.library import Library as Instance
+from ...clib.library import SharedLibrary as Instance
 from ...clib.library import description_in, read_description
-from ...clib.remote_library import RemoteLibrary
+from ...clib.remote_library import RemoteSharedLibrary
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import AloftError, BlockError
@@ -20,7 +20,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal, signal_of
 
 
-class LibraryState(Signal):
+class CLibraryState(Signal):
     """The state of a library."""
 
     steps = Field(dtype="int64", text="the steps that were made")
@@ -29,7 +29,7 @@ class LibraryState(Signal):
     )
 
 
-class LibraryParameters(Parameters):
+class CLibraryParameters(Parameters):
     """The library to run, and the way to run it."""
 
     folder: str = parameter(
@@ -43,12 +43,12 @@ class LibraryParameters(Parameters):
     )
 
 
-class LibraryBlock(Block):
+class CLibraryBlock(Block):
     """A block whose ports are those of a library."""
 
-    Params = LibraryParameters
-    params: LibraryParameters
-    state = State(LibraryState, text="state of the library")
+    Params = CLibraryParameters
+    params: CLibraryParameters
+    state = State(CLibraryState, text="state of the library")
     about: ClassVar[Mapping[str, Any]] = {}
     """The content of the library's description."""
 
@@ -57,7 +57,7 @@ class LibraryBlock(Block):
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a library that cannot run here, or not at this rate."""
-        assert isinstance(params, LibraryParameters)
+        assert isinstance(params, CLibraryParameters)
         try:
             about = _read(params, context.folder)
         except AloftError as error:
@@ -92,9 +92,9 @@ class LibraryBlock(Block):
         """Make an instance of the library, and bind its terminals to the ports."""
         description = description_in(self.context.folder / self.params.folder)
         self.files_read = (description, description.with_name(f"lib{self.about['name']}.so"))
-        self._instance: Instance | RemoteLibrary
+        self._instance: Instance | RemoteSharedLibrary
         if self.params.memory:
-            self._instance = RemoteLibrary(self.about, Path(self.params.memory))
+            self._instance = RemoteSharedLibrary(self.about, Path(self.params.memory))
         else:
             self._instance = Instance(description)
             for name, value in self.params.live.items():
@@ -137,14 +137,14 @@ class LibraryBlock(Block):
 
     def save_state(self) -> None:
         """Write the library's state into the block's own."""
-        if isinstance(self._instance, RemoteLibrary):
+        if isinstance(self._instance, RemoteSharedLibrary):
             return
         kept = np.frombuffer(self._instance.save(), np.uint8)
         self.state.data.view(np.uint8)[: kept.size] = kept
 
     def load_state(self) -> None:
         """Give the library its state back."""
-        if isinstance(self._instance, RemoteLibrary):
+        if isinstance(self._instance, RemoteSharedLibrary):
             if self.state.steps[()]:
                 raise BlockError(
                     f"the state of {self.about['name']} is in the process that shares {self.params.memory}: "
@@ -161,7 +161,7 @@ class LibraryBlock(Block):
         ]
 
 
-class Library(LibraryBlock):
+class CLibrary(CLibraryBlock):
     """Runs a library of C that ``aloft export c`` has written, in place of the blocks that it was made of.
 
     The ports follow from its description ``NAME.json``, with shapes, units and frames: a terminal
@@ -194,7 +194,7 @@ class Library(LibraryBlock):
         graph_folder: Path | None = None,
     ) -> type[Block]:
         """Make the class with the ports of the library."""
-        assert isinstance(params, LibraryParameters)
+        assert isinstance(params, CLibraryParameters)
         try:
             return _class_for(_read(params, folder), remote=bool(params.memory))
         except AloftError as error:
@@ -213,7 +213,7 @@ class Library(LibraryBlock):
         self.state.steps[()] += 1
 
 
-class _WithoutFeedthrough(LibraryBlock):
+class _WithoutFeedthrough(CLibraryBlock):
     """A library whose outputs do not depend on its inputs at once."""
 
     _instance: Instance
@@ -232,7 +232,7 @@ class _WithoutFeedthrough(LibraryBlock):
         self.state.steps[()] += 1
 
 
-def _read(params: LibraryParameters, folder: Path) -> Mapping[str, Any]:
+def _read(params: CLibraryParameters, folder: Path) -> Mapping[str, Any]:
     return read_description(description_in(folder / params.folder))
 
 
@@ -256,13 +256,13 @@ def _class_for(about: Mapping[str, Any], *, remote: bool) -> type[Block]:
     key = repr((about, remote))
     if key not in _CLASSES:
         direct = remote or any(each["depends"] for each in about["outputs"])
-        base: Any = Library if direct else _WithoutFeedthrough
-        body: dict[str, Any] = {"__doc__": Library.__doc__, "__module__": Library.__module__}
+        base: Any = CLibrary if direct else _WithoutFeedthrough
+        body: dict[str, Any] = {"__doc__": CLibrary.__doc__, "__module__": CLibrary.__module__}
         for kind, ports in _ports(about).items():
             for name, fields in ports.items():
                 signal = signal_of("OfLibrary", {each["field"]: each for each in fields})
                 text = "; ".join(each["text"] for each in fields[:3])
                 body[name] = (Input if kind == "inputs" else Output)(signal, text=text)
-        body["about"], body["specialize"] = about, vars(Library)["specialize"]
+        body["about"], body["specialize"] = about, vars(CLibrary)["specialize"]
         _CLASSES[key] = type("Library", (base,), body)
     return _CLASSES[key]

@@ -65,7 +65,7 @@ class MotorCondition(Signal):
     pack_resistance = Field(unit="ohm", text="of the pack and its leads")
 
 
-class PlaceMeasurement(Signal):
+class PoseMeasurement(Signal):
     """Place of the base, as measured from outside."""
 
     number = Field(dtype="int64", text="counts the measurements, from 1; zero: none yet")

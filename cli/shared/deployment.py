@@ -26,7 +26,7 @@ from ...runtime.graph import load
 from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.part import part_graph
-from ...runtime.placement.placed import PlacedGraph, moves_actuators, place
+from ...runtime.placement.placed import PlacedGraph, moves_actuators, split_over_machines
 from ...runtime.running.memory import BoundGraph
 from ...runtime.transports.keys import secured
 
@@ -75,7 +75,7 @@ def deploy(
     part = checked
     problems: list[str] = []
     if machine or checked.machines:
-        placed = place(checked)
+        placed = split_over_machines(checked)
         placed.machine(machine)
         part = part_graph(placed, machine)
         if any(spec.endpoint.startswith("tls/") for spec in checked.machines):
@@ -160,7 +160,8 @@ def _destinations(graph: CheckedGraph, bound: BoundGraph, problems: list[str]) -
 
 
 def _write_graph(graph: CheckedGraph, folder: Path) -> None:
-    text = with_robot_beside(graph, graph.text, folder)
+    assert graph.resolved is not None
+    text = with_robot_beside(graph.resolved, graph.robot, folder).text
     (folder / f"{graph.name}.yaml").write_text(text, encoding="utf-8")
     for spec in graph.blocks:
         name = getattr(spec, "use", "") or spec.block_type.__module__

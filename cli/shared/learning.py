@@ -47,7 +47,7 @@ class LearningOptions:
 
 
 @dataclass(frozen=True)
-class PlannedGraph:
+class ReadyJump:
     """A graph that is ready to jump, and what its robot is to do."""
 
     graph: Graph
@@ -66,7 +66,7 @@ class Attempt:
     lesson: Lesson | None
 
 
-Prepare = Callable[[Mapping[str, float], Sequence[str]], PlannedGraph]
+Prepare = Callable[[Mapping[str, float], Sequence[str]], ReadyJump]
 """Plans a task with these changes, and loads the graph with these further settings."""
 
 
@@ -128,7 +128,7 @@ def learn_jumps(
     return code
 
 
-def known(file: Path, ready: PlannedGraph) -> LearntJumps:
+def known(file: Path, ready: ReadyJump) -> LearntJumps:
     """Read the corrections that the robot has learnt so far."""
     from ...planner.library.learnt import LearntJumps, read_learnt
 

@@ -25,8 +25,8 @@ from ...runtime.links.observer import StatusPublisher
 from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
-from ...runtime.loading import load
-from ...runtime.placement.placed import PlacedGraph, place
+from ...runtime.loading import checked_file
+from ...runtime.placement.placed import PlacedGraph, split_over_machines
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
@@ -82,7 +82,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     from ...logs.recording.output_file import cause_of, remedy
     from .viewing import how_to_view
 
-    placed = place(load(path, options.settings))
+    placed = split_over_machines(checked_file(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
         files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
@@ -351,7 +351,7 @@ class MachineRun:
     """
 
     def __init__(self, graph: CheckedGraph, machine: str, keys: Path | None = None) -> None:
-        placed = place(graph)
+        placed = split_over_machines(graph)
         self.bound = BoundPart(placed, machine, network_transport(placed, machine, keys))
         self._result: RunResult | None = None
 

@@ -28,7 +28,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from ...files.problems import Code, LoadError, Problems, nearest
-from ...files.validation import path_text, place_of, read_model
+from ...files.validation import location_of, path_text, read_model
 from ..file.format import (
     DIAGRAM,
     EVENTS,
@@ -219,7 +219,7 @@ def read_layout(path: Path, header: Header) -> ViewLayout:
     if layout is not None and tree is not None:
         for at, message, near in _unknown_signals(layout, header):
             problems.add(
-                Code.UNKNOWN_SOURCE if near else Code.BAD_VALUE, message, place_of(tree, at),
+                Code.UNKNOWN_SOURCE if near else Code.BAD_VALUE, message, location_of(tree, at),
                 at=path_text(at), nearest=near, fix=near[0] if near else "",
             )  # fmt: skip
     if len(problems) or layout is None:

@@ -46,7 +46,7 @@ ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IM
 OTHERS = (
     "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
     "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
-    "PhaseState", "PlaceMeasurement", "PlanSegment", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
+    "PhaseState", "PoseMeasurement", "PlanSegment", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
     "SwitchHealth", "ThrustCommand", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""

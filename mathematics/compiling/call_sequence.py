@@ -13,7 +13,7 @@ from .chain_code import NEXT, call_table, chain_function
 
 
 class Call(Protocol):
-    """A ``KernelCall`` or a ``LibraryCall``."""
+    """A ``KernelCall`` or a ``ForeignCall``."""
 
     run: Callable[[], Any]
     when: NDArray[np.int64] | None

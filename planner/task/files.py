@@ -43,7 +43,7 @@ Key = str | int
 
 
 @dataclass(frozen=True)
-class PlacedFile:
+class LocatedFile:
     """Content of a file: ``values`` as plain data, and the place of each of them."""
 
     file: str
@@ -64,7 +64,7 @@ class PlacedFile:
                 where = node.where
         return str(where)
 
-    def place_of_words(self, text: str) -> str:
+    def location_of_words(self, text: str) -> str:
         """Return the place of the last of the file's keys that a message names; the start of the file where it names
         none.
         """
@@ -76,7 +76,7 @@ class PlacedFile:
         return str(max(named_keys, default=self.tree.where))
 
 
-def read_placed(path: Path, example: str) -> PlacedFile:
+def read_located(path: Path, example: str) -> LocatedFile:
     """Read a file that is a mapping.
 
     Raises:
@@ -101,7 +101,7 @@ def read_placed(path: Path, example: str) -> PlacedFile:
         found = "nothing" if tree is None else repr(plain(tree))
         where = tree.where if tree else Position(shown, 1, 1)
         raise JumpTaskError(f"{where}: expected keys such as {example!r}, found {found}")
-    return PlacedFile(shown, plain(tree), tree)
+    return LocatedFile(shown, plain(tree), tree)
 
 
 ABANDONED = 3600.0

@@ -25,7 +25,7 @@ from ...robots.kinematics import (
 )
 from ...robots.shapes import corners_of
 from .contact_groups import contact_points, wrong_groups
-from .files import JumpTaskError, read_placed
+from .files import JumpTaskError, read_located
 from .margins import unknown_joints
 from .sequence import Hop, StanceLocation, edge_of
 from .task import JumpTask, make_task
@@ -39,7 +39,7 @@ def read_task(path: str | Path) -> JumpTask:
             itself or the robot; one line for each, with ``file:line:column``.
     """
     path = Path(path)
-    source = read_placed(path, "rise: 15 cm")
+    source = read_located(path, "rise: 15 cm")
     task = make_task({"name": path.stem, **source.values}, where=str(path), source=source)
     try:
         robot = find_robot(task.robot, path.parent)
@@ -66,7 +66,7 @@ def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
             other; lines about a change begin with ``task: key:``.
     """
     read_task(path)  # what is wrong in the file itself is said with its line
-    values = dict(read_placed(path, "rise: 15 cm").values)
+    values = dict(read_located(path, "rise: 15 cm").values)
     for name in INSTEAD:
         if any(changes.get(other) is not None for other in INSTEAD if other != name):
             values.pop(name, None)

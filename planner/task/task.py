@@ -21,7 +21,7 @@ from ...files.validation import describe, names_at
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .contact_groups import in_turn, wrong_times
-from .files import JumpTaskError, PlacedFile
+from .files import JumpTaskError, LocatedFile
 from .margins import Margins
 from .recipe import choices, chosen_fields
 from .scaling import scaled_defaults
@@ -447,7 +447,7 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
 
 
 def make_task(
-    values: Mapping[str, Any], *, where: str = "task", source: PlacedFile | None = None
+    values: Mapping[str, Any], *, where: str = "task", source: LocatedFile | None = None
 ) -> JumpTask:
     """Return a task from plain values, quantities as numbers or text.
 
@@ -465,7 +465,7 @@ def make_task(
         for problem in error.errors():
             line, place = _explain(problem), where
             if source is not None and not problem["loc"]:
-                place = source.place_of_words(line)
+                place = source.location_of_words(line)
             elif source is not None:
                 place = source.place(problem["loc"], key=problem["type"] == "extra_forbidden")
             lines.append(f"{place}: {line}")

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...files.problems import listing
 from ...mathematics.arrays import Array
-from ..validation import RobotError, RobotFault
+from ..validation import DescriptionError, RobotError
 from .capsules import Capsule, coarse
 from .hulls import RawShape
 from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
@@ -230,7 +230,7 @@ def _is_planar(body: RawBody) -> bool:
 
 
 def _error(model: RawModel, message: str, expected: str = "", found: str = "") -> RobotError:
-    return RobotError(str(model.path), [RobotFault((), message, expected, found)])
+    return RobotError(str(model.path), [DescriptionError((), message, expected, found)])
 
 
 def _axis(axis: Array) -> list[float]:

@@ -22,7 +22,7 @@ from ..language.block import Metric
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph, ClockSpec
 from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
-from ..placement.placed import PlacedGraph, place
+from ..placement.placed import PlacedGraph, split_over_machines
 from ..running.run_result import RunResult, merge_metrics
 from ..running.sinks import Sink
 from ..running.ticker import Ticker
@@ -92,7 +92,7 @@ def run_spread(
     hub = Hub()
     hub.interfere = interfere
     return run_parts_of(
-        place(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
+        split_over_machines(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
         **options,
     )  # fmt: skip
 
@@ -238,7 +238,7 @@ def run_virtual(
     Raises:
         AloftError: the graph names no machines, or a part fails.
     """
-    placed = place(graph)
+    placed = split_over_machines(graph)
     time = _Time()
     network = _Network(time, travel)
     parts = {

@@ -2,7 +2,7 @@
 
 ::
 
-    step = LibraryCall(partial(mujoco.mj_step1, model, data), address, model_address, data_address)
+    step = ForeignCall(partial(mujoco.mj_step1, model, data), address, model_address, data_address)
 
 ``run`` calls it through its own module for Python. Where the address of the function is known a
 ``CallSequence`` calls it without the interpreter.
@@ -24,7 +24,7 @@ MOST = 3
 """The largest number of arguments."""
 
 
-class LibraryCall:
+class ForeignCall:
     """One call of a function of C, whose arguments are fixed once.
 
     Args:
