@@ -304,7 +304,7 @@ class MujocoRobot(SimulatedRobot):
         return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
-        """Return the values that were drawn from the seed, and the gains that the drives do not give."""
+        """The values that were drawn from the seed, and what the drives do not give of the gains."""
         lost = lost_gains(self.params, self.robot) if self.params.bus_period is not None else {}
         return {**self.plant.metrics(), **lost}
 

@@ -146,12 +146,12 @@ class ExternalForces:
         return KernelCall(clear_wrenches, self._points.wrenches)
 
     def pushing(self, push: ExternalForce) -> KernelCall:
-        """Return the call for a push in the next physics step; ``check`` tests whether it has a point."""
+        """The push acts in the next physics step; ``check`` says whether it has a point."""
         return KernelCall(apply_push, push.force, push.point, self._points)
 
     def pulling(self, params: SimulatorParameters) -> list[Call]:
-        """Return the calls for a cable in every physics step: the first goes before that of a push, which it makes
-        begin anew, the second after it."""
+        """In every physics step, what a cable does: the first call goes before that of a push, which
+        it makes begin anew, the second after it."""
         assert params.cable is not None
         base = self._points.wrenches[self._base, :3]
         force = np.array(draw_pull(params.cable, params.seed, self._robot))
@@ -168,8 +168,8 @@ class ExternalForces:
 
 
 def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
-    """Return the two parts of a physics step: what follows from the state, and the step with the present controls.
-    ``model`` and ``data`` must stay alive.
+    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
+    and ``data`` must stay alive.
 
     Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the
     simulator, such as no memory left for contacts, ends the process in machine code, and is an exception in Python.

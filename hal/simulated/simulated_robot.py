@@ -289,7 +289,7 @@ def _unknown_windings(
 def _longest_steps(
     params: SimulatorParameters, robot: RobotDescription
 ) -> Iterator[tuple[str, float]]:
-    """Yield the moving parts of the drives, and the longest steps [s] that follow them."""
+    """What moves in the drives, and the longest steps [s] that follow it."""
     joints, motors, rated = params.joints, params.motors, robot.motors
     rotors = joints.rotor_inertia * (1.0 - joints.rotor_inertia_spread) * rated.rotor_inertia
     if params.gears is not None:
