@@ -32,7 +32,7 @@ from .expressions import EquationError as EquationError  # noqa: PLC0414  also i
 from .expressions import cross as cross  # noqa: PLC0414
 from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
-from .slices import counters_of
+from .slices import Cut, counters_of
 
 VERSION = 2
 """Counts changes of what a statement is rewritten into: machine code made before is not used."""
@@ -109,6 +109,7 @@ class _Rewriter(ArrayEquations):
         self._count = 0
         self._products: set[str] = set()
         self._aliases: dict[str, str] = {}
+        self._cuts: dict[str, Cut] = {}
         self._ahead: list[ast.stmt] | None = []
 
     # Statements
@@ -129,7 +130,7 @@ class _Rewriter(ArrayEquations):
         """Rewrite some statements that follow each other."""
         made: list[ast.stmt] = []
         for statement in statements:
-            outer, self._ahead = self._ahead, []
+            outer, self._ahead, self._cuts = self._ahead, [], {}
             rewritten = self._statement(statement)
             made += [*self._ahead, *rewritten]
             self._ahead = outer
@@ -225,8 +226,7 @@ class _Rewriter(ArrayEquations):
                 ast.Subscript(loaded, ast.Tuple([], ast.Load()), ast.Store()), node
             )
         if isinstance(node, ast.Subscript):
-            node.slice = self._expression(node.slice)
-            node.value = self._inside(node.value)
+            return self._inside(node)
         return node
 
     # Expressions that are one number, or are handed on
@@ -279,6 +279,7 @@ class _Rewriter(ArrayEquations):
         if isinstance(node, ast.Attribute):
             node.value = self._inside(node.value)
         elif isinstance(node, ast.Subscript):
+            self._kind(node)  # refuses an index beyond the array
             node.slice = self._expression(node.slice)
             node.value = self._inside(node.value)
         return node

@@ -68,8 +68,9 @@ class Expressions:
             return self._kind_of_operation(node)
         if isinstance(node, ast.UnaryOp):
             kind = self._kind(node.operand)
-            negated = isinstance(node.op, ast.Not) and isinstance(kind, ArrayKind)
-            return ArrayKind(kind.shape, bool) if negated else kind
+            if isinstance(node.op, ast.Not) and isinstance(kind, ArrayKind):
+                return ArrayKind(kind.shape, bool)
+            return kind
         if isinstance(node, ast.IfExp):
             kind = self._joined(node, [node.body, node.orelse, node.test])
             if kind != NUMBER:
@@ -251,7 +252,7 @@ class Expressions:
         k = kept[dimension]
         if k >= len(indices):
             return self._size_of(node.value, k)
-        part = indices[k]
+        part: Any = indices[k]
         if isinstance(part, ast.Slice):
             part = self._cut(part, whole.shape[k], node, k)
         length: ast.expr = copy.deepcopy(part.length)

@@ -70,6 +70,17 @@ class Slices(Expressions):
 
     def _cut(self, part: ast.Slice, size: int | None, node: ast.Subscript, dimension: int) -> Cut:
         """Find the places of a slice in a dimension of ``size`` elements, or of as many as there are."""
+        key = f"{ast.dump(part)} {ast.dump(node.value)} {dimension}"
+        if key not in self._cuts:
+            self._cuts[key] = self._new_cut(part, size, node, dimension)
+        return copy.deepcopy(self._cuts[key])
+
+    _cuts: dict[str, Cut]
+    """The slices of the present statement, so that equal ones have bounds of one name."""
+
+    def _new_cut(
+        self, part: ast.Slice, size: int | None, node: ast.Subscript, dimension: int
+    ) -> Cut:
         step = 1 if part.step is None else self._constant_of(part.step)
         if step is None:
             raise self._error(node, f"the step of {ast.unparse(node)} is not a constant")
@@ -159,7 +170,7 @@ class Slices(Expressions):
         step = 1 if part.step is None else self._constant_of(part.step)
         known = all(b is None or c is not None for b, c in zip((part.lower, part.upper), bounds, strict=True))  # fmt: skip
         if known and size is not None and step:
-            return len(range(*slice(*bounds, step).indices(size)))
+            return len(range(*slice(bounds[0], bounds[1], step).indices(size)))
         if step == 1 and part.upper is not None:
             more = self._more_than(part.lower, part.upper)
             if more is not None and (part.lower is None or self._is_count(part.lower)):
@@ -184,8 +195,8 @@ class Slices(Expressions):
             case ast.Constant(value=int() as value) if not isinstance(value, bool):
                 return value
             case ast.UnaryOp(op=ast.USub()):
-                value = self._constant_of(node.operand)
-                return None if value is None else -value
+                operand = self._constant_of(node.operand)
+                return None if operand is None else -operand
             case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult()):
                 a, b = self._constant_of(node.left), self._constant_of(node.right)
                 if a is None or b is None:
