@@ -78,7 +78,7 @@ class Twin:
         self.limits = self.drives.limits
         self.faults = InjectedFaults(faults, params.seed)
         self.lockstep = True
-        """Whether time goes on with the exchanges; else only by ``advance``."""
+        """True if time goes on with the exchanges; else it does only by ``advance``."""
         self.released = False
         self.exchanges = 0
         self.zero = 0
