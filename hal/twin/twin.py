@@ -25,7 +25,7 @@ from .injected_faults import ANSWERS, InjectedFault, InjectedFaults, apply_fault
 from .snapshot import Attributes
 
 BRAKING = 0.5
-"""Of an actuator with shorted windings [N m s/rad]: an estimate."""
+"""Braking of an actuator with shorted windings [N m s/rad]: an estimate."""
 SUPPLY = 14.8
 """The battery's voltage [V]."""
 
