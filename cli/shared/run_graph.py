@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import typer
 
 from ...runtime.language.errors import ExitCode
-from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sink import Sink
 from .output import (
     number,
     print_error,
@@ -26,12 +26,12 @@ from .output import (
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
 
     from ...logs.recording.recorder_link import RecorderLink
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
     from ...runtime.running.real_time import RealTimeOptions
-    from ...runtime.running.sinks import Sink
     from ...studies.batch.seeds import SeedRow
 
 
@@ -101,7 +101,7 @@ def run_once(
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
     from ...runtime.running.real_time import NO_REAL_TIME
-    from .output import TickCounter, compiling_shown, progress_bar
+    from .output import compiling_shown, progress_bar
     from .viewing import how_to_view
 
     name, record, as_json = graph.checked.name, options.record, options.as_json
@@ -263,7 +263,7 @@ def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
     return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code
 
 
-class CrashReporter:
+class CrashReporter(Sink):
     """A sink that prints the JSON object of an abandoned run; it records nothing.
 
     Args:
@@ -275,16 +275,24 @@ class CrashReporter:
         self._name = name
         self._as_json = as_json
 
-    def open(self, bound: BoundGraph) -> None:
-        """Nothing to prepare."""
-
-    def record(self, tick: int) -> None:
-        """Nothing to record."""
-
-    def close(self) -> None:
-        """Nothing to close."""
-
     def abandoned(self, result: RunResult) -> None:
         """Print the result."""
         if self._as_json:
             print_json({"graph": self._name, **result.to_json()})
+
+
+TICKS_A_STEP = 100
+"""Ticks between two updates of the bar: the control thread pays microseconds for each."""
+
+
+class TickCounter(Sink):
+    """A sink that moves a progress bar."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress = progress
+        self._task = task
+
+    def record(self, tick: int) -> None:
+        """Move the bar now and then."""
+        if tick % TICKS_A_STEP == 0:
+            self._progress.update(self._task, completed=tick)

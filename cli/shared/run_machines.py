@@ -30,7 +30,7 @@ from ...runtime.placement.placed import PlacedGraph, place
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
-from ...runtime.running.sinks import Sink
+from ...runtime.running.sink import Sink
 from ...runtime.running.timing import BlockTimes
 from ...runtime.transports.registry import network_transport, transport_type
 from .output import (

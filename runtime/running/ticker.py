@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
@@ -24,8 +24,8 @@ from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
-from .sinks import Note, Sink
-from .timing import Program
+from .sink import Note, Sink
+from .timing import BlockTimes, Program
 
 
 class Pauses(Protocol):
@@ -295,12 +295,15 @@ def owner_of(call: Callable[..., Any] | None) -> object:
     return owner.current if isinstance(owner, Chain) else owner
 
 
-@runtime_checkable
-class SupportsTicker(Protocol):
-    """The method that a sink or a block has if it shows the times of blocks, or has notes to tell."""
+class WorkerBlock(Block):
+    """A block that computes elsewhere: it takes its own times, and tells of late results."""
 
     def watch_ticker(self, ticker: Ticker) -> None:
-        """Take what measures the times, after ``open`` and before the first tick."""
+        """Take whom to tell, before the first tick."""
+
+    def worker_times(self) -> BlockTimes:
+        """Return the times of its runs."""
+        return BlockTimes()
 
 
 def hang_text(who: str, instant: str, limit: float) -> str:

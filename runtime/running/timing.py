@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from struct import Struct
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -241,11 +241,3 @@ def _times(
         max_us=longest * 1e-3,
         overruns=overruns,
     )
-
-
-@runtime_checkable
-class SupportsTimes(Protocol):
-    """The method of a block that computes elsewhere, and takes its times there."""
-
-    def worker_times(self) -> BlockTimes:
-        """Return the times of its runs."""

@@ -25,6 +25,7 @@ from aloft.runtime.running.chain import Chain
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.pacing import WallTime
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.running.ticker import Ticker
 from aloft.runtime.testing import BlockUse, checked_graph
 
@@ -248,7 +249,7 @@ def test_after_attention_the_rest_of_the_chain_runs_once() -> None:
 
 @pytest.mark.parametrize("fuse", [True, False])
 def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> None:
-    class Change:
+    class Change(Sink):
         """A sink that changes the gain after tick 9."""
 
         def open(self, bound: BoundGraph) -> None:
@@ -258,9 +259,6 @@ def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> N
             if tick == 9:
                 blocks = self.bound.parameters.blocks
                 self.bound.parameters.requests.append(adjust(blocks, ["two.gain=0.75"]))
-
-        def close(self) -> None:
-            pass
 
     hashes = {
         plain: Executor(graph(), plain=plain, fuse=fuse, sinks=[Change()]).run(30).run_hash
