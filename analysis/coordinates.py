@@ -17,7 +17,7 @@ from ..logs.viewing.signal_names import element_names, unit_of_element
 from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import multiply
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.reading.selection import WHOLE, Selection, read_selection, select
+from ..runtime.language.selection import WHOLE, Selection, read_selection, select
 from ..runtime.running.memory import BoundGraph, Region
 
 _AXES = "xyz"
@@ -113,7 +113,7 @@ class Coordinates:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Hamilton's product of two quaternions x, y, z, w."""
+    """Return Hamilton's product of two quaternions x, y, z, w."""
     out = np.empty(4)
     multiply(a, b, out)
     return out

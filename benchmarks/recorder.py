@@ -132,7 +132,7 @@ def _drain(sink: Recorder) -> None:
 
 
 def packing(graph: CheckedGraph) -> list[Row]:
-    """Size and time of the packed rows, beside what Arrow makes of the same columns."""
+    """Measure size and time of the packed rows, beside Arrow's of the same columns."""
     result = Executor(graph).run(PACKED_TICKS)
     result.raise_if_failed()
     assert result.log is not None
@@ -218,7 +218,8 @@ class _MemoryWatch(Sink):
                 self.found.append(int(status.read_text().split()[1]) * 4096)
 
     def growth(self) -> float | None:
-        """Mebibytes that the last quarter's median is above that of the second quarter."""
+        """Return the mebibytes by which the last quarter's median is above that of the second
+        quarter."""
         quarter = len(self.found) // 4
         if quarter < 2:
             return None

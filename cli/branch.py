@@ -38,7 +38,7 @@ def branch(
     with errors_reported(as_json):
         opened = opened_recording(recording, folder)
         rate = opened.file.header.base_rate
-        graph = opened.load(overrides) if overrides else opened.graph
+        graph = opened.changed(overrides) if overrides else opened.graph
         end = None if until is None else round(until * rate)
         done = branch_run(opened, round(at * rate), graph, until=end)
         path = output or recording.with_name(f"{recording.stem}-branch.rrd")
@@ -63,12 +63,12 @@ def branch(
 
 
 def verdict_of(done: Replayed) -> dict[str, Any]:
-    """How the branch ended, as plain data."""
+    """Return the branch's outcome as plain data."""
     return {"success": done.result.success, "reason": done.result.reason}
 
 
 def print_outcomes(out: Console, opened: OpenedRun, done: Replayed) -> None:
-    """How both runs ended, and the metrics that differ."""
+    """Print the outcomes of both runs, and the metrics that differ."""
     before = opened.file.outcome or {}
     metrics = before.get("metrics", {})
     rows = [("end", str(before.get("reason", "")), done.result.reason)]

@@ -102,7 +102,7 @@ def show(
 ) -> dict[str, Any]:
     """Print the simplest failure as a graph, after running it once more, and keep it if asked to."""
     from ..runtime.graph import Graph
-    from ..runtime.loading import load_text
+    from ..runtime.loading import checked_text
     from ..studies import falsification
 
     folder = Path()
@@ -113,7 +113,7 @@ def show(
     outcome = simplest.worst.outcome
     assert outcome is not None
     text = falsification.graph_text(study, simplest, folder)
-    again = Graph(load_text(text, folder / "falsified.yaml")).run(log=False)
+    again = Graph(checked_text(text, folder / "falsified.yaml")).run(log=False)
     same = again.run_hash == outcome.run_hash
     if not same:
         print_warning("the graph gave other bytes than the run of the search")
@@ -127,7 +127,7 @@ def show(
 
 
 def attempt_json(each: Attempt) -> dict[str, Any]:
-    """An attempt and its worst run as plain data."""
+    """Return an attempt and its worst run as plain data."""
     run = each.worst
     assert run.outcome is not None
     return {
@@ -139,7 +139,7 @@ def attempt_json(each: Attempt) -> dict[str, Any]:
 
 
 def search_json(study: Study, found: Search, random: bool) -> dict[str, Any]:
-    """The search as one JSON object."""
+    """Return the search as one JSON object."""
     section, worst = study.falsification, found.worst
     assert section is not None
     first = next((each.number for each in found.attempts if each.failed), None)

@@ -95,14 +95,14 @@ class Target:
 
 
 def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
-    """Blocks, and paths for pytest.
+    """Sort the targets into blocks, and paths for pytest.
 
     Raises:
         LoadError: a graph may not run.
         AloftError: a target is nothing that can be tested.
     """
     from ..runtime.language.registry import find_block
-    from ..runtime.loading import load
+    from ..runtime.loading import checked_file
     from ..runtime.loading.checking.parameters import plain_parameters
 
     blocks: list[Target] = []
@@ -110,7 +110,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
     for target in targets:
         path = Path(target.partition("::")[0])
         if path.suffix in (".yaml", ".yml"):
-            graph = load(path)
+            graph = checked_file(path)
             blocks += [
                 Target(
                     f"{spec.path} ({spec.block_type.__name__})",
@@ -131,7 +131,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
 
 
 def check(target: Target, robot: str) -> list[Row]:
-    """The checks of one block, one for each thing that every block promises.
+    """Run the checks of one block, one for each promise of every block.
 
     A ``robot`` that is named takes the place of the target's own.
     """
@@ -232,7 +232,7 @@ def write(
 
 
 def parse_ticks(text: str) -> tuple[int, int]:
-    """``1200:1400`` as two numbers. Raises ``AloftError``."""
+    """Parse ``1200:1400`` as two numbers. Raises ``AloftError``."""
     first, colon, last = text.partition(":")
     try:
         return int(first), int(last) if colon else int(first) + 1

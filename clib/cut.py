@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 
 from ..runtime.language.errors import AloftError
+from ..runtime.language.flat_graph import FlatBlock, FlatGraph, FlatWire
 from ..runtime.language.quantities import Quantity
 from ..runtime.language.signals import Field
 from ..runtime.language.stages import BlockSpec, CheckedGraph
 from ..runtime.language.units import parse_unit
-from ..runtime.loading import flatten
-from ..runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
-from ..runtime.loading.load import load
+from ..runtime.loading.checked import checked_file
 
 _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m", "W", "V", "A")
 """Units by the names that people know; a unit may have been multiplied up to a longer text."""
@@ -49,13 +48,23 @@ class Terminal:
 
 @dataclass(frozen=True)
 class Cut:
-    """A sub-graph that can run alone: its text, its terminals, and its blocks as they were."""
+    """A sub-graph that can run alone: its graph, what stands for the blocks outside it, its terminals, and its
+    blocks as they were.
 
-    text: str
+    ``outside`` has the lines of ``blocks`` for those outside.
+    """
+
+    flat: FlatGraph
+    outside: str
     inputs: tuple[Terminal, ...]
     outputs: tuple[Terminal, ...]
     graph: CheckedGraph
     inside: tuple[FlatBlock, ...]
+
+    @property
+    def text(self) -> str:
+        """The sub-graph as the text of a graph file."""
+        return self.flat.text + self.outside
 
 
 def cut(
@@ -83,7 +92,9 @@ def cut(
         LoadError: the graph may not run.
         AloftError: there is no such part, or it cannot be cut out; the message says why.
     """
-    flat, graph = flatten(path, overrides), load(path, overrides)
+    graph = checked_file(path, overrides)
+    flat = graph.resolved
+    assert flat is not None
     specs = {spec.path: spec for spec in graph.blocks}
     inside = [b for b in flat.blocks if not part or f"{b.path}/".startswith(f"{part}/")]
     if not inside:
@@ -125,7 +136,7 @@ def cut(
         f"  {path}: {{use: fmi.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
         for path, ports in stubs.items()
     ]
-    return Cut(without.text + "".join(lines), tuple(inputs), tuple(results), graph, blocks)
+    return Cut(without, "".join(lines), tuple(inputs), tuple(results), graph, blocks)
 
 
 Read = dict[str, dict[str, "dict[str, None] | None"]]
@@ -144,7 +155,7 @@ def _read_from_outside(inside: Sequence[FlatBlock], specs: Mapping[str, BlockSpe
                 wanted = specs[block.path].block_type.inputs[name].signal.fields
                 before = ports.get(each.source_port, {})
                 ports[each.source_port] = (
-                    None if wire.parts or before is None else {**before, **dict.fromkeys(wanted)}
+                    None if wire.slices or before is None else {**before, **dict.fromkeys(wanted)}
                 )
     return found
 
@@ -200,7 +211,7 @@ def _stubs(
 def _terminals(
     name: str, spec: BlockSpec, port: str, wanted: Mapping[str, None] | None
 ) -> list[Terminal]:
-    """One terminal for each field of an output; ``name`` alone if the only field is ``value``."""
+    """Return one terminal for each field of an output; ``name`` alone if the only field is ``value``."""
     fields: Mapping[str, Field] = spec.block_type.outputs[port].signal.fields
     plain = list(fields) == ["value"]
     return [
@@ -289,8 +300,9 @@ def _read_by(
 def _ancestors(
     blocks: Iterable[str], specs: Mapping[str, BlockSpec], outside: Container[str]
 ) -> dict[str, None]:
-    """Blocks and all on which they depend, in this tick or through earlier ones, but not through
-    what is outside."""
+    """Return the blocks and all on which they depend, in this tick or through earlier ones, but not through what is
+    outside.
+    """
     found: dict[str, None] = {}
     pending = list(blocks)
     while pending:
@@ -302,7 +314,7 @@ def _ancestors(
 
 
 def _whole(name: str, wire: FlatWire, inside: Iterable[str]) -> str:
-    if wire.parts or wire.constant is not None or wire.delay or wire.source_block not in inside:
+    if wire.slices or wire.constant is not None or wire.delay or wire.source_block not in inside:
         raise AloftError(
             f"the output {name!r} of the sub-graph is not one whole output of a block in it; "
             "name outputs of blocks with --output block.port"

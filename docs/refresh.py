@@ -117,7 +117,7 @@ def refreshed_excerpt(match: re.Match[str]) -> str:
 
 
 def write_excerpts() -> None:
-    """README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
+    """Write README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
     text = README.read_text(encoding="utf-8")
     README.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
 
@@ -264,7 +264,7 @@ def write_robots_results(file: Path) -> None:
 
 
 def write_every_robot(file: Path) -> None:
-    """Every URDF of example-robot-data, read and put on its feet."""
+    """Write every URDF of example-robot-data, read and put on its feet."""
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
 
 
@@ -285,27 +285,27 @@ def write_known_effects(file: Path) -> None:
 
 
 def write_real(file: Path) -> None:
-    """Robots as a bench finds them, untold, calibrated, and learning."""
+    """Write robots as a bench finds them, untold, calibrated, and learning."""
     refresh(DOCS / "real_robots.md", "real", real_table(read_json(file)["robots"]))
 
 
 def write_ground(*files: Path) -> None:
-    """Landings on single unevennesses that nobody is told of."""
+    """Write landings on single unevennesses that are unknown to the controller."""
     refresh(DOCS / "ground.md", "ground", ground_table(_runs_of(files), "ground"))
 
 
 def write_uneven(*files: Path) -> None:
-    """Jumps in the trial ``uneven``."""
+    """Write jumps in the trial ``uneven``."""
     refresh(DOCS / "ground.md", "uneven", ground_table(_runs_of(files), "task"))
 
 
 def write_slopes(*files: Path) -> None:
-    """Landings on slopes, untold and told."""
+    """Write landings on slopes, untold and told."""
     refresh(DOCS / "ground.md", "slopes", ground_table(_runs_of(files), "ground"))
 
 
 def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
-    """All runs of studies, of which ``files`` are the summaries."""
+    """Read all runs of studies, of which ``files`` are the summaries."""
     from pyarrow import parquet
 
     return [
@@ -315,7 +315,7 @@ def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def write_late(file: Path) -> None:
-    """Late sensors, told and not told."""
+    """Write late sensors, told and not told."""
     refresh(DOCS / "real_robots.md", "late", effects_table(read_json(file)["rows"]))
 
 
@@ -388,7 +388,7 @@ PAGES = {
 
 
 def usage() -> str:
-    """All pages, and how each is made."""
+    """List all pages, and the command that makes each."""
     lines = []
     for name, page in PAGES.items():
         lines.append(f"{name}: {page.write.__doc__}")

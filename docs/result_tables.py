@@ -82,7 +82,8 @@ AXES = ("jump", "task", "arm")
 
 
 def comparison_table(summary: Row) -> str:
-    """One row a cell: how many runs succeeded and fell, and medians with their 5 % and 95 %."""
+    """Format one row a cell: the numbers of runs that succeeded and fell, and medians with their 5
+    % and 95 %."""
     rows, columns = summary["rows"], COLUMNS[summary["study"]]
     axes = [axis for axis in AXES if len({row.get(axis) for row in rows}) > 1]
     rows = sorted(rows, key=lambda row: [_place(rows, axis, row) for axis in axes])
@@ -102,7 +103,7 @@ def _place(rows: Sequence[Row], axis: str, row: Row) -> int:
 
 
 def _figures(row: Row, metric: str, less: str, factor: float) -> str:
-    """Median and the two quantiles; how many runs have them where not all do."""
+    """Format median and the two quantiles, with the number of runs that have them where not all do."""
     metrics = row["metrics"]
     if metric not in metrics:
         return "-"
@@ -170,13 +171,13 @@ def rate(successes: float, runs: float) -> str:
 
 
 def count(rows: Sequence[Row], **wanted: object) -> tuple[int, int]:
-    """Successes and runs of the rows with these values."""
+    """Count successes and runs of the rows with these values."""
     mine = [row for row in rows if all(row[name] == value for name, value in wanted.items())]
     return sum(row["successes"] for row in mine), sum(row["n"] for row in mine)
 
 
 def impulse_table(rows: Sequence[Row]) -> str:
-    """Success over all directions, a line an arm, a column an impulse."""
+    """Format success over all directions, a line an arm, a column an impulse."""
     impulses = values_of(rows, "impulse_n_s")
     lines = []
     for arm in values_of(rows, "arm"):
@@ -187,7 +188,7 @@ def impulse_table(rows: Sequence[Row]) -> str:
 
 
 def quarter_table(rows: Sequence[Row]) -> str:
-    """Success over all impulses, a column a quarter of the directions."""
+    """Format success over all impulses, a column a quarter of the directions."""
     lines = []
     for arm in values_of(rows, "arm"):
         cells = []
@@ -281,12 +282,12 @@ TASKS_HEAD = ("task", "succeeded", "95 % interval", "goal")
 
 
 def tasks_table(summary: Row) -> str:
-    """One row a task: how many of its runs succeeded, and between which rates that lies."""
+    """Format one row a task: the number of its runs that succeeded, and the interval of the rate."""
     return table(TASKS_HEAD, map(_task, summary["rows"]))
 
 
 def every_robot_table(rows: Sequence[Row]) -> str:
-    """One row a file: its joints, and what became of it."""
+    """Format one row a file: its joints, and the outcome."""
     return table(
         ("file", "joints", "what became of it"),
         (
@@ -297,7 +298,8 @@ def every_robot_table(rows: Sequence[Row]) -> str:
 
 
 def mutated_robots_table(rows: Sequence[Row]) -> str:
-    """One row a kind of mistake, with what became of its cases in each format; none where a format has no such kind.
+    """Format one row a kind of mistake, with the outcomes of its cases in each format; none where a
+    format has no such kind.
 
     The rows are those of ``aloft bench mutated_robots``, called ``FORMAT: KIND``.
     """
@@ -455,7 +457,8 @@ def pairs_of(runs: Sequence[Row]) -> dict[str, list[Pair]]:
 
 
 def twin_table(rows: Sequence[Row], runs: Sequence[Row]) -> str:
-    """One row a task that both arms ran, the runs that differ, and what all of them say together."""
+    """Format one row a task that both arms ran, the runs that differ, and the verdict over all of
+    them."""
     by_task: dict[str, dict[str, Row]] = {}
     for row in rows:
         by_task.setdefault(row["task"], {})[row["arm"]] = row
@@ -472,7 +475,7 @@ def twin_table(rows: Sequence[Row], runs: Sequence[Row]) -> str:
 
 
 def effects_table(rows: Sequence[Row]) -> str:
-    """One row an effect, one column a task."""
+    """Format one row an effect, one column a task."""
     tasks = list(dict.fromkeys(row["task"] for row in rows))
     by_effect: dict[str, dict[str, Row]] = {}
     for row in rows:
@@ -484,7 +487,8 @@ def effects_table(rows: Sequence[Row]) -> str:
 
 
 def real_table(robots: Sequence[Mapping[str, Any]]) -> str:
-    """One row a kind of jump, one column an arm: how many robots land, at each time."""
+    """Format one row a kind of jump, one column an arm: the number of robots that land, at each
+    time."""
     arms = list(robots[0]["arms"])
     rows = []
     for kind in robots[0]["arms"][arms[0]]:
@@ -547,6 +551,7 @@ def _mean(row: Row, name: str, scale: float, unit: str) -> str:
 
 
 def _highest(pairs: Sequence[Pair], arm: int) -> str:
-    """Over the runs that succeeded: a robot that has fallen says nothing about the others."""
+    """Format the highest value over the runs that succeeded: a robot that has fallen says nothing
+    about the others."""
     values = [pair[arm][TILT] for pair in pairs if pair[arm]["success"] and pair[arm].get(TILT)]
     return f"{max(values):.0f} deg" if values else "-"

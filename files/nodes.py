@@ -111,7 +111,8 @@ def texts_of(node: Node) -> Iterator[str]:
 
 
 def from_plain(value: Any, where: Position) -> Node:
-    """Return a tree of plain Python data (also NumPy arrays and scalars), all of it at one place."""
+    """Return a tree of plain Python data (also NumPy arrays and scalars), all of it at one
+    place."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -247,8 +247,8 @@ class Problems:
         Where a place has a syntax error, its other problems follow from that and are left out.
         """
         unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
-        printed_problems = [p for p in self._found if unread.get(p.where, p) is p]
-        return Report(file, tuple(sorted(printed_problems, key=lambda problem: problem.where)))
+        kept = [p for p in self._found if unread.get(p.where, p) is p]
+        return Report(file, tuple(sorted(kept, key=lambda problem: problem.where)))
 
 
 def nearest(

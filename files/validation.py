@@ -311,7 +311,7 @@ def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, E
     return tuple(steps), node, entry
 
 
-def place_of(root: MapNode, path: Sequence[str | int]) -> Position:
+def location_of(root: MapNode, path: Sequence[str | int]) -> Position:
     """Return the place of the value at a path, or of the nearest thing that holds it."""
     return locate(root, path)[1].where
 
@@ -320,7 +320,7 @@ def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:
     """Return whether a collection was refused only because of elements that other mistakes report.
 
     Where the type is a number or a mapping, pydantic reports the wrong element of a mapping, and
-    also that the mapping is not a number; the latter says nothing new.
+    also that the mapping is not a number; the latter adds nothing.
     """
     depth = len(mistake.path)
     return isinstance(mistake.node, (MapNode, ListNode)) and any(

@@ -115,7 +115,7 @@ def divide(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def remainder(a: Array1D, b: Array1D, out: Array1D) -> None:
-    """With the sign of ``b``, as in Python."""
+    """Compute the remainder with the sign of ``b``, as in Python."""
     for i in range(out.shape[0]):
         out[i] = _rest(a[i], b[i])
 
@@ -162,7 +162,7 @@ def not_equal(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def choose(condition: Array1D, a: Array1D, b: Array1D, out: Array1D) -> None:
-    """``a`` where the condition is not zero, else ``b``."""
+    """Choose ``a`` where the condition is not zero, else ``b``."""
     for i in range(out.shape[0]):
         out[i] = a[i] if condition[i] != 0.0 else b[i]
 
@@ -293,7 +293,7 @@ def round_up(a: Array1D, out: Array1D) -> None:
 
 @kernel
 def nearest(a: Array1D, out: Array1D) -> None:
-    """The nearest whole number, of two the even one."""
+    """Round to the nearest whole number, of two to the even one."""
     np.rint(a, out)
 
 

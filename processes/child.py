@@ -1,4 +1,5 @@
-"""Main function of a ``ChildProcess``: it reports readiness and failure, and ends with its parent."""
+"""Main function of a ``ChildProcess``: it reports readiness and failure, and ends with its
+parent."""
 
 from __future__ import annotations
 

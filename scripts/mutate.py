@@ -184,7 +184,7 @@ def functions_with_changes(folder: str) -> list[list[Change]]:
 
 
 def outer_functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Functions and methods, not those inside of others."""
+    """Yield functions and methods, not those inside of others."""
     pending: list[ast.AST] = list(tree.body)
     while pending:
         node = pending.pop(0)
@@ -379,7 +379,7 @@ class Copy:
             yield tests[0], "long"
 
     def tests_of(self, file: str) -> list[str]:
-        """The test files of a file of the package, the one that mirrors it first."""
+        """Return the test files of a file of the package, the one that mirrors it first."""
         found = self._own_tests(file)
         reached, latest = {file}, {file}
         while not found and latest:

@@ -1,4 +1,4 @@
-"""Weighs the package: what a maintainer has to read, and where one thing is said more than once.
+"""Weighs the package: the code that a maintainer has to read, and the declarations that repeat others.
 
     python scripts/weigh.py                     the working tree, folder by folder and in total
     python scripts/weigh.py --base a4c74fc      beside a git revision
@@ -81,7 +81,7 @@ class Source:
         return self.path.split("/")[0] if "/" in self.path else "."
 
     def classes(self) -> list[ast.ClassDef]:
-        """Classes of the module itself, not those inside of others."""
+        """Return classes of the module itself, not those inside of others."""
         return [node for node in self.tree.body if isinstance(node, ast.ClassDef)]
 
 
@@ -268,7 +268,8 @@ def calls_of_float(node: ast.AST) -> int:
 
 
 def count_shared_names(sources: list[Source], weights: dict[str, Weight]) -> None:
-    """Names of classes that are defined in more than one file; a folder counts those it defines."""
+    """Count names of classes that are defined in more than one file; a folder counts those it
+    defines."""
     for measure, counted in (("shared names", None), ("shared tuples", is_named_tuple)):
         places: dict[str, list[tuple[str, str]]] = defaultdict(list)
         for source in sources:

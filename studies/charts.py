@@ -324,7 +324,7 @@ def line_panels(
 
 
 def _draw_line(axes: Axes, number: int, points: Sequence[Point], lines: int, panel: str) -> None:
-    """One line with its dots and its intervals."""
+    """Draw one line with its dots and its intervals."""
     from matplotlib.transforms import ScaledTranslation
 
     ordered = sorted(points, key=lambda point: point.x)

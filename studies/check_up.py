@@ -29,21 +29,21 @@ SLENDER, WIDE = 0.1, 1.5
 AWAY = 1.5
 """A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
 FAR = 4.0
-"""A joint farther from the middle of its parent's shapes than this times what both links reach is elsewhere; of the robots of
+"""A joint farther from the middle of its parent's shapes than this times the reach of both links is misplaced; of the robots of
 ``example-robot-data`` it is at most 1.7 times."""
 NEARLY_ALONG = math.radians(5.0)
 """An axis closer to a coordinate axis than this, and not along it, was measured or typed."""
 NEAR_LIMIT = 0.05
-"""rad; the standing robot is closer to a limit than this."""
+"""Distance from a limit below which the standing robot is close to it [rad]."""
 SLOW = 2.0
-"""Hz; legs whose motors turn their joints more slowly than this cannot balance a robot."""
+"""Least bandwidth of the joints of legs that can balance a robot [Hz]."""
 STEP = 0.1
-"""rad; the step that a joint's bandwidth is told by."""
+"""Step by which a joint's bandwidth is measured [rad]."""
 
 
 @dataclass(frozen=True)
 class Remark:
-    """Something that looks wrong: the ``part``, what was ``found``, and what is ``usual``."""
+    """An oddity of a description: the ``part``, the value ``found``, and the ``usual`` one."""
 
     part: str
     found: str
@@ -66,13 +66,13 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
 
 
 def _size(robot: RobotDescription) -> Iterator[Remark]:
-    """Mass and size of the whole robot."""
+    """Check mass and size of the whole robot."""
     for found in wrong_size(robot):
         yield Remark("the robot", found, "lengths in m and masses in kg")
 
 
 def _joints(robot: RobotDescription) -> Iterator[Remark]:
-    """Joints far from the links that they join."""
+    """Find joints far from the links that they join."""
     for joint in robot.joints:
         parent, child = robot.link(joint.parent), robot.link(joint.child)
         if not parent.shapes or not child.shapes:
@@ -86,7 +86,7 @@ def _joints(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _links(robot: RobotDescription) -> Iterator[Remark]:
-    """Masses and inertias."""
+    """Check masses and inertias."""
     for link in robot.links:
         share = link.mass / robot.total_mass
         if link.name != robot.base and share > HEAVY:
@@ -114,7 +114,7 @@ def _extent(link: Link) -> tuple[float, Array]:
 
 
 def _axes(robot: RobotDescription) -> Iterator[Remark]:
-    """Axes that are nearly, and not quite, along a coordinate axis."""
+    """Find axes that are nearly, and not quite, along a coordinate axis."""
     for joint in robot.joints:
         along = max(abs(component) for component in joint.axis)
         off = math.acos(min(1.0, along))
@@ -124,7 +124,7 @@ def _axes(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _limits(robot: RobotDescription) -> Iterator[Remark]:
-    """Limits, and how the standing robot keeps off them."""
+    """Check limits, and the standing robot's distance from them."""
     for k, joint in enumerate(robot.joints):
         if joint.limits is None:
             yield Remark(
@@ -143,14 +143,14 @@ def _limits(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _stance(robot: RobotDescription) -> Iterator[Remark]:
-    """Feet that the robot cannot stand on."""
+    """Find feet that the robot cannot stand on."""
     off = off_its_feet(robot) if robot.contacts else ""
     if off:
         yield Remark("the standing pose", off, "a pose that rests on all contact points")
 
 
 def _sides(robot: RobotDescription) -> Iterator[Remark]:
-    """Legs of which left and right differ, and signs of joints that do."""
+    """Find legs of which left and right differ, and signs of joints that do."""
     from ..planner.models.symmetry import mirrored_pairs
     from ..robots.welding import welded
 
@@ -180,7 +180,7 @@ def _sides(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Remark]:
-    """Motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
+    """Find motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
     for row in rows:
         share = row["standing_share"]
         if share is not None and share > 0.5:

@@ -160,7 +160,8 @@ def compared_axis(study: Study, text: str) -> tuple[str, str]:
 
 
 def compare(study: Study, runs: Sequence[Run], asked: Comparing) -> list[Comparison]:
-    """Every other label of the axis against the base: success first, then every metric by name.
+    """Compare every other label of the axis with the base: success first, then every metric by
+    name.
 
     Labels without a pair are left out.
 

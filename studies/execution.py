@@ -78,7 +78,8 @@ def make_runs(
     *,
     on_run: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Run]:
-    """All runs with their outcomes, in the order of ``runs``; ``pool`` is one of ``run_pool``.
+    """Make all runs and return them with their outcomes, in the order of ``runs``; ``pool`` is one
+    of ``run_pool``.
 
     Runs that are in the journal are not made again. Every other run is kept as soon as it is done.
     Runs with the same key are made once, and ``on_run`` is called once for them. The death of a

@@ -107,7 +107,7 @@ def searched_cells(study: Study) -> list[Cell]:
 
 
 def end_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with each range at its ends. They are checked before anything runs."""
+    """Return cells with each range at its ends. They are checked before anything runs."""
     return cells_at_ends(chosen[0], _section(study).ranges) if chosen else []
 
 

@@ -41,17 +41,17 @@ velocity."""
 GAIN = 0.8
 """Share of the mean error that a try corrects; half of it after a try that did not help."""
 LARGEST = 0.08
-"""The largest correction along each axis [m/s]; of the momentum this speed at the lever."""
+"""The largest correction along each axis [m/s]; of the momentum this speed at the lever arm."""
 GYRATION = (0.22, 0.22, 0.15)
 """Radius of gyration about each axis [heights of the centre of mass] of a robot whose legs keep
 their feet in place: an angular momentum turns BRUCE by so much until touchdown."""
 LEAST_SHARE = 0.5
 """Of a momentum that is spread over more than about 200 deg of turn less than this share tilts one
-way; no more than its inverse is then asked for."""
+way; the correction is then its inverse at most."""
 LOST = 2.0
 """The share used by a run that fell or never landed; no run counts as more."""
 AFTER = 0.15
-"""s after touchdown in which the extremes of the tilt are looked for."""
+"""Time after touchdown in which the extremes of the tilt are searched [s]."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def response(plan: PlannedJump, mass: float) -> Array:
 
 
 def angles_of(quaternions: Array) -> Array:
-    """Roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
+    """Compute roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))

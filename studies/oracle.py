@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..hal.random_streams import Purpose, stream
-from ..hal.simulated.imu_effects import draw_delays, draw_place
+from ..hal.simulated.imu_effects import draw_delays, draw_imu_pose
 from ..hal.simulated.simulated_robot import SimulatorParameters
 from ..hal.simulated.variation import draw_variation
 from ..mathematics.arrays import Array
@@ -20,11 +20,11 @@ from ..robots.description import RobotDescription
 from ..runtime.graph import Graph
 
 CONSUMER = "controllers/late_sensors.yaml"
-"""The file that a graph includes so that its controller takes what is told."""
+"""The file that a graph includes so that its controller takes the values of a calibration."""
 
 
 class CalibrationErrors(NamedTuple):
-    """Standard deviations of what is told: shares of friction and of torque constants, ages [s], the IMU's
+    """Standard deviations of a calibration's values: shares of friction and of torque constants, ages [s], the IMU's
     place [m] and angle [rad]."""
 
     friction: float = 0.0
@@ -66,7 +66,7 @@ def oracle_values(
 def _imu(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    place, angle = map(np.array, draw_place(params.imu, params.seed))
+    place, angle = map(np.array, draw_imu_pose(params.imu, params.seed))
     return {
         "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
         "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),

@@ -52,6 +52,7 @@ def written(number: float, unit: str) -> Any:
 
 
 def column_name(axis: str, unit: str) -> str:
-    """``direction`` in ``deg`` is ``direction_deg``; ``m/s`` is ``_m_s``, as in metrics."""
+    """Name a column: ``direction`` in ``deg`` is ``direction_deg``; ``m/s`` is ``_m_s``, as in
+    metrics."""
     suffix = re.sub(r"[^0-9a-z]+", "_", unit.lower().replace("%", "percent")).strip("_")
     return f"{axis}_{suffix}" if suffix else axis

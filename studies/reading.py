@@ -58,7 +58,7 @@ def read_study(path: Path) -> Study:
     return study
 
 
-def part_of(study: Study, texts: Sequence[str]) -> CellFilter:
+def rows_where(study: Study, texts: Sequence[str]) -> CellFilter:
     """Return the filter that texts such as ``axis=value`` mean. Several values of one axis are
     alternatives.
 
@@ -205,7 +205,7 @@ def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[StudyTask, 
 
 
 def _read_task(entry: Entry, path: Path, problems: Problems) -> StudyTask | None:
-    """``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
+    """Read ``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
     file = entry
     sets: tuple[Entry, ...] = ()
     if isinstance(entry.value, MapNode):
@@ -268,7 +268,8 @@ def _read_falsification(node: MapNode, labels: Labels, problems: Problems) -> Fa
 
 
 def _read_arm(entry: Entry, common: tuple[Range, ...], path: Path, problems: Problems) -> Arm:
-    """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}, include: FILE}``."""
+    """Read ``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}, include:
+    FILE}``."""
     node = entry.value
     if isinstance(node, MapNode) and any(node.get(key) for key in ARM_KEYS):
         for item in node:

@@ -25,7 +25,7 @@ from ..planner.library.library import shipped_folder
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.flattening.flat import FlatGraph
+from ..runtime.language.flat_graph import FlatGraph
 from ..runtime.loading.reading.files import settings_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
@@ -63,13 +63,13 @@ TRIES = 2
 GAIN = 0.8
 """Share of the deviation that a try corrects; half of it after a try that was too much or did not help."""
 NEGLIGIBLE = 0.005
-"""A deviation that is not worth a correction [m/s]."""
+"""Deviation below which no correction is made [m/s]."""
 WORTH = 0.75
 """A correction is kept only if it leaves at most this share of the deviation."""
 LARGEST = 0.15
-"""The largest correction along each axis [m/s]; of the momentum this speed at the lever."""
+"""The largest correction along each axis [m/s]; of the momentum this speed at the lever arm."""
 LEVER = 1.0 / 3.0
-"""The lever, as a share of the height of the centre of mass, at which an angular momentum is
+"""The lever arm, as a share of the height of the centre of mass, at which an angular momentum is
 compared with a velocity: about the radius of gyration of a standing robot."""
 EARLY, FLIGHT = 0.1, 10
 """Contact may end that long before the planned lift-off [s]; a flight is that many ticks without."""

@@ -1,4 +1,4 @@
-"""A robot sways in a graph, or has swayed in a recording: what is read of the run, and what it says of the robot.
+"""Calibration of a robot from a run in which it sways, in a graph or from a recording.
 
 ``calibrated_fragment(graph, "sway.yaml")`` runs a graph in this process and returns the text that
 ``aloft robot calibrate`` writes.

@@ -49,7 +49,7 @@ _SPACING = ("from", "to", "step")
 
 
 def read_axes(node: MapNode, problems: Problems) -> tuple[Axis, ...]:
-    """All axes in order. A wrong axis is noted as a problem and left out."""
+    """Read all axes in order. A wrong axis is noted as a problem and left out."""
     axes = []
     owners: dict[str, str] = {}
     for entry in node:
@@ -260,7 +260,7 @@ class Labels:
     axes: Mapping[str, Axis]
 
     def read_filter(self, entry: Entry | None, problems: Problems) -> CellFilter:
-        """``where``: for some axes one value or a list of them."""
+        """Read ``where``: for some axes one value or a list of them."""
         if entry is None:
             return CellFilter()
         if not isinstance(entry.value, MapNode):
@@ -369,7 +369,7 @@ def _share(node: Node, what: str, problems: Problems) -> float | None:
 
 
 def read_seeds(node: Node, what: str, problems: Problems) -> tuple[int, ...]:
-    """``2000:2040`` (2040 not among them), a list of numbers, or one."""
+    """Read ``2000:2040`` (2040 not among them), a list of numbers, or one."""
     value = plain(node)
     text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
     try:
@@ -475,7 +475,7 @@ def read_falsification(
 
 
 def _read_margin(node: MapNode, problems: Problems) -> tuple[MarginTerm, ...]:
-    """``margin: {metric: [best, limit]}``."""
+    """Read ``margin: {metric: [best, limit]}``."""
     entry = node.get("margin")
     example = "margin: {peak_tilt_deg: [0, 45]}"
     if entry is None:

@@ -98,7 +98,7 @@ def elementary_effects(
 def sobol_indices(
     varied: Sequence[Varied], evaluate: Evaluate, samples: int, seed: int
 ) -> dict[str, tuple[float, float, float, float]]:
-    """First index and half its interval, total index and half its, by parameter."""
+    """Compute first index and half its interval, total index and half its, by parameter."""
     salib, problem = import_salib(), _problem(varied)
     points = salib.sample.sobol.sample(problem, samples, calc_second_order=False, seed=seed)
     values = evaluate(points)

@@ -97,7 +97,7 @@ class SharedStart:
 
 
 @dataclass(frozen=True)
-class _Places:
+class _MemoryBytes:
     """The places of a block's memory: bytes of the bus and of the state."""
 
     read: NDArray[np.intp]
@@ -167,7 +167,7 @@ def _is_all_declared(block: Block) -> bool:
     return not kind.is_moore() or can_be_chained(block, "update_calls")
 
 
-def _places(bound: BoundGraph, path: str) -> _Places:
+def _places(bound: BoundGraph, path: str) -> _MemoryBytes:
     spec = bound.graph.block(path)
     bus, state = bound.memory.bus.layout, bound.memory.state.layout
     kind = spec.block_type
@@ -183,7 +183,7 @@ def _places(bound: BoundGraph, path: str) -> _Places:
         spec.wires[name].source if name in spec.wires else f"{path}.{name}": port
         for name, port in kind.inputs.items()
     }
-    return _Places(
+    return _MemoryBytes(
         bytes_of(bus, read),
         bytes_of(bus, {f"{path}.{name}": port for name, port in kind.outputs.items()}),
         bytes_of(state, {f"{path}.{name}": port for name, port in kind.states.items()}),

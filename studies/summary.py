@@ -98,7 +98,8 @@ class StudyRow:
 
 
 def summarise(study: Study, runs: Sequence[Run]) -> list[StudyRow]:
-    """One row for each cell, in the order of the study, with Wilson's 95 % interval of its success rate."""
+    """Return one row for each cell, in the order of the study, with Wilson's 95 % interval of its
+    success rate."""
     by_cell: dict[int, list[Run]] = {}
     for run in runs:
         by_cell.setdefault(id(run.cell), []).append(run)

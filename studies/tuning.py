@@ -152,7 +152,7 @@ def tuning_cells(study: Study) -> list[Cell]:
 
 
 def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with every range of tuning at its ends. They are checked before anything runs."""
+    """Return cells with every range of tuning at its ends. They are checked before anything runs."""
     found = []
     for arm in study.arms:
         first = next((cell for cell in chosen if cell.arm == arm.name), None)
@@ -331,7 +331,8 @@ def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
 
 
 def value_to_minimise(found: Draw, runs: int) -> float:
-    """One number that orders draws as ``order`` does: failures first, then the metric, in (0, 1)."""
+    """Compute one number that orders draws as ``order`` does: failures first, then the metric, in
+    (0, 1)."""
     share = 1.0 if math.isnan(found.least) else 0.5 + math.atan(found.least) / math.pi
     return runs - found.successes + share
 

@@ -23,8 +23,8 @@ a fall."""
 
 
 def worst_first(runs: Sequence[Run]) -> list[Run]:
-    """All runs that were made: those that broke, those that failed, those that succeeded; among equal
-    ones those that tilted most come first, and then the order of the study counts."""
+    """Sort all runs that were made: those that broke, those that failed, those that succeeded;
+    among equal ones those that tilted most come first, and then the order of the study counts."""
     made = [run for run in runs if run.outcome is not None]
     return sorted(made, key=_rank)
 

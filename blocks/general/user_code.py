@@ -1,4 +1,4 @@
-"""What the graph computes by a formula or gets from outside."""
+"""Computations of the graph by a formula, or values from outside."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Expression(KernelBlock):
 
         with: {expression: "k * (a - b) if t > 1 else 0", constants: {k: 2.5}}
 
-    Units are checked in it: ``units: {k: N/m}`` says those of constants, t is in s, and other
+    Units are checked in it: ``units: {k: N/m}`` gives those of constants, t is in s, and other
     numbers are plain. ``unit: unchecked`` switches this off.
 
     It is never evaluated as Python: each operation is a call of a kernel. Both sides of a choice are computed, so neither
@@ -52,7 +52,7 @@ class Expression(KernelBlock):
         expression: str = parameter(text="the formula")
         constants: dict[str, float] = parameter({}, text="numbers by the names the formula has")
         units: dict[str, str] = parameter({}, text="units of constants, by name")
-        unit: str | None = parameter(None, text="unit of y, if it is said and not computed")
+        unit: str | None = parameter(None, text="unit of y, if it is given and not computed")
 
         @field_validator("unit", "units")
         @classmethod
@@ -74,7 +74,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The formula must be one, and every input that it reads must be wired."""
+        """Report a formula that is none, or reads an input that is not wired."""
         assert isinstance(params, cls.Params)
         for name in params.constants:
             if name in (*INPUTS, "t", "pi") or not name.isidentifier():
@@ -99,7 +99,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of the formula, and the one frame that its inputs have."""
+        """Return the unit of the formula, and the one frame that its inputs have."""
         assert isinstance(params, cls.Params)
         formula = parse_expression(params.expression, (*INPUTS, "t", *params.constants))
         read = {name: inputs[name] for name in formula.names if name in INPUTS}
@@ -123,7 +123,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A formula of all inputs."""
+        """Return a formula of all inputs."""
         return {
             "n": 2,
             "expression": "k * a - b + e * f if c > d else sin(t) * d + g - h",
@@ -148,7 +148,7 @@ class Expression(KernelBlock):
 
 @kernel
 def _write_time(tick: Indices1D, base_period: float, time: Array1D) -> None:
-    """The seconds since the run began, in each element."""
+    """Write the seconds since the run began into each element."""
     time[:] = base_period * tick[0]
 
 
@@ -162,7 +162,7 @@ TIME = {"t": SECOND}
 
 
 def unit_of(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
-    """The unit of a checked expression; ``None`` where it is not checked.
+    """Return the unit of a checked expression; ``None`` where it is not checked.
 
     ``units`` has those of the variables. Numbers are plain; zero has every unit.
 
@@ -198,7 +198,7 @@ def unit_of(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
 
 
 def _factor(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
-    """The same for a factor, in which zero is as plain as any number."""
+    """Return the same as ``unit_of`` for a factor, in which zero is as plain as any number."""
     return ONE if isinstance(node, ast.Constant) else unit_of(node, units)
 
 
@@ -255,8 +255,8 @@ class External(UnitFromParameters, Block):
         in_unit = ("initial",)
 
     params: Params
-    y = Output(Vector, text="what was set last")
-    x = State(Vector, text="what was set last")
+    y = Output(Vector, text="values that were set last")
+    x = State(Vector, text="values that were set last")
 
     def setup(self) -> None:
         """Begin with the initial value."""

@@ -280,12 +280,12 @@ class JumpPlan(Block):
         return read_learnt(path, context.robot.name).correction(launch_of(task))
 
     def setup(self) -> None:
-        from ...planner.library.once import reference_table_once
+        from ...planner.library.validation_cache import cached_reference_table
 
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
-        table = reference_table_once(plan, robot, self.params.stand_time)
+        table = cached_reference_table(plan, robot, self.params.stand_time)
         self.table = table_rows(table)
         self.rotation = self._time_progress(table)
 

@@ -30,7 +30,7 @@ from .table_reading import read_table
 
 
 class StandReference(GuidedReference):
-    """The whole body stands as its description says, and with a ``squat_depth`` squats and rises.
+    """The whole body stands as described, and with a ``squat_depth`` squats and rises.
 
     The feet stand still and the base stays level. For ``stand_time`` the robot stands in its
     standing pose. With a ``squat_depth`` above zero its centre of mass then goes down by that much

@@ -64,7 +64,7 @@ def sum_to(table: TableRows, time: float, sign: float, out: Array1D) -> None:
 
 @kernel
 def interpolate_rows(table: TableRows, time: float, lead: float, hold: float, out: Array1D) -> None:
-    """Interpolate all columns at ``time``; the fed-forward ones follow ``read_table``."""
+    """Interpolate all columns at ``time``; the fed-forward ones as by ``read_table``."""
     rows = table.rows
     here, part = locate(table.time, time)
     there, later = locate(table.time, time + lead)

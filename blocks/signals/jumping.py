@@ -26,10 +26,10 @@ class JumpReference(Signal):
     )
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its rate")
-    contact = Field("n_contacts", dtype="bool", text="which points are planned to carry load")
+    contact = Field("n_contacts", dtype="bool", text="points that are planned to carry load")
     toes_first = Field(
         dtype="bool",
-        text="whether the flight under way or next ends on some of the points only, such as the toes",
+        text="the flight under way or next ends on some of the points only, such as the toes",
     )
     foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
     foot_velocity = Field(("n_feet", 3), unit="m/s", frame="world", text="their velocities")
@@ -51,5 +51,5 @@ class PhaseState(Signal):
     stance = Field("n_contacts", dtype="bool", text="points the controller may push with")
     stepping = Field("n_contacts", dtype="bool", text="points of a foot that takes a step")
     step_acceleration = Field(
-        ("n_contacts", 3), unit="m/s^2", frame="world", text="what these points should do"
+        ("n_contacts", 3), unit="m/s^2", frame="world", text="planned acceleration of these points"
     )

@@ -21,16 +21,16 @@ from numpy.typing import NDArray
 
 from aloft.clib.cut import Cut
 from aloft.clib.module import Module
-from aloft.clib.part import NeedsPython, Part, needs_python
+from aloft.clib.part import NeedsPython, SubGraph, needs_python
 from aloft.clib.targets import TARGETS, compile_module, link
 from aloft.hal.simulated.mujoco_model import body_name, mujoco_spec
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
+from aloft.mathematics.compiling.foreign_call import ForeignCall
 from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.compiling.library_call import LibraryCall
 from aloft.planner.task.phase import Phase
 from aloft.robots.surfaces import robot_surfaces
-from aloft.runtime.loading.load import load
+from aloft.runtime.loading.checked import checked_file
 from aloft.runtime.running.memory import BoundGraph
 
 TO_MUJOCO, FROM_MUJOCO = (
@@ -83,7 +83,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
         NeedsPython: blocks beside the robot need Python.
         StartError: the robot does not stand.
     """
-    graph = load(graph_file, overrides)
+    graph = checked_file(graph_file, overrides)
     bound = BoundGraph(graph)
     blocks = tuple(path for path in graph.order if path != "robot")
     reasons = [
@@ -104,7 +104,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     for key, calls in robot.calls.items():
         programs[key] = []
         for kind, group in groupby(calls, type):
-            if kind is LibraryCall:
+            if kind is ForeignCall:
                 programs[key] += group
                 continue
             made = list(group)
@@ -117,15 +117,16 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
         id(call): _drawn(call)
         for program in programs.values()
         for call in program
-        if isinstance(call, LibraryCall) and call not in (plant.step1, plant.step2)
+        if isinstance(call, ForeignCall) and call not in (plant.step1, plant.step2)
     }
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
-    part = Part(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
+    assert graph.resolved is not None
+    part = SubGraph(Cut(graph.resolved, "", (), (), graph, ()), graph, bound, blocks, (), ())
     module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
 
-    def told(each: str | LibraryCall) -> Any:
+    def told(each: str | ForeignCall) -> Any:
         if isinstance(each, str):
             return each
         if id(each) not in draws:
@@ -149,7 +150,7 @@ def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
     return np.asarray(found)
 
 
-def _drawn(call: LibraryCall) -> NDArray[np.float64]:
+def _drawn(call: ForeignCall) -> NDArray[np.float64]:
     """Return the memory into which a call draws random numbers."""
     size, address = int(call.words[2]), int(call.words[3])
     return np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))

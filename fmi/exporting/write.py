@@ -8,7 +8,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,8 @@ from ... import __version__
 from ...clib.cut import Cut, Terminal, cut, start_of
 from ...clib.part import NeedsPython
 from ...clib.write import prepare
-from ...logs.file.surroundings import named_file
-from ...runtime.carried import copy_module, with_robot_beside
+from ...logs.file.dependencies import named_file
+from ...runtime.bundle import copy_module, with_robot_beside
 from ...runtime.language.errors import AloftError
 from .native import compiler, write_native
 from .slave import GRAPH, INTERFACE
@@ -130,8 +130,9 @@ def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -
 
 def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
     """Write the graph, its interface, and the files and modules that it names."""
-    graph, text = cut_out.graph, cut_out.text
-    text = with_robot_beside(graph, text, folder)
+    graph = cut_out.graph
+    beside = with_robot_beside(cut_out.flat, graph.robot, folder)
+    text = replace(cut_out, flat=beside).text
     overrides: dict[str, Any] = {}
     for block in cut_out.inside:
         spec = graph.block(block.path)

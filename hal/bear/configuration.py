@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from ...files.problems import Code, LoadError, Problems, listing, nearest
-from ...files.validation import place_of, read_model
+from ...files.validation import location_of, read_model
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import exponential, from_matrix, logarithm, to_matrix
 from ...robots.robot_description import RobotDescription
@@ -284,7 +284,7 @@ class Hardware(Parameters):
         if found is not None and tree is not None:
             for requirement in found.find_faults(robot):
                 problems.add(
-                    Code.UNMET_REQUIREMENT, requirement.message, place_of(tree, requirement.parameter.split(".")),
+                    Code.UNMET_REQUIREMENT, requirement.message, location_of(tree, requirement.parameter.split(".")),
                     at=requirement.parameter, expected=requirement.expected, found=requirement.found,
                     nearest=requirement.nearest, fix=requirement.fix,
                 )  # fmt: skip

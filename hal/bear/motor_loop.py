@@ -323,7 +323,7 @@ class MotorThread:
     Args:
         loop: the motor loop.
         command_age: how old a command may be [s].
-        objection: called before every cycle; a text that is not empty ends the driving.
+        stop_reason: called before every cycle; a text that is not empty ends the driving.
     """
 
     def __init__(self, loop: MotorLoop, command_age: float, stop_reason: Callable[[], str]) -> None:

@@ -42,7 +42,7 @@ from ...files.validation import describe
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.call_sequence import Call
 from ...robots.description import RobotDescription
-from ...robots.robot_description import MountedSensorPart
+from ...robots.robot_description import SensorMount
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.registry import find_class
@@ -145,7 +145,7 @@ class MountedSensor(Sensor):
 
     Args:
         name: of the sensor, and of the robot's output.
-        part: the sensor's entry in the description.
+        mount: the sensor's entry in the description.
 
     Raises:
         SensorError: the entry sets something that this kind of sensor does not have.
@@ -158,18 +158,18 @@ class MountedSensor(Sensor):
 
     Settings: ClassVar[type[SensorSettings]] = SensorSettings
 
-    def __init__(self, name: str, part: MountedSensorPart) -> None:
+    def __init__(self, name: str, mount: SensorMount) -> None:
         super().__init__(name)
-        self.link, self.position = part.link, part.position
-        length = math.sqrt(sum(x * x for x in part.orientation))
+        self.link, self.position = mount.link, mount.position
+        length = math.sqrt(sum(x * x for x in mount.orientation))
         if not 0.0 < length < math.inf:
             raise SensorError(
                 f"sensor {name}: orientation is a quaternion x, y, z, w that is not zero, not "
-                f"{list(part.orientation)}"
+                f"{list(mount.orientation)}"
             )
-        self.orientation = tuple(x / length for x in part.orientation)
+        self.orientation = tuple(x / length for x in mount.orientation)
         try:
-            self.settings = self.Settings.model_validate(dict(part.model_extra or {}))
+            self.settings = self.Settings.model_validate(dict(mount.model_extra or {}))
         except ValidationError as error:
             first = describe(error.errors(include_url=False)[0], self.Settings)
             known = ", ".join(self.Settings.model_fields)
@@ -255,16 +255,16 @@ def mounted_sensors(
         SensorError: there is no such kind or link, or a setting is wrong.
     """
     found: list[MountedSensor] = []
-    for name, part in robot.sensors.mounted.items() if robot is not None else ():
+    for name, mount in robot.sensors.mounted.items() if robot is not None else ():
         assert robot is not None
         links = [link.name for link in robot.links]
-        if part.link not in links:
-            near = get_close_matches(part.link, links, 1)
+        if mount.link not in links:
+            near = get_close_matches(mount.link, links, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise SensorError(f"sensor {name}: {robot.name} has no link {part.link!r}{hint}")
+            raise SensorError(f"sensor {name}: {robot.name} has no link {mount.link!r}{hint}")
         try:
-            kind = find_sensor(part.kind, folder)
+            kind = find_sensor(mount.kind, folder)
         except SensorError as error:
             raise SensorError(f"sensor {name}: {error}") from error
-        found.append(kind(name, part))
+        found.append(kind(name, mount))
     return tuple(found)

@@ -29,8 +29,8 @@ from ...mathematics.arrays import (
     Vector3,
 )
 from ...mathematics.compiling.call_sequence import Call, CallSequence
+from ...mathematics.compiling.foreign_call import ForeignCall, address_of
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.compiling.library_call import LibraryCall, address_of
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
@@ -167,7 +167,7 @@ class ExternalForces:
             )
 
 
-def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
+def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
     """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
     and ``data`` must stay alive.
 
@@ -180,8 +180,8 @@ def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
     first, second = _addresses()
     memory = model._address, data._address
     return (
-        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
-        LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
+        ForeignCall(partial(mujoco.mj_step1, model, data), first, *memory),
+        ForeignCall(partial(mujoco.mj_step2, model, data), second, *memory),
     )
 
 
@@ -357,7 +357,7 @@ class Plant:
         )
         self.step1, self.step2 = step_calls(model, data)
         if self._params.contact_bias:
-            self.step1 = LibraryCall(ContactBias(model, data).begin_step, 0)
+            self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(

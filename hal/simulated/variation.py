@@ -13,7 +13,7 @@ from ...mathematics.elementary import cos, sin
 from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
 from .effects import CableParameters, JointEffects
-from .imu_effects import NOMINAL, ImuPlace, draw_place, draw_spread
+from .imu_effects import NOMINAL, ImuPose, draw_imu_pose, draw_spread
 from .simulated_robot import SimulatorParameters
 
 
@@ -41,7 +41,7 @@ class Variation:
     link_inertia: tuple[float, ...] = ()
     friction_of_joint: tuple[float, ...] = ()
     rotor_inertia: tuple[float, ...] = ()
-    imu: ImuPlace = NOMINAL
+    imu: ImuPose = NOMINAL
     rotor_share: float = 1.0
     sole: tuple[float, float] | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
@@ -133,7 +133,7 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         factors(Purpose.LINK_MASS, links.mass_spread, len(robot.links)), centres,
         factors(Purpose.LINK_INERTIA, links.inertia_spread, len(robot.links)),
         factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
-        draw_place(params.imu, params.seed) if params.imu.moved else NOMINAL,
+        draw_imu_pose(params.imu, params.seed) if params.imu.moved else NOMINAL,
         1.0 if params.gears is None else params.gears.output_share,
         None if params.soles is None else (params.soles.time_constant, params.soles.damping_ratio),
         _gravity(params), factors(Purpose.LINK_LENGTH, links.length_spread, len(robot.links)),

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...blocks.signals import ImuReading
 from ...blocks.signals.robot import HEALTHY
-from ...robots.robot_description import MountedSensorPart
+from ...robots.robot_description import SensorMount
 from ..bear.protocol import (
     BROADCAST,
     CONFIG,
@@ -326,7 +326,7 @@ class EmulatedBoard:
     def __init__(self) -> None:
         self.mode = BoardMode.NOMINAL
         self.cooling = 0
-        self._imu = Imu("imu", MountedSensorPart(kind="imu", link=""))
+        self._imu = Imu("imu", SensorMount(kind="imu", link=""))
         self._pending = bytearray()
         self._calibrating = False
 

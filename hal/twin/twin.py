@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.signals import ExternalForce, ImuReading, JointState
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.call_sequence import CallSequence
-from ...mathematics.compiling.library_call import LibraryCall
+from ...mathematics.compiling.foreign_call import ForeignCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
@@ -21,7 +21,7 @@ from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
-from .faults import ANSWERS, Faults, InjectedFault, apply_fault, corrupt_byte
+from .injected_faults import ANSWERS, InjectedFault, InjectedFaults, apply_fault, corrupt_byte
 from .snapshot import Attributes
 
 BRAKING = 0.5
@@ -76,7 +76,7 @@ class Twin:
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
         self.limits = self.drives.limits
-        self.faults = Faults(faults, params.seed)
+        self.faults = InjectedFaults(faults, params.seed)
         self.lockstep = True
         """Whether time goes on with the exchanges; else only by ``advance``."""
         self.released = False
@@ -221,7 +221,7 @@ class Twin:
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
-    ) -> LibraryCall:
+    ) -> ForeignCall:
         """Return the call for the torques of the drives, and of the gantry until it lets go."""
         holding = self._gantry.torque_call(step, position, velocity, speed, self._held)
 
@@ -232,7 +232,7 @@ class Twin:
                 holding.run()
                 np.add(out, self._held, out=out)
 
-        return LibraryCall(write, 0)
+        return ForeignCall(write, 0)
 
     def clear_record(self) -> None:
         """Begin a new record of torques, loads and limits; packets go on."""

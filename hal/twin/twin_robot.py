@@ -22,7 +22,7 @@ from ..simulated.simulated_robot import (
 )
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from ..simulated.unsupported import uneven_contacts, unsupported_motor
-from .faults import InjectedFault
+from .injected_faults import InjectedFault
 from .snapshot import Attributes, ObjectSnapshot
 from .twin import Twin
 

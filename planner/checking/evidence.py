@@ -24,7 +24,7 @@ from ...robots.kinematics import (
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
-from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
+from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.phase import Phase
@@ -111,8 +111,10 @@ def body_heights(
     return found
 
 
-def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[Array, str] | None:
-    """Return the same as ``leg_lack`` between each of the ``arms`` and all that is no part of it; and which link lacks
+def arm_clearance_deficit(
+    robot: RobotDescription, poses: LinkPoses, wanted: float
+) -> tuple[Array, str] | None:
+    """Return the same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks
     most. ``None`` where no arm has shapes that could touch.
     """
     parent = {joint.child: joint.parent for joint in robot.joints}
@@ -127,20 +129,20 @@ def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[
                 if not (own and others):
                     continue
                 near = gaps_between(own, others)
-                found = lacking(near, wanted, 0, carried=other.name == parent[link])
+                found = clearance_deficit(near, wanted, 0, carried=other.name == parent[link])
                 lack = found if lack is None else np.maximum(lack, found)
                 if found.max() > most:
                     most, worst_link = float(found.max()), f"{link} at {other.name}"
     return None if lack is None else (lack, worst_link)
 
 
-def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
+def leg_clearance_deficit(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
     """Return the distance [m] by which the links of different legs are closer than ``wanted``, or than at the first
     instant where they stand closer than that, the worst at each instant (n,); ``None`` where no two legs have shapes.
     """
     lack: Array | None = None
     for gap in _gaps(robot, poses):
-        found = lacking(gap, wanted, 0)
+        found = clearance_deficit(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
@@ -159,7 +161,7 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
 
 @per_robot
 def _asymmetric(robot: RobotDescription) -> bool:
-    """See ``Evidence.asymmetric``."""
+    """Return ``Evidence.asymmetric``."""
     robot = welded(robot).robot
     pairs = mirrored_pairs(robot)
     return pairs is not None and symmetrised(robot, pairs) != robot

@@ -26,15 +26,15 @@ from .evidence import (
     MILLIMETRE,
     Evidence,
     PlanTestResult,
-    arm_lack,
+    arm_clearance_deficit,
     body_heights,
-    leg_lack,
+    leg_clearance_deficit,
     worst,
 )
 from .replay import replay
 
 HIT_TOLERANCE = 0.05
-"""m/s by which feet may be faster at touchdown than the margins say."""
+"""Margin by which feet may be faster at touchdown than the task's margins [m/s]."""
 SHORTEST_IMPACT = 0.004
 """s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
 bounds its impulse at touchdown."""
@@ -376,16 +376,16 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None:  # else no two legs have shapes that could touch
-        sample = int(lacking.argmax())
-        yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None:  # else no two legs have shapes that could touch
+        sample = int(deficit.argmax())
+        yield PlanTestResult("leg_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
-    swung = arm_lack(robot, e.poses, task.leg_clearance) if task.moving else None
+    swung = arm_clearance_deficit(robot, e.poses, task.leg_clearance) if task.moving else None
     if swung is not None:
-        lacking, link = swung
-        sample = int(lacking.argmax())
-        yield PlanTestResult("arm_clearance", float(lacking[sample]), MILLIMETRE, "m",
+        deficit, link = swung
+        sample = int(deficit.argmax())
+        yield PlanTestResult("arm_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what moving arms lack of that gap to the rest of the body",
                     f"{link} {e.moment(sample)}")  # fmt: skip
 
@@ -400,7 +400,7 @@ PLAN_TESTS: tuple[Callable[[Evidence], Iterator[PlanTestResult]], ...] = (
 NEAR = 0.985
 """The share of a limit from which it counts as reached."""
 NEAR_LIMIT = 0.01
-"""rad; the same for a joint's limit."""
+"""Distance from a joint's limit at which it counts as reached [rad]."""
 LEAST_TIME = 0.02
 """Share of the plan's instants that must be at a limit for it to be named."""
 LEAST_GAP = 0.002
@@ -473,8 +473,8 @@ def _narrow(e: Evidence) -> Iterator[str]:
     ):
         if height.min() < least + MILLIMETRE < height[0]:
             yield name
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None and lacking[0] < -MILLIMETRE < lacking.max():
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None and deficit[0] < -MILLIMETRE < deficit.max():
         yield "leg"
 
 

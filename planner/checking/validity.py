@@ -73,7 +73,7 @@ class ValidityReport:
         }
 
     def explain(self) -> str:
-        """One line for every test that failed."""
+        """Return one line for every test that failed."""
         return "\n".join(
             f"{test.name}: {test.text} is {test.value:.4g} {test.unit}, at most {test.limit:.4g} "
             f"{test.unit} is allowed{f' ({test.where})' if test.where else ''}"
@@ -125,7 +125,7 @@ def require_valid(plan: PlannedJump, robot: RobotDescription) -> None:
         )
 
 
-def why_not(error: Exception) -> str:
+def failure_text(error: Exception) -> str:
     """Return what binds where a task has no valid plan, in a few words, from what the planner raised."""
     if isinstance(error, InvalidPlanError):
         return ", ".join(t["name"] for t in error.plan.report["tests"] if not t["passed"])

@@ -122,7 +122,7 @@ def draw_postures(axes: Axes, plan: PlannedJump, robot: RobotDescription) -> Non
 
 
 def posture_times(plan: PlannedJump) -> Array:
-    """Instants [s] that show the whole motion: more of them about the thrust and in the flight."""
+    """Return the instants [s] that show the whole motion: more of them about the thrust and in the flight."""
     if plan.later_flights:
         return np.linspace(0.0, plan.time[-1], POSTURES)
     lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
@@ -251,7 +251,7 @@ def torque_share_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def speed_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """Motor speeds as shares of the speed without load."""
+    """Return the motor speeds as shares of the speed without load."""
     share = np.abs(e.motor_speed) / e.plan.task.equipped(e.robot).motors.no_load_speed
     return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
 

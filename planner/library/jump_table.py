@@ -165,7 +165,7 @@ WHOLE = math.pi
 TUCKED = 0.9
 """The legs are tucked from when the rate is this share of its greatest."""
 OUT = 0.3
-"""They are out when this share of the rate's way from its greatest to its last value is left."""
+"""The legs are out when this share of the rate's way from its greatest to its last value is left."""
 ROUNDING = 1e-9
 
 

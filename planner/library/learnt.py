@@ -38,7 +38,7 @@ NEAR, FAR = 0.25, 1.5
 NOISE = 0.5
 """Scatter of one lesson, as a share of what robots need."""
 FORGETTING = 0.9
-"""With each further jump a lesson counts as if its noise had grown by this share's inverse."""
+"""Factor by whose inverse a lesson's variance of noise grows with each further jump."""
 MOST = 40
 """Lessons that are kept, the last ones."""
 LARGEST = 0.15
@@ -90,8 +90,8 @@ class LearntJumps:
         launches = np.array([lesson.launch for lesson in self.lessons])
         needed = np.array([lesson.velocity + lesson.momentum for lesson in self.lessons])
         ages = np.arange(len(launches))[::-1]
-        gram = likeness(launches[:, None] - launches) + np.diag(NOISE**2 / FORGETTING**ages)
-        weights = product(inverse(gram), likeness(launches - np.array(launch)))
+        gram = similarity(launches[:, None] - launches) + np.diag(NOISE**2 / FORGETTING**ages)
+        weights = product(inverse(gram), similarity(launches - np.array(launch)))
         x, y, z, kx, ky, kz = product(weights, needed).round(5).tolist()
         return (x, y, z), (kx, ky, kz)
 
@@ -100,7 +100,7 @@ class LearntJumps:
         return LearntJumps(self.robot, (*self.lessons, lesson)[-MOST:])
 
 
-def likeness(differences: Any) -> Any:
+def similarity(differences: Any) -> Any:
     """Return the similarity of launches with these differences (..., 4), from 0 to 1."""
     square = -0.5 * (differences**2).sum(axis=-1)
     return SHARED * np.exp(square / FAR**2) + (1.0 - SHARED) * np.exp(square / NEAR**2)

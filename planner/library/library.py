@@ -65,7 +65,7 @@ ALIKE = 2.0
 """Greatest distance between two tasks at which the plan of one is evidence for the other."""
 
 Solver = Callable[[JumpTask, RobotDescription, PlannedJump | None], PlannedJump]
-"""Makes a plan of a task, starting from another plan where one is given."""
+"""Maker of a plan of a task, from another plan where one is given."""
 
 
 def user_folder() -> Path:
@@ -334,12 +334,12 @@ class PlanLibrary:
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
         from ..checking.validity import InvalidPlanError
-        from .once import require_valid_once
+        from .validation_cache import require_valid_cached
 
         kept = None if anew else self.find(task)
         if kept is not None:
             try:
-                require_valid_once(kept, self.robot)
+                require_valid_cached(kept, self.robot)
             except InvalidPlanError:
                 path = self.path_of(task)
                 if path is None or path.parent != user_folder():
@@ -399,7 +399,7 @@ def solve_and_check(
         JumpTaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
     from ..checking.validity import checked, require_valid
-    from ..solving.solve import ROUNDS, curable
+    from ..solving.solve import ROUNDS, relaxable
     from ..task.read_task import require_consistent
 
     require_consistent(task, robot)
@@ -414,7 +414,7 @@ def solve_and_check(
                 return plan
     plan = checked(make(task, robot, None), robot)
     for _ in range(ROUNDS if refine else 0):
-        if plan.valid or not curable(plan):
+        if plan.valid or not relaxable(plan):
             break
         try:
             plan = checked(make(task, robot, plan), robot)

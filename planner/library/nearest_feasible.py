@@ -29,7 +29,7 @@ ALTOGETHER = 8.5
 STRIDES, FIRST_STRIDES = 8, 4
 """Least numbers of steps on the way to the wanted values, from a kept plan's value and from a modest one."""
 SINGLE = 2
-"""So many parameters are changed on their own before all are changed together."""
+"""Number of parameters that are changed on their own before all are changed together."""
 TOGETHER = ("rise", "take_off_speed", "distance_x", "distance_y", "twist", "landing_height")
 UPWARDS = ("rise", "take_off_speed", "landing_height")
 SHARES = 20

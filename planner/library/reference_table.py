@@ -165,8 +165,9 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
-    base position, Euler angles and joints between two knots."""
+    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    base position, Euler angles and joints between two knots.
+    """
     angles = euler_angles(plan.position[:, 3:7])
     turns = matrices_of_quaternions(plan.position[:, 3:7])
     places = np.hstack([plan.position[:, :3], angles])
@@ -188,8 +189,9 @@ def _between(
 
 
 def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
-    """Pinocchio's quaternions (n, 4) of rotation matrices (n, 3, 3), with its bits; all with a positive trace, as those
-    of an upright base, at once."""
+    """Return Pinocchio's quaternions (n, 4) of rotation matrices (n, 3, 3), with its bits; all with a positive trace,
+    as those of an upright base, at once.
+    """
     trace = turns[:, 0, 0] + (turns[:, 1, 1] + turns[:, 2, 2])
     root = np.sqrt(np.maximum(trace, 0.0) + 1.0)
     share = 0.5 / root

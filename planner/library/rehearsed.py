@@ -180,7 +180,7 @@ def _hash_of(plan: Path) -> str:
 
 
 def read_vector(values: Any) -> Vector:
-    """Three finite numbers from a file; raises ``ValueError`` or ``TypeError`` for anything else."""
+    """Read three finite numbers from a file; raises ``ValueError`` or ``TypeError`` for anything else."""
     x, y, z = (float(value) for value in values)
     if not all(abs(value) < 1e6 for value in (x, y, z)):
         raise ValueError(f"{values} is not finite")

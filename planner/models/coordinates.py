@@ -108,14 +108,16 @@ def full_coordinates(model: SymbolicModel) -> Coordinates:
 
 
 def sagittal_coordinates(model: SymbolicModel) -> Coordinates | None:
-    """Motion in the sagittal plane: the joints about y move, left and right alike, and all others
-    keep their zero; ``None`` if the robot is not the same left and right."""
+    """Return coordinates of motion in the sagittal plane: the joints about y move, left and right alike, and all others
+    keep their zero; ``None`` if the robot is not the same left and right.
+    """
     return _mirrored(model, "sagittal")
 
 
 def mirrored_coordinates(model: SymbolicModel) -> Coordinates | None:
-    """Motion that is the same left and right, with all joints of the computed limbs; ``None`` if
-    the robot is not the same left and right."""
+    """Return coordinates of motion that is the same left and right, with all joints of the computed limbs; ``None`` if
+    the robot is not the same left and right.
+    """
     return _mirrored(model, "mirrored")
 
 

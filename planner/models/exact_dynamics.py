@@ -59,8 +59,9 @@ class JointMotion(NamedTuple):
     duration: float | Array
 
     def at(self, time: float | Array) -> Motion:
-        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n
-        times (n, 1) each is (n, n_joints)."""
+        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
+        each is (n, n_joints).
+        """
         t, u = self.duration, time / self.duration
         way = self.end - self.start
         bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
@@ -70,7 +71,7 @@ class JointMotion(NamedTuple):
         return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """Motion over some steps under constant contact forces.
 
     Attributes:
@@ -149,8 +150,7 @@ class ExactDynamics:
         return found
 
     def contact_jacobians(self, q: Array) -> tuple[Array, Array]:
-        """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
-        axes."""
+        """Return the contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world axes."""
         pin = self.pin
         points = self.evaluated_points(q)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -254,8 +254,9 @@ class ExactDynamics:
         return found
 
     def foot_angles(self) -> tuple[Array, Array]:
-        """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
-        last. A ball has none of its own: it has the base's heading and no pitch."""
+        """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
+        has none of its own: it has the base's heading and no pitch.
+        """
         turns = [self.data.oMf[frame].rotation for frame in self.sole_frames]
         yaw, pitch = self._angles(
             np.array(turns).reshape(1, -1, 3, 3), np.array(self.data.oMi[1].rotation)[None]
@@ -287,7 +288,7 @@ class ExactDynamics:
         return np.array(self.pin.centerOfMass(self.model, self.data, q))
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
+        """Return the centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
         momentum = self.pin.computeCentroidalMomentum(self.model, self.data, q, v)
         com = np.array(self.data.com[0])
         return com, np.array(momentum.linear) / self.mass, np.array(momentum.angular)
@@ -401,7 +402,7 @@ class ExactDynamics:
         return found
 
     def _pushed(self, q: Array, force: Array) -> Array:
-        """J' F: the generalised force of the contacts."""
+        """Return J' F, the generalised force of the contacts."""
         pushed = np.zeros(self.model.nv)
         if not force.any():
             return pushed
@@ -443,24 +444,24 @@ class ExactDynamics:
         count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
         h = duration / count
         angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        stretch = Stretch(q[:7], v[:6], angles, speeds, force, np.full(count, h))
-        places, rates = self.follow([stretch])
+        segment = Segment(q[:7], v[:6], angles, speeds, force, np.full(count, h))
+        places, rates = self.follow([segment])
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
-    def follow(self, stretches: list[Stretch]) -> tuple[Array, Array]:
-        """Return the states after every step of all stretches in turn: (n_steps, n_positions) and (n_steps,
+    def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
+        """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
-        angles = np.concatenate([one.angles for one in stretches])
-        speeds = np.concatenate([one.speeds for one in stretches])
-        steps = np.concatenate([one.steps for one in stretches])
-        counts = np.array([len(one.steps) for one in stretches])
+        angles = np.concatenate([one.angles for one in segments])
+        speeds = np.concatenate([one.speeds for one in segments])
+        steps = np.concatenate([one.steps for one in segments])
+        counts = np.array([len(one.steps) for one in segments])
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        force = np.array([one.force for one in stretches])
+        force = np.array([one.force for one in segments])
         base, twist = (
-            np.array([one.base for one in stretches]),
-            np.array([one.twist for one in stretches]),
+            np.array([one.base for one in segments]),
+            np.array([one.twist for one in segments]),
         )
         seen = self._at_origin(angles, speeds)
         starts, ends = (
@@ -545,13 +546,13 @@ def joint_motions(
 
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
-) -> list[Stretch]:
+) -> list[Segment]:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
     angles, speeds, _ = joints.at(np.asarray(quarters))
     return [
-        Stretch(
+        Segment(
             position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
             np.full(2, 0.5 * float(time[k + 1] - time[k])),
         )

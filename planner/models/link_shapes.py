@@ -111,7 +111,7 @@ def _middle(shape: Shape) -> Vector3:
 
 @lru_cache(maxsize=512)
 def _solid(shape: Shape) -> tuple[Any, Any, float]:
-    """Coal's shape, where its frame is in the link's, and how far it reaches from the middle of its corners [m]."""
+    """Return Coal's shape, the place of its frame in the link's, and its reach from the middle of its corners [m]."""
     import coal
 
     middle = np.array(_middle(shape))
@@ -124,7 +124,7 @@ def _solid(shape: Shape) -> tuple[Any, Any, float]:
     return solid, coal.Transform3s(turn, middle), reach
 
 
-def lacking(gaps: Array, wanted: float, at: int, *, carried: bool = False) -> Array:
+def clearance_deficit(gaps: Array, wanted: float, at: int, *, carried: bool = False) -> Array:
     """Return the distance [m] by which any of the pairs is closer than ``wanted``, or than at the instant ``at`` where
     it is closer then, the worst at each instant (n,). Pairs of a link and the one that it is ``carried`` by which are
     that close at ``at`` form the joint between them, and do not count.

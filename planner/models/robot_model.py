@@ -20,7 +20,7 @@ from .symbolic_model import SymbolicModel
 from .symmetry import Pair, mirrored_pairs, symmetrised, symmetrised_angles
 
 HARD, HARD_TURN = 40.0, 100.0
-"""m/s^2 and rad/s^2 of a link in a hard jump, gravity included."""
+"""Accelerations of a link in a hard jump, gravity included [m/s^2, rad/s^2]."""
 MATTERS = 0.5
 """Held joints that need less than this share of their motors in such a motion have no constraint."""
 TWIN = 10.0
@@ -122,8 +122,9 @@ class StanceFinder:
     def __init__(
         self, robot: RobotDescription, pairs: Sequence[Pair] = (), loosely: float = 1.0
     ) -> None:
-        """``pairs`` of limbs get the same angles where they are to have almost the same ones; ``loosely`` multiplies
-        what almost means."""
+        """Give ``pairs`` of limbs the same angles where they are to have almost the same ones; ``loosely`` multiplies
+        what almost means.
+        """
         self.robot, self.pairs, self.loosely = robot, tuple(pairs), loosely
         self._body = ExactDynamics(robot)
         self._placed: dict[tuple[bytes, StanceLocation], Stance] = {}
@@ -272,7 +273,7 @@ def _normal(points: Array) -> Array:
 
 
 def _lean(normal: Array) -> Array:
-    """Pitch and roll of the base that make a direction of the body vertical."""
+    """Return the pitch and roll of the base that make a direction of the body vertical."""
     roll = np.arctan2(normal[1], normal[2])
     return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
 
@@ -283,7 +284,8 @@ def _base_rotation(q: Array) -> Array:
 
 
 def _turned(q: Array, heading: float) -> Array:
-    """Pitch, roll, yaw of a base that leans as in the coordinates ``q`` and is then turned by
-    ``heading``."""
+    """Return the pitch, roll and yaw of a base that leans as in the coordinates ``q`` and is then turned by
+    ``heading``.
+    """
     turn = rotation(np.array([0.0, 0.0, heading]))
     return angles_of(turn @ _base_rotation(q))[ORDER]

@@ -130,7 +130,7 @@ def _at_rest_base(model: SymbolicModel, q: Any) -> Any:
 
 
 def com(model: SymbolicModel, q: Any) -> Any:
-    """f_com of equation (r = f_com(q)), world."""
+    """Return f_com of equation (r = f_com(q)), world."""
     import casadi as ca
 
     seen = model.com(_at_rest_base(model, q))
@@ -138,7 +138,7 @@ def com(model: SymbolicModel, q: Any) -> Any:
 
 
 def contact_points(model: SymbolicModel, q: Any) -> list[Any]:
-    """f_contact of equation (c = f_contact(q)): of every contact point, world."""
+    """Return f_contact of equation (c = f_contact(q)): of every contact point, world."""
     import casadi as ca
 
     turn = quaternion_rotation(q[QUATERNION])
@@ -147,7 +147,7 @@ def contact_points(model: SymbolicModel, q: Any) -> list[Any]:
 
 
 def angular_momentum(model: SymbolicModel, q: Any, v: Any) -> Any:
-    """A(q) v, the rows of the centroidal momentum matrix for the angular momentum, world."""
+    """Return A(q) v, the rows of the centroidal momentum matrix for the angular momentum, world."""
     import casadi as ca
 
     # Of the unturned base the rates of pitch, roll and yaw are those about y, x and z. Angular

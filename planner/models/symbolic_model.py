@@ -159,8 +159,9 @@ class SymbolicModel:
         return origin + ca.mtimes(rotation, ca.DM(list(place)))
 
     def contact_points(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
-        """World positions of the contact points on those limbs, in the description's order; of a
-        ball the lowest point."""
+        """Return the world positions of the contact points on those limbs, in the description's order; of a ball the
+        lowest point.
+        """
         return self._contacts(q, limbs, None)
 
     def footholds(
@@ -340,8 +341,9 @@ class SymbolicModel:
     def _accelerations(
         self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None
     ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Angular velocity, angular acceleration and acceleration of the origin, with gravity's
-        opposite added, of the links of the base and those limbs, each in its own frame."""
+        """Return the angular velocity, angular acceleration and acceleration of the origin, with gravity's opposite
+        added, of the links of the base and those limbs, each in its own frame.
+        """
         import casadi as ca
 
         base = self.robot.base
@@ -374,7 +376,7 @@ class SymbolicModel:
         return spins, turns, pulls
 
     def _body_wrench(self, link: Link, spin: Any, turn: Any, pull: Any) -> Any:
-        """Force and moment about the link's origin that its own mass needs, in its frame."""
+        """Return the force and moment about the link's origin that its own mass needs, in its frame."""
         import casadi as ca
 
         centre = ca.DM(list(link.com))
@@ -396,7 +398,7 @@ class SymbolicModel:
         return False
 
     def joints_of(self, limbs: Sequence[int] | None) -> list[int]:
-        """Joint indices of those limbs, or of all of them, parents first."""
+        """Return the joint indices of those limbs, or of all of them, parents first."""
         chosen = range(len(self.limbs)) if limbs is None else limbs
         return sorted(index for limb in chosen for index in self.limbs[limb])
 

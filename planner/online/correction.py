@@ -128,7 +128,7 @@ def squares_of_changes(problem: FullProblem) -> Array:
         changes[state + n : state + 2 * n] = RATE
         if knot.controls:
             changes[control : control + n] = ACCELERATION
-            flies = problem.stretch_at(k).flies
+            flies = problem.phase_at(k).flies
             own = len(problem.coordinates.turning) if flies else problem.coordinates.forces
             changes[control + n : control + n + own] = RATE if flies else FORCE
     return np.asarray(changes * changes)

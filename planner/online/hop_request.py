@@ -11,7 +11,7 @@ from ..task.task import JumpTask, Knots, make_task
 
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 STEP_KNOTS = Knots(squat=9, thrust=10, flight=12, landing=10)
-"""Those of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
+"""Knots of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
 RISE_SHARE = 0.5
 """Added height of a jump for each metre that it lands higher: with a half, flights take equally long."""
 TOE_KNOTS = 4
@@ -120,9 +120,13 @@ def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
 def coarse(task: JumpTask) -> JumpTask:
     """Return a task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
 
-    def on_fewer(span: PhaseSpec) -> PhaseSpec:
-        return span if span.knots is None else span.model_copy(update={"knots": TOE_KNOTS})
+    def on_fewer(phase_spec: PhaseSpec) -> PhaseSpec:
+        return (
+            phase_spec
+            if phase_spec.knots is None
+            else phase_spec.model_copy(update={"knots": TOE_KNOTS})
+        )
 
-    phases = task.phases and tuple(on_fewer(span) for span in task.phases)
+    phases = task.phases and tuple(on_fewer(phase_spec) for phase_spec in task.phases)
     knots = STEP_KNOTS if task.landing_height else KNOTS
     return task.model_copy(update={"knots": knots, "phases": phases})

@@ -79,7 +79,7 @@ def step_request(index: int, reach: StepReach) -> HopRequest:
 
 
 def scaled(limits: Sequence[float], robot: RobotDescription) -> list[float]:
-    """Lengths of BRUCE for another robot."""
+    """Scale lengths of BRUCE to another robot."""
     share = standing_height(robot) / HEIGHT
     return [round(share * length, 3) for length in limits]
 
@@ -105,7 +105,7 @@ Tell = Callable[[HopRequest, bool], None]
 def plan_level_hops(
     robot: RobotDescription, wanted: HopReach, tell: Tell, count: int
 ) -> PlanSamples:
-    """Plan those on level ground, lower than asked for where the motors are too weak.
+    """Plan hops on level ground, lower than wanted where the motors are too weak.
 
     Raises:
         PlanError: not even the lowest jump on the spot has a valid plan.

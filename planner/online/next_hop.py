@@ -120,7 +120,9 @@ class HopPlanner:
         return plan, steps, time.process_time() - started
 
     def _guesses(self, wanted: HopRequest) -> Iterator[PlannedJump]:
-        """Motions near that of a request: between the stored plans, and where that leads to none the nearest of them."""
+        """Yield motions near that of a request: between the stored plans, and where that leads to none the nearest of
+        them.
+        """
         samples = self.samples(wanted)
         yield samples.interpolated(wanted)
         yield samples.plan(samples.nearest(wanted))

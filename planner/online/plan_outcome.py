@@ -1,4 +1,4 @@
-"""Which plan answers a request for the next hop."""
+"""Outcome of a request for the next hop's plan."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from enum import IntEnum
 
 
 class PlanOutcome(IntEnum):
-    """Which plan answers a request."""
+    """Plan that answers a request."""
 
     NONE = 0
-    """None was asked for."""
+    """No request."""
     PLANNED = 1
-    """A plan of what was asked."""
+    """A plan of the requested hop."""
     NEAREST = 2
-    """What was asked is out of reach; the plan is of the nearest that is within."""
+    """The request is out of reach; the plan is of the nearest hop within it."""
     UNSOLVED = 3
     """No motion was found; the plan is the nearest of the stored ones."""
     INVALID = 4

@@ -28,7 +28,7 @@ FILE_FORMAT = "aloft hop plans 3"
 SCALES = np.array([0.1, 0.1, 0.4, 0.05])
 """Difference of each part of a request that counts as a distance of 1."""
 NEAR = 0.3
-"""Within this distance plans count alike."""
+"""Distance within which plans count alike."""
 KEPT_EXACTLY = ("contact", "phase")
 
 
@@ -76,7 +76,7 @@ class PlanSamples:
         return int(square.argmin())
 
     def plan(self, row: int) -> PlannedJump:
-        """One of the plans. Its flight begins and ends at knots, whose times are in single precision."""
+        """Return one of the plans. Its flight begins and ends at knots, whose times are in single precision."""
         weights = np.eye(len(self.requests))[row]
         plan = self._make(HopRequest(*self.requests[row].tolist()), weights)
         flying = np.flatnonzero(plan.phase == Phase.FLIGHT)

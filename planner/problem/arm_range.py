@@ -14,7 +14,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
+from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
 from ..task.scaling import per_robot
 
 POSES = 6000
@@ -22,7 +22,7 @@ POSES = 6000
 FINEST = 61
 """Angles of a joint of an arm with few joints."""
 TURN = np.pi
-"""rad; how far joints without limits are looked at on either side."""
+"""Range examined on either side of a joint without limits [rad]."""
 
 
 @per_robot
@@ -47,7 +47,7 @@ def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float,
 def _ranges(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float
 ) -> dict[int, tuple[float, float]]:
-    """Those of one arm."""
+    """Return the ranges of one arm."""
     count = min(FINEST, int(POSES ** (1.0 / len(joints))))
     angles, start = list[Array](), list[int]()
     for k in joints:
@@ -92,10 +92,10 @@ def _clear(
     for link in arm:
         for each in moving_shapes(robot, poses, link) if side else ():
             inside = (side * each.corners()[:, :, 1]).min(axis=0) - each.shape.radius
-            clear &= lacking(inside[None], 0.5 * gap, here) <= 0.0
+            clear &= clearance_deficit(inside[None], 0.5 * gap, here) <= 0.0
         for other in trunk:
             own, body = (moving_shapes(robot, poses, name) for name in (link, other))
             if own and body:
                 gaps = gaps_between(own, body)
-                clear &= lacking(gaps, gap, here, carried=other == carrier[link]) <= 0.0
+                clear &= clearance_deficit(gaps, gap, here, carried=other == carrier[link]) <= 0.0
     return np.asarray(clear.reshape(grid.shape[:-1]))

@@ -112,7 +112,7 @@ class Assembly:
         return np.arange(end - len(self.knots[k].fixed), end)
 
     def _place(self) -> None:
-        """Global indices of every piece's variables and rows; -1 for rows left out."""
+        """Compute the global indices of every piece's variables and rows; -1 for rows left out."""
         self._columns: dict[str, Indices] = {}
         self._rows: dict[str, Indices] = {}
         for name, users in self.users.items():
@@ -151,10 +151,10 @@ class Assembly:
     # The functions of the whole problem
 
     def functions(self, *, upper: bool = True) -> dict[str, Any]:
-        """``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions
-        ``nlp_f``, ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures
-        nlpsol's own would have; with ``upper`` also ``hess_lag``, the upper triangle of the
-        Hessian alone."""
+        """Return ``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions ``nlp_f``,
+        ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures nlpsol's own would have; with
+        ``upper`` also ``hess_lag``, the upper triangle of the Hessian alone.
+        """
         import casadi as ca
 
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
@@ -306,7 +306,7 @@ def _layers(place: Indices, source: Indices, size: int, empty: int) -> list[Any]
 
 
 def _gather(vector: Any, index: Indices, shape: tuple[int, int]) -> Any:
-    """Those entries of a dense vector."""
+    """Return those entries of a dense vector."""
     import casadi as ca
 
     return ca.reshape(vector.nz[index.tolist()], *shape) if len(index) else ca.MX(0, 1)

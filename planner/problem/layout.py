@@ -1,6 +1,6 @@
 """The phases of a task divided into intervals: what the knots of its problem stand for.
 
-Knots are the beginnings of intervals, and the end. A stretch is a phase with a number of intervals;
+Knots are the beginnings of intervals, and the end. A problem phase is a phase with a number of intervals;
 where its time is free, and in every flight, the mean length of its intervals is a state that the
 knot before it chooses. With impacts one interval of no length, the touchdown's impulse, comes
 between a flight and the ground.
@@ -106,27 +106,27 @@ class ProblemPhase:
 
 
 def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
-    """Return the stretches of a task in the order of time.
+    """Return the phases of a task in the order of time.
 
     Raises:
         JumpTaskError: a phase on the ground names no contact point.
     """
-    spans, found, knot, place = task.spans(), list[ProblemPhase](), 0, 0
-    for number, span in enumerate(spans):
-        phase, on_ground = PHASES[span.phase], span.on_ground(robot)
+    phase_specs, found, knot, place = task.phase_specs(), list[ProblemPhase](), 0, 0
+    for number, phase_spec in enumerate(phase_specs):
+        phase, on_ground = PHASES[phase_spec.phase], phase_spec.on_ground(robot)
         flies = phase is Phase.FLIGHT
         if not flies and not on_ground:
             raise JumpTaskError(
-                f"phase {number + 1}, {span.phase}: no contact point of {robot.name} is on the ground"
+                f"phase {number + 1}, {phase_spec.phase}: no contact point of {robot.name} is on the ground"
             )
         if task.impact and found and found[-1].flies:
             found.append(
                 ProblemPhase(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True)
             )
             knot += 1
-        last = all(later.phase != "flight" for later in spans[number:])
-        count = span.knots or 1
+        last = all(later.phase != "flight" for later in phase_specs[number:])
+        count = phase_spec.knots or 1
         lengths = spacing(phase, count, last=last)
-        found.append(ProblemPhase(phase, knot, count, span.time, lengths, place, on_ground))
+        found.append(ProblemPhase(phase, knot, count, phase_spec.time, lengths, place, on_ground))
         knot, place = knot + count, place + flies
     return tuple(found)

@@ -76,8 +76,9 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
 
 
 def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
-    """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
-    is nearer to the ground than the gap that is kept."""
+    """Return points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the
+    other half is nearer to the ground than the gap that is kept.
+    """
     corners, _ = corners_of(link.shapes)
     half = 0.5 * max((math.dist(corner, ball) for corner in corners), default=0.0)
     for shape in link.shapes:
@@ -101,8 +102,9 @@ def _between(start: Vector3, end: Vector3, share: float) -> Vector3:
 
 
 def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, float]:
-    """Centre [m, link frame] and radius [m] of what touches the ground at a contact point: the
-    point itself, without a radius, unless its foot is a ball."""
+    """Return the centre [m, link frame] and radius [m] of what touches the ground at a contact point: the point itself,
+    without a radius, unless its foot is a ball.
+    """
     for ball in ball_feet(robot):
         if ball.point == contact:
             x, y, z = (float(value) for value in ball.centre)
@@ -153,19 +155,21 @@ class ObstacleRows:
     def _of(self, *kinds: str) -> Indices:
         return np.sort(np.concatenate([self._of_kind[kind] for kind in kinds]))
 
-    def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
+    def rows(
+        self, hop: Hop, edge: float | None, problem_phase: ProblemPhase, first: bool
+    ) -> Indices:
         """Return the rows of a jump's knot; ``first`` marks the flight's first."""
         turns = bool(hop.rotation)
-        if self.knees_fold and not stretch.flies and not turns:
+        if self.knees_fold and not problem_phase.flies and not turns:
             # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
             return self._folding
-        landed = not stretch.flies and stretch.place > 0 and edge is not None
+        landed = not problem_phase.flies and problem_phase.place > 0 and edge is not None
         if edge is None and not turns:
             return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
         kinds = ["calf"] if turns else ["calf", "shin", "shank"]
         kinds += ["body"] if turns or landed else []
-        if turns and stretch.flies and not first:
+        if turns and problem_phase.flies and not first:
             kinds = ["foot", *kinds]
         return np.concatenate([self._of_kind[kind] for kind in kinds])
 

@@ -238,7 +238,7 @@ class RigidBodyProblemBuilder:
             self.fill.rows("take_off", k, [("take-off speed", 1, self.up, self.up)])
 
     def _guess(self, k: int) -> None:
-        """Standing, a ballistic flight, standing; the weight shared by all contact points."""
+        """Return the guess: standing, a ballistic flight, standing; the weight shared by all contact points."""
         assembly, share = self.fill.assembly, (k - self.flight.start) / len(self.flight)
         at = int(assembly.state_start[k])
         state = self._at_rest(self._stance_at(k))

@@ -148,7 +148,7 @@ class WholeBodyPose:
 def whole_body(
     model: SymbolicModel, path: FeetPath, times: Array, body: Array, rates: Array, first: Array
 ) -> tuple[Array, Array]:
-    """Coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
+    """Return the coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
 
     ``body`` and ``rates`` (N, 6) are centre of mass, pitch, roll and yaw, and their derivatives.
     """

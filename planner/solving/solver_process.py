@@ -25,7 +25,7 @@ from ...processes.child_process import ChildProcess
 
 
 def cpu_time() -> float:
-    """Processor time [s] of this process, of those it has waited for, and what others counted."""
+    """Return the processor time [s] of this process, of those it has waited for, and what others counted."""
     if not hasattr(os, "fork"):
         return time.process_time()
     import resource
@@ -103,7 +103,7 @@ def has_one_thread() -> bool:
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
     """Call a solver of CasADi. Returns the variables, and its report of success."""
-    with quiet():
+    with without_output():
         result = function(**arguments)
     stats = function.stats()
     found = {key: stats.get(key) for key in ("success", "iter_count", "unified_return_status")}
@@ -125,7 +125,7 @@ def call_bounded(
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def without_output() -> Iterator[None]:
     """Silence the solvers, which write to the process's standard output whatever their options."""
     kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -149,7 +149,7 @@ class _Helper:
     def call(
         self, function: Any, arguments: Mapping[str, Array], limit: int
     ) -> tuple[bool, Answer | None]:
-        """See ``call_bounded``."""
+        """Call a solver; see ``call_bounded``."""
         with self._lock:
             try:
                 ended, error, answer, used = self._ask(function, arguments, limit)

@@ -6,10 +6,10 @@ from enum import IntEnum
 
 
 class Phase(IntEnum):
-    """What the robot is doing, in the order of a jump."""
+    """Phase of the robot, in the order of a jump."""
 
     HANG = -1
-    """It hangs in a gantry, or is put down, and does not carry itself yet."""
+    """Hanging in a gantry, or being put down, without carrying itself yet."""
     STAND = 0
     SQUAT = 1
     THRUST = 2

@@ -187,7 +187,7 @@ def motor_load(time: Array, joint_torque: Array, robot: RobotDescription) -> dic
 
 
 def _plain(value: Any) -> Any:
-    """NumPy's numbers and arrays as JSON has them."""
+    """Return NumPy's numbers and arrays as JSON has them."""
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} cannot be kept in a plan file")

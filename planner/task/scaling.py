@@ -123,8 +123,9 @@ def toe_push(robot: RobotDescription) -> float:
 
 @per_robot
 def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[float, float]]:
-    """Limits [rad] that keep every knee bent by that much, by the joint's name or by the part of it
-    that is the same for all of them; no more than most of what the standing robot bends them."""
+    """Return the limits [rad] that keep every knee bent by that much, by the joint's name or by the part of it that is
+    the same for all of them; no more than most of what the standing robot bends them.
+    """
     found: dict[str, tuple[float, float]] = {}
     for foot in robot.feet:
         knee = _knee(robot, foot.link, foot.sole)
@@ -181,7 +182,7 @@ def _lengths(
     robot: RobotDescription, link: str, sole: tuple[float, float, float],
     first: int, joint: int, angles: Array,
 ) -> Array:  # fmt: skip
-    """Distances [m] from a leg's first joint to a place of a link, with one joint at those angles."""
+    """Return the distances [m] from a leg's first joint to a place of a link, with one joint at those angles."""
     positions = np.tile(robot.standing_position, (len(angles), 1))
     positions[:, joint] = angles
     count = len(angles)
@@ -255,11 +256,11 @@ def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]
         if name not in task.model_fields_set
     }
     weights: Parameters = getattr(task, "weights")  # noqa: B009 - any task's
-    said = weights.model_fields_set if "weights" in task.model_fields_set else set()
+    given_fields = weights.model_fields_set if "weights" in task.model_fields_set else set()
     lighter = {
         name: rounded(type(weights).model_fields[name].default * light)
         for name in ("force", "impulse")
-        if name not in said
+        if name not in given_fields
     }
     if lighter:
         changed["weights"] = weights.model_copy(update=lighter)

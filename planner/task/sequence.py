@@ -43,7 +43,7 @@ Slope = tuple[float, float]
 """Angles [rad] by which ground rises along the world's x and y axes, as those of a scene's boxes."""
 LEVEL: Slope = (0.0, 0.0)
 STEEPEST = math.radians(45.0)
-"""rad; a scene's boxes lean no more."""
+"""Steepest slope [rad]; a scene's boxes lean no more."""
 SHORTEST_JUMP_OVER_AN_EDGE = 0.03
 """Start and landing closer together than this [m] have no room for a step's edge between them."""
 PHASES = {
@@ -135,17 +135,20 @@ class PhaseSpec(FreeTimes):
         return tuple(k for k in contact_points(robot, self.contacts) if k not in off)
 
 
-def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
+def check_phase_specs(phase_specs: Sequence[PhaseSpec], flights: int) -> str:
     """Return what is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
-    if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
+    if not PATTERN.fullmatch("".join(phase_spec.phase[0] for phase_spec in phase_specs)):
         return (
             "the phases must be squat or thrust, then flights with thrust or landing between "
-            "them, then landing; found " + ", ".join(span.phase for span in spans)
+            "them, then landing; found " + ", ".join(phase_spec.phase for phase_spec in phase_specs)
         )
-    found = sum(span.phase == "flight" for span in spans)
+    found = sum(phase_spec.phase == "flight" for phase_spec in phase_specs)
     if found != flights:
         return f"there are {found} flights among the phases but {flights} jumps"
-    if any(span.contacts != ALL or span.raised for span in (spans[0], spans[-1])):
+    if any(
+        phase_spec.contacts != ALL or phase_spec.raised
+        for phase_spec in (phase_specs[0], phase_specs[-1])
+    ):
         return "the robot stands on all contact points in the first and in the last phase"
     return ""
 
@@ -178,8 +181,9 @@ class StanceLocation:
 
 
 def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
-    """Axes along feet of that ``heading``, across them and normal to ground that leans, as the
-    columns of a matrix (3, 3)."""
+    """Return the axes along feet of that ``heading``, across them and normal to ground that leans, as the columns of a
+    matrix (3, 3).
+    """
     cosine, sine = np.cos(heading), np.sin(heading)
     if slope == LEVEL:
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

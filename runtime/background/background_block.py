@@ -3,8 +3,8 @@
 It samples the inputs at every run and gives them to a worker, a process that runs the block itself; the
 outputs that follow from them appear N runs later, neither sooner nor later. So it has the outputs of
 the block followed by a delay of N runs, to the byte. In virtual time the run waits for a result that is
-due. In real time it never waits: a result that is late is counted, and the block's policy says what the
-outputs are meanwhile.
+due. In real time it never waits: a result that is late is counted, and the block's policy sets the
+outputs meanwhile.
 
 What has been sampled and is not yet shown is part of the state, as is the block's own state after the
 run that is shown. So a snapshot holds all that it takes to compute what is under way again.

@@ -83,7 +83,8 @@ class JobMemory:
         return _split(self._results[slot], like)
 
     def ask(self, slot: int, job: int, tick: int) -> None:
-        """Post the job whose inputs are in a slot. The numbers of jobs count from one and increase."""
+        """Post the job whose inputs are in a slot. The numbers of jobs count from one and
+        increase."""
         self._asked[slot, _TICK] = tick
         with self._fence:
             pass

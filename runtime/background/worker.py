@@ -4,9 +4,9 @@ The jobs lie in memory that both processes share; the worker does them in the or
 virtual time it is woken for each. In real time it looks by itself, every millisecond or less, because a
 control thread that wakes another may lose its processor to it.
 
-Through its standard input come first the ``WorkerTask`` and then messages, each of which says before
-which job it holds. When its input ends, it closes the block and answers with the block's metrics and
-warnings.
+Through its standard input come first the ``WorkerTask`` and then messages, each of which names the
+job before which it holds. When its input ends, it closes the block and answers with the block's
+metrics and warnings.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ NICENESS = 5
 
 @dataclass(frozen=True)
 class WorkerTask:
-    """Everything that a worker must know.
+    """Task of a worker: its block, with all that is needed to make it.
 
     Attributes:
         use: the block, as a graph file names it.

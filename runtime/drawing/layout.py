@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
-from .layers import FEW, Layers, Place, WirePassage, arrange
+from .layers import FEW, Layers, Slot, WirePassage, arrange
 from .tracks import LANE, STRAIGHT, TRACK, Hop, Net, assign_tracks
 
 ROW = 18.0
@@ -238,7 +238,8 @@ class Router:
 
 
 def column_gaps(router: Router) -> list[float]:
-    """Return the width of every gap: before the first column, between columns, and behind the last."""
+    """Return the width of every gap: before the first column, between columns, and behind the
+    last."""
     widths = []
     for number, gap in enumerate(router.gaps):
         count = 1 + max((hop.track for hop in gap.values() if not hop.is_straight()), default=-1)
@@ -297,15 +298,15 @@ def draw(diagram: Diagram) -> Drawing:
     return drawing
 
 
-def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
+def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Slot, float]:
     """Return the y of the upper edge of every node, and of every passage."""
-    y: dict[Place, float] = {}
+    y: dict[Slot, float] = {}
     for column in layers.columns:
         top = 0.0
         for place in column:
             y[place] = top
             top += _height(place, boxes) + (_PASS_GAP if isinstance(place, WirePassage) else _GAP)
-    links: dict[Place, list[tuple[Place, float, float, float]]] = {}
+    links: dict[Slot, list[tuple[Slot, float, float, float]]] = {}
     for (a, b), ends in layers.links.items():
         for out, into in ends:
             weight = (1.0, 4.0, 16.0)[isinstance(a, WirePassage) + isinstance(b, WirePassage)]
@@ -328,7 +329,7 @@ def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
     return {place: round(value - least + _MARGIN) for place, value in y.items()}
 
 
-def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) -> None:
+def _straighten(layers: Layers, y: dict[Slot, float], boxes: dict[str, Box]) -> None:
     """Take small steps out of the lines that pass columns, where there is room."""
     before = {
         b: (a, ends[0][0]) for (a, b), ends in layers.links.items() if isinstance(b, WirePassage)
@@ -349,14 +350,14 @@ def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) ->
                 y[place] = wish
 
 
-def _height(place: Place, boxes: dict[str, Box]) -> float:
+def _height(place: Slot, boxes: dict[str, Box]) -> float:
     return boxes[place].height if isinstance(place, str) else 0.0
 
 
 def _settle(
-    column: list[Place],
+    column: list[Slot],
     wishes: list[tuple[float, float]],
-    y: dict[Place, float],
+    y: dict[Slot, float],
     boxes: dict[str, Box],
 ) -> None:
     """Move the places of a column as near to their wishes as their order and distances allow.

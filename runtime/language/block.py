@@ -281,9 +281,9 @@ class Block:
         name.
 
         A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is declared
-        twice; ``name`` may also be a parameter of the block. Loading puts the value in its place. A
-        ``UnmetRequirement`` in place of a value says why there is none; it is reported where a
-        graph uses it. ``context`` is as for ``requires``, but has no dimensions and no wired
+        twice; ``name`` may also be a parameter of the block. Loading puts the value in its place.
+        An ``UnmetRequirement`` in place of a value is the reason why there is none, reported where
+        a graph uses it. ``context`` is as for ``requires``, but has no dimensions and no wired
         inputs. What this raises should be an unmet requirement of ``requires`` as well.
         """
         return {}
@@ -295,7 +295,7 @@ class Block:
         ``inputs`` has those of the inputs. A gain, for instance, answers ``{"y": u.times(unit)}``
         with ``u = inputs["u"]``, and ``{"y": None}`` while ``u`` is not known. ``inputs.alike("a",
         "b")`` requires that inputs agree. Without this method such an output has a unit that is not
-        checked, which ``aloft check`` says.
+        checked, which ``aloft check`` reports.
         """
         return {}
 

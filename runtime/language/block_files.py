@@ -95,7 +95,8 @@ def files_of(folder: Path) -> tuple[Path, ...]:
 
 
 def _some_files(folder: Path) -> Iterator[Path]:
-    """Yield the Python files in a folder and in the folders that lie in it, up to ``_MOST_FILES``."""
+    """Yield the Python files in a folder and in the folders that lie in it, up to
+    ``_MOST_FILES``."""
     count = 0
     for pattern in ("*.py", "*/*.py"):
         for path in sorted(folder.glob(pattern)):

@@ -29,7 +29,8 @@ class Clock:
         """Time at which the present tick began, by the run's source of time [ns]; zero if ticks are
         not timed."""
         self.command_limit = 0.0
-        """Longest silence allowed to the links that bring commands [s]; zero where none is watched."""
+        """Longest silence allowed to the links that bring commands [s]; zero where none is
+        watched."""
 
     @property
     def tick(self) -> int:

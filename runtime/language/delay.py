@@ -119,7 +119,8 @@ _TYPES: dict[tuple[type[Signal], int], type[WireDelay]] = {}
 
 
 def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
-    """Return the block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
+    """Return the block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output
+    ``y``."""
     if k < 1:
         raise ValueError(f"a delay is at least 1 run, not {k}")
     if (signal, k) in _TYPES:
@@ -130,7 +131,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
         (WireDelay,),
         {
             "__doc__": WireDelay.__doc__,
-            "u": Input(signal, text="what is delayed"),
+            "u": Input(signal, text="the signal to delay"),
             "y": Output(signal, text=f"the input {k} runs ago"),
             "past": State(past, text="the last inputs"),
             "delay_runs": k,

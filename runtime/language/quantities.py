@@ -1,8 +1,7 @@
-"""Quantities of the numbers on a wire: their unit and their frame, also behind blocks that take
-any.
+"""Quantities of the numbers on a wire: their unit and their frame, also behind general blocks.
 
 A general block such as ``Gain`` takes vectors of every unit. Its fields are ``inferred``: the graph
-decides what they are, and the block's ``infer_units`` method says how outputs follow from inputs.
+decides what they are, and the block's ``infer_units`` method derives outputs from inputs.
 Loading applies these methods from block to block, and then checks every wire.
 """
 
@@ -45,7 +44,8 @@ UNCHECKED = Quantity(None)
 
 
 def quantity_of(field: Field) -> Quantity | None:
-    """Return the quantity that a field declares; ``None`` for one that carries whatever is wired."""
+    """Return the quantity that a field declares; ``None`` for one that carries whatever is
+    wired."""
     return None if field.inferred else Quantity(field.unit, field.frame)
 
 

@@ -123,7 +123,8 @@ def _parameter(name: str, info: FieldInfo) -> ParameterReference:
 
 
 def type_text(annotation: Any) -> str:
-    """Format a type as it is written in code: ``float``, ``list[float]``, ``'daqp' | 'quadprog'``."""
+    """Format a type as it is written in code: ``float``, ``list[float]``, ``'daqp' |
+    'quadprog'``."""
     origin = get_origin(annotation)
     arguments = get_args(annotation)
     if origin is Literal:

@@ -54,7 +54,8 @@ def _entry_points() -> Mapping[str, str]:
 
 
 def known_names() -> tuple[str, ...]:
-    """Return the names of all blocks of aloft and of installed packages, sorted; none is imported."""
+    """Return the names of all blocks of aloft and of installed packages, sorted; none is
+    imported."""
     return tuple(sorted({**_own_blocks(), **_entry_points()}))
 
 
@@ -124,7 +125,8 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
 
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """Return the module of aloft that has the class: first the one that convention gives, then any."""
+    """Return the module of aloft that has the class: first the one that convention gives, then
+    any."""
     stem = snake_case(class_name)
     for path in files_of(_ROOT / package):
         if path.stem == stem:
@@ -174,9 +176,9 @@ def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tupl
     scored: dict[str, float] = {}
     for candidate, least in candidates:
         other_package, other_class = _parts(candidate)
-        likeness = _likeness(class_name, other_class)
-        if likeness >= least:
-            scored.setdefault(candidate, likeness + 0.2 * _likeness(package, other_package))
+        similarity = _similarity(class_name, other_class)
+        if similarity >= least:
+            scored.setdefault(candidate, similarity + 0.2 * _similarity(package, other_package))
     ordered = sorted(scored, key=lambda each: (-scored[each], each))
     return tuple(each for each in ordered[:count] if scored[each] >= scored[ordered[0]] - 0.2)
 
@@ -186,7 +188,7 @@ def _parts(name: str) -> tuple[str, str]:
     return ".".join(parts[:-1]), parts[-1]
 
 
-def _likeness(a: str, b: str) -> float:
+def _similarity(a: str, b: str) -> float:
     return difflib.SequenceMatcher(None, a.lower(), b.lower()).ratio()
 
 

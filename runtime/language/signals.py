@@ -64,7 +64,7 @@ class Field:
         text: one line on what the field is.
         values: what the numbers of an ``"int64"`` field stand for; shown by name in recordings.
         inferred: unit and frame are those of whatever the graph wires to the block: an input takes
-            any, and ``Block.infer_units`` says what an output has.
+            any, and ``Block.infer_units`` returns those of an output.
         ring: of a state that is a ring buffer along its first axis: the field with the place of its
             oldest entry, ``name`` of the same signal or ``state.name`` of the same block.
 
@@ -234,7 +234,7 @@ def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal
     Raises:
         DeclarationError: as for ``Field``.
     """
-    body: dict[str, Any] = {"__doc__": "What is outside."}
+    body: dict[str, Any] = {"__doc__": "A signal declared by data."}
     for key, field in fields.items():
         body[key] = Field(
             tuple(field.get("shape", ())),

@@ -15,7 +15,7 @@
 * ``clock``: the ``tick`` and the ``base_period`` [s] of the graph; ``period``: that of the block [s];
 * an array, a number or a named tuple that ``setup`` has stored in the block under that name.
 
-A kernel step that returns ``bool`` says whether ``Block.on_event`` is to be called after it, for what
+A kernel step that returns ``bool`` decides whether ``Block.on_event`` is called after it, for what
 happens rarely and needs Python.
 
 What differs from the declarations is refused when the class is made. A kernel gets of each signal the
@@ -160,7 +160,8 @@ def _line_of(cls: type, name: str) -> int | str:
 
 
 def step_in_file_of(cls: type, name: str, place: CodeType) -> Any:
-    """Make a method that makes a block's calls; stacks and reports of errors show the given place."""
+    """Make a method that makes a block's calls; stacks and reports of errors show the given
+    place."""
     method = _update if name == "update" else _step
     code = method.__code__.replace(
         co_filename=place.co_filename, co_firstlineno=place.co_firstlineno, co_name=name

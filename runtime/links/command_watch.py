@@ -1,6 +1,6 @@
 """Watches the links that bring commands to actuators: silence on one of them ends in damping.
 
-It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` says
+It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` is
 and whatever the estimate of the other clock is. What it finds is used twice: a driver hands it to
 the process that watches it (``hal/bear/watchdog.py``), which damps the drives although this process
 may hang, be stopped or be killed; and a part that runs free ends its run.
@@ -54,7 +54,8 @@ class CommandWatch:
         return tuple(box.link.name for box in self._watched)
 
     def heard(self) -> int:
-        """Return the time [ns] of the most silent link's last new message; zero if none is watched."""
+        """Return the time [ns] of the most silent link's last new message; zero if none is
+        watched."""
         if not self._watched:
             return 0
         if not self._since:
@@ -65,7 +66,8 @@ class CommandWatch:
         return oldest
 
     def complaint(self) -> str:
-        """Return a complaint about the link that has been silent for too long; empty if none has."""
+        """Return a complaint about the link that has been silent for too long; empty if none
+        has."""
         if not self._watched:
             return ""
         silence = (self._clock() - self.heard()) * 1e-9

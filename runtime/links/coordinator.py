@@ -47,7 +47,8 @@ class PartClock(Clock):
         super().__init__(base_period)
 
     def commands_heard(self) -> int:
-        """Return the time [ns] of the last commands on the most silent link that brings commands."""
+        """Return the time [ns] of the last commands on the most silent link that brings
+        commands."""
         return 0 if self.heard is None else self.heard()
 
     def agree(self, reason: str, block: str) -> None:
@@ -276,7 +277,7 @@ class LockstepCoordinator(Block):
 
         Raises:
             PeerError: another part failed in this tick, or is gone.
-            RunError: another part said nothing for too long.
+            RunError: another part was silent for too long.
         """
         clock = self._clock
         tick = self._tick = clock.tick
@@ -459,7 +460,7 @@ class FreeRunningCoordinator(LockstepCoordinator):
     """Starts the parts together, as in lockstep, and then lets each keep its own time.
 
     A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
-    fault. One that is gone does not: what its links' policies say of late messages holds, and it
+    fault. One that is gone does not: the policies of its links for late messages hold, and it
     may come back. Beacons during the run are sent by a thread of their own.
     """
 

@@ -83,7 +83,7 @@ class LatestReceiver:
     Args:
         link: the link.
         reader: what checks messages and writes them into the bus.
-        others: the other parts.
+        peers: the other parts.
         policy: what to do where nothing has come for too long.
         health: where to write how the link does.
         stop: called with the reason where the policy is to stop.

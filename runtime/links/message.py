@@ -1,4 +1,4 @@
-"""The messages of a link: raw fields behind a header that says what they are and whether they are whole.
+"""The messages of a link: raw fields behind a header that identifies them and has their checksum.
 
 A message is a header of ``HEADER`` bytes and the payload: the bytes of the link's fields as they lie
 in the bus, section by section. The header holds, in little endian,

@@ -42,7 +42,7 @@ class StatusPublisher(Sink):
     Args:
         machine: of the part.
         transport: the part's own; it is open once the part has started.
-        others: the other parts, and the numbers by which the graph and the run are known.
+        peers: the other parts, and the numbers by which the graph and the run are known.
         receivers: the receiving ends of its links.
     """
 
@@ -92,7 +92,8 @@ class StatusPublisher(Sink):
         self._thread.join(1.0)
 
     def status(self, rate: float) -> dict[str, Any]:
-        """Return the status of the part; ``rate`` is the ticks per second that it runs at present."""
+        """Return the status of the part; ``rate`` is the ticks per second that it runs at
+        present."""
         peers = self._peers
         return {
             "machine": self._machine,

@@ -119,7 +119,7 @@ class BoundPart(BoundGraph):
         machine: the machine.
         transport: what carries messages; the part opens it when it starts.
         timeout: the seconds to wait for a message.
-        connect_time: the seconds to wait for the others at the start.
+        connect_timeout: the seconds to wait for the others at the start.
         clock: the time [ns] by which free-running links and the watch of commands go.
 
     Raises:
@@ -212,7 +212,8 @@ class BoundPart(BoundGraph):
         self.clock.stop_reason = reason
 
     def _moving(self) -> dict[str, Block]:
-        """Return the blocks that move actuators: those that have something to do to come to rest."""
+        """Return the blocks that move actuators: those that have something to do to come to
+        rest."""
         still = Block.stop_cycle
         return {p: block for p, block in self.blocks.items() if type(block).stop_cycle is not still}
 
@@ -308,7 +309,8 @@ class MergedLayout:
                 copies.append((first, last, start))
 
     def rows(self, parts: Mapping[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:
-        """Return the rows (n, bytes) of the whole from those of each part, (n, bytes of that part)."""
+        """Return the rows (n, bytes) of the whole from those of each part, (n, bytes of that
+        part)."""
         count = len(next(iter(parts.values())))
         rows = np.zeros((count, self._layout.size), np.uint8)
         for machine, copies in self._copies.items():

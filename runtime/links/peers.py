@@ -1,9 +1,9 @@
 """State of the other parts, as known to one part: phase, links checked, and failures.
 
 Every part sends its phase to all others in *beacons*, which it repeats until all have answered. So
-a beacon that is lost, doubled or late does no harm. A beacon says what its sender has heard of the
-receiver, which answers at once if that is old. Beacons also give the offset of the other machine's
-clock.
+a beacon that is lost, doubled or late does no harm. A beacon carries the latest that its sender has
+heard of the receiver, which answers at once if that is old. Beacons also give the offset of the
+other machine's clock.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class PeerStates:
         placed: the graph.
         machine: the name of this part's machine.
         transport: an open transport.
-        wanted: called while waiting; a text says why this part must not wait any longer.
+        stop_reason: called while waiting; returns the reason to stop waiting, if any.
         free: whether parts keep their own time. Then one that is gone may come back.
 
     Attributes:
@@ -283,7 +283,8 @@ class PeerStates:
         so.
 
         It never raises, and does not wait for a part that is gone. Where this part could not start,
-        it says why until all have heard it. ``tick`` is the first that this part will not run.
+        it sends the reason until all have heard it. ``tick`` is the first that this part will not
+        run.
         """
         end = time.monotonic() + timeout
         self._phase, self._ended = PartPhase.RESTING, tick

@@ -222,7 +222,7 @@ def ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
     """Send a request to the graph that listens at ``path``, and return its answer.
 
     Raises:
-        EndpointError: nobody answers there, or the request was refused; the text says why.
+        EndpointError: nobody answers there, or the request was refused; the text has the reason.
     """
     answer, descriptors = _exchange(path, request)
     for descriptor in descriptors:
@@ -237,7 +237,7 @@ def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
     Waits for a graph that is only starting.
 
     Raises:
-        EndpointError: nobody answers there, or it cannot be watched; the text says why.
+        EndpointError: nobody answers there, or it cannot be watched; the text has the reason.
     """
     end = time.monotonic() + START_TIME
     while True:
@@ -317,7 +317,7 @@ def set_parameters(path: Path, settings: Sequence[str]) -> list[dict[str, Any]]:
         The changes that were made, as the attributes of each ``ParameterChange``.
 
     Raises:
-        EndpointError: nobody answers there, or a setting was refused; the text says why.
+        EndpointError: nobody answers there, or a setting was refused; the text has the reason.
     """
     changes: list[dict[str, Any]] = ask(path, {"verb": "set", "settings": list(settings)})[
         "changes"

@@ -14,7 +14,7 @@ from ...files.nodes import MapNode, text_of
 from ...files.validation import unit_of
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
-from ..loading import LoadError, flatten, load_text
+from ..loading import LoadError, checked_text, flatten
 
 LONGEST_LIST = 12
 """Numbers of a list that have a slider each; a longer one is changed as a text."""
@@ -181,16 +181,16 @@ def _places(graph: CheckedGraph) -> dict[str, str]:
     except LoadError:
         return found
     for block in flat.blocks:
-        _add_places(block.path, block.parameters, found)
+        _add_locations(block.path, block.parameters, found)
     return found
 
 
-def _add_places(path: str, node: MapNode, found: dict[str, str]) -> None:
+def _add_locations(path: str, node: MapNode, found: dict[str, str]) -> None:
     for entry in node:
         key = f"{path}.{entry.key}"
         found[key] = str(entry.key_where)
         if isinstance(entry.value, MapNode):
-            _add_places(key, entry.value, found)
+            _add_locations(key, entry.value, found)
 
 
 FIRST_LINE = "# Values that were tuned while the graph ran; `aloft run` takes this file."
@@ -226,7 +226,7 @@ def write_overlay(path: Path, graph: CheckedGraph, rows: Sequence[Mapping[str, A
     try:
         included = os.path.relpath(source.resolve(), path.resolve().parent)
         text = _text(included, found)
-        load_text(text, path)
+        checked_text(text, path)
         if path.exists() and not path.read_text(encoding="utf-8").startswith(FIRST_LINE):
             raise AloftError(f"{path} is there already; give another name with --save FILE")
         path.write_text(text, encoding="utf-8")

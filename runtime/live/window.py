@@ -288,7 +288,8 @@ def parse_window(copy: bytes, shape: WindowLayout) -> WindowContents:
 def _stamps(
     copy: bytes, shape: WindowLayout, words: NDArray[np.int64], number: int
 ) -> NDArray[np.int64]:
-    """Return the rows of a program that hold stamps, the oldest first, each in the order of time."""
+    """Return the rows of a program that hold stamps, the oldest first, each in the order of
+    time."""
     ticks, newest = words[shape.cursors + 2 * number :][:2].tolist()
     first, last = shape.stamps(number)
     rows = np.frombuffer(copy[first:last], np.int64).reshape(STAMPED_TICKS, -1)

@@ -8,9 +8,9 @@ from typing import Any
 
 from ..background.background_block import BackgroundBlock
 from ..language.delay import WireDelay
-from ..language.fault import Fault, FaultParameters
 from ..language.quantities import Quantity
 from ..language.registry import block_name
+from ..language.signal_error import SignalError, SignalErrorParameters
 from ..language.stages import BlockSpec, CheckedGraph, Wire
 from .checking.inserted import ConstantSignal, Gather
 
@@ -118,7 +118,7 @@ def _latency(graph: CheckedGraph, spec: BlockSpec) -> str:
 
 def _use(spec: BlockSpec) -> str:
     block_type = spec.block_type
-    if issubclass(block_type, Fault) and isinstance(spec.params, FaultParameters):
+    if issubclass(block_type, SignalError) and isinstance(spec.params, SignalErrorParameters):
         return f"{spec.params.kind}: {block_type.target}"
     for inserted, word in ((WireDelay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
         if issubclass(block_type, inserted):
@@ -171,7 +171,8 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
 
 
 def _origin(specs: dict[str, BlockSpec], wire: Wire) -> str:
-    """Return the output a wire comes from, seen through the delay block that loading has inserted."""
+    """Return the output a wire comes from, seen through the delay block that loading has
+    inserted."""
     source = specs[wire.source_block]
     if wire.delay and issubclass(source.block_type, WireDelay):
         return source.wires["u"].source

@@ -121,7 +121,8 @@ def _quantity(schema: Schema) -> list[Schema]:
 
 
 def _further_inputs(block_type: type[Block]) -> Schema | bool:
-    """Return the schema of inputs that the class does not declare: their parameters may make some."""
+    """Return the schema of inputs that the class does not declare: their parameters may make
+    some."""
     made = block_type.specialize.__func__ is not Block.specialize.__func__  # type: ignore[attr-defined]
     return {"$ref": "#/definitions/Wire"} if made and not block_type.inputs else False
 

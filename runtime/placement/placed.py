@@ -1,6 +1,6 @@
 """A placed graph: a checked graph divided among machines, with the links that join the parts.
 
-``place`` finds the links that the division needs; ``command_sources`` are the blocks whose commands reach actuators.
+``split_over_machines`` finds the links that the division needs; ``command_sources`` are the blocks whose commands reach actuators.
 The rest shows a placed graph as rows of a table and as JSON.
 """
 
@@ -107,7 +107,7 @@ class PlacedGraph:
         return tuple(link for link in self.links if link.receiver == machine)
 
 
-def place(graph: CheckedGraph) -> PlacedGraph:
+def split_over_machines(graph: CheckedGraph) -> PlacedGraph:
     """Place a graph that names its machines.
 
     Raises:

@@ -36,7 +36,7 @@ class Executor:
 
     Args:
         graph: a checked graph, or a bound one.
-        clock: how to pace it; by default as the graph says.
+        clock: how to pace it; by default that of the graph.
         sinks: what records the run, beside the log and the hash.
         log: whether to keep every tick in memory.
         run_hash: whether to hash every tick.
@@ -114,7 +114,7 @@ class Executor:
         """Run the graph through its whole life: start, ticks, stop cycles, close.
 
         The run lasts ``ticks`` ticks, by default the graph's duration. SIGINT, SIGTERM and a block
-        that asks for it end the run after the present tick. The result says what ended the run,
+        that asks for it end the run after the present tick. The result has what ended the run,
         also if it was an error: see ``RunResult.raise_if_failed``.
 
         Raises:
@@ -309,10 +309,13 @@ class Executor:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
-        metrics, unmet, praise = merge_metrics(by_block)
+        metrics, unmet, success_reason = merge_metrics(by_block)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
-        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
-        code, reason = self._verdict(error, problems, interrupts, unmet, praise)
+        unmet, success_reason = (
+            self._with_stop(unmet, judges),
+            self._with_stop(success_reason, judges),
+        )
+        code, reason = self._verdict(error, problems, interrupts, unmet, success_reason)
         for program in self.ticker.programs:
             program.fold()
         pacer = self.ticker.pacer
@@ -356,7 +359,7 @@ class Executor:
         problems: Sequence[str],
         interrupts: Interrupts,
         unmet: str | None,
-        praise: str | None,
+        success_reason: str | None,
     ) -> tuple[ExitCode, str]:
         """Return the exit code and the reason; of several reasons, the gravest."""
         stopped = self.bound.clock.stop_reason
@@ -371,7 +374,7 @@ class Executor:
             return ExitCode.RUN_FAILED, problems[0]
         if unmet is not None:
             return ExitCode.NOT_SUCCESSFUL, unmet
-        return ExitCode.SUCCESS, praise or stopped or "ran to its end"
+        return ExitCode.SUCCESS, success_reason or stopped or "ran to its end"
 
 
 @contextmanager

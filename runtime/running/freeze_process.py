@@ -1,10 +1,11 @@
 """Separate program that ends a run whose compiled code does not release the interpreter.
 
-Such code (an endless loop in a solver, or in a function compiled to machine code) lets no thread of Python
-run, so nothing in the process of the run can help. This process hears a beat from a thread there.
-When the beats stop, it asks with a signal for the stacks of all threads, which Python's fault
-handler writes without the interpreter, says which block hangs and where, and kills the process. It
-counts its own looks instead of reading a clock, so that a suspended process does not seem to hang.
+Such code (an endless loop in a solver, or in a function compiled to machine code) lets no thread of
+Python run, so nothing in the process of the run can help. This process hears a beat from a thread
+there. When the beats stop, it asks with a signal for the stacks of all threads, which Python's
+fault handler writes without the interpreter, reports which block hangs and where, and kills the
+process. It counts its own looks instead of reading a clock, so that a suspended process does not
+seem to hang.
 
 It knows nothing of aloft, so it starts fast, and nothing that the graph imports can fail in it::
 
@@ -71,7 +72,8 @@ def _read(seconds: float) -> bytes | None:
 
 
 def _stacks(pid: int) -> str:
-    """Return the stacks of all threads; empty where the process is suspended, or goes on after all."""
+    """Return the stacks of all threads; empty where the process is suspended, or goes on after
+    all."""
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGUSR1)
     text = b""
@@ -124,7 +126,8 @@ def _is_installed(file: str, description: dict[str, object]) -> bool:
 
 
 def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
-    """Return the paths of the blocks whose class has the outermost frame that belongs to a block."""
+    """Return the paths of the blocks whose class has the outermost frame that belongs to a
+    block."""
     known = description["blocks"]
     assert isinstance(known, list)
     for file, line, _ in reversed(frames):

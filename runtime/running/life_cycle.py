@@ -28,7 +28,7 @@ class LifeState(Enum):
     STOPPING = "stopping"
     """Stop cycles go out."""
     STOPPED = "stopped"
-    """Everything is closed."""
+    """All blocks are closed."""
 
 
 _NEXT: Mapping[LifeState, tuple[LifeState, ...]] = {

@@ -61,7 +61,8 @@ class Region:
 
 
 def _allocate(layout: Layout, what: str) -> Region:
-    """Allocate the memory of a layout. Raises ``RunError`` if it needs more than a graph may have."""
+    """Allocate the memory of a layout. Raises ``RunError`` if it needs more than a graph may
+    have."""
     try:
         if layout.size <= LARGEST:
             return Region(layout)

@@ -43,7 +43,7 @@ class RealTimeOptions:
         """Request everything once and give it back, before anything moves.
 
         Raises:
-            RealTimeError: something is refused; the text says what and what helps.
+            RealTimeError: something is refused; the text names it and the remedy.
         """
         with self._granted(_LOCK_ALL | _ON_FAULT):
             pass

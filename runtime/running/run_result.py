@@ -193,17 +193,17 @@ def merge_metrics(
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
     failure: str | None = None
-    praise: str | None = None
+    success_reason: str | None = None
     for path, metrics in by_block.items():
         for name in metrics:
             owners.setdefault(name, []).append(path)
         if failure is None and not metrics.get("success", True):
             failure = str(metrics.get("reason") or f"block '{path}' reports no success")
-        elif praise is None and metrics.get("success") and metrics.get("reason"):
-            praise = str(metrics["reason"])
+        elif success_reason is None and metrics.get("success") and metrics.get("reason"):
+            success_reason = str(metrics["reason"])
     merged: dict[str, Metric] = {}
     for path, metrics in by_block.items():
         for name, value in metrics.items():
             if name not in ("success", "reason"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
-    return merged, failure, praise
+    return merged, failure, success_reason

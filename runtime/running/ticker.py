@@ -90,7 +90,8 @@ class Ticker:
         self.paused = False
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
-        """Return the different programs, and for each tick of the hyperperiod the program it runs."""
+        """Return the different programs, and for each tick of the hyperperiod the program it
+        runs."""
         graph = self.bound.graph
         specs = [graph.block(path) for path in graph.order]
         programs: dict[tuple[int, ...], Program] = {}
@@ -146,7 +147,8 @@ class Ticker:
     def _in_chains(
         self, active: Sequence[str], which: Calls = "kernel_calls"
     ) -> list[tuple[str, Chain | None]]:
-        """Return the blocks, those that follow each other in a chain only once, with their chain."""
+        """Return the blocks, those that follow each other in a chain only once, with their
+        chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
         found: list[tuple[str, Chain | None]] = []
         pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path], which))
@@ -167,7 +169,7 @@ class Ticker:
         (SIGINT, SIGTERM) requests it, or when it is paused.
 
         Raises:
-            RunError: a block failed, a value is not finite or the overrun policy says stop.
+            RunError: a block failed, a value is not finite or the overrun policy is to stop.
         """
         clock = self.bound.clock
         first = tick = clock.tick

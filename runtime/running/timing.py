@@ -106,7 +106,8 @@ class Program:
         self.columns = {owner: column for owner, column in met.items() if owner}
 
     def times_this_run(self) -> bool:
-        """Return whether the run that begins now is timed; if it is not, its chains read no clock."""
+        """Return whether the run that begins now is timed; if it is not, its chains read no
+        clock."""
         self._runs += 1
         timed = self._runs <= FIRST_TIMED or self._runs % TIMED_EVERY == 0
         self._place_value[0] = self._base + self._cursor if timed else 0

@@ -27,7 +27,7 @@ from typing import Any, Self
 
 from ..language.block import Block, Clock
 from ..language.errors import RunError
-from .failures import Hang, place_of_frames
+from .failures import Hang, location_of_frames
 from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
 from .pacing import Paced
 from .sink import Sink
@@ -216,7 +216,7 @@ class Watchdog:
 
     def _give_up(self, call: tuple[int, str]) -> None:
         stack = traceback.extract_stack(sys._current_frames()[self._watched])
-        place = place_of_frames(stack)
+        place = location_of_frames(stack)
         self._abandon(call[1], place, "".join(traceback.format_list(stack)))
 
 

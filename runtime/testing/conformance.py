@@ -169,7 +169,8 @@ def _outputs_written(subject: Subject) -> None:
 
 
 def _set_up_once(subject: Subject, port: str, name: str, value: bytes) -> bool:
-    """Return whether ``setup`` writes a field of an output, and no run changes it from this value."""
+    """Return whether ``setup`` writes a field of an output, and no run changes it from this
+    value."""
     bench = subject.bench(plain=True)
     view = bench.get(port).views()[name]
     if view.tobytes() != value:
@@ -469,7 +470,8 @@ def random_inputs(
 def _inputs_of(
     block_type: type[Block], sizes: tuple[tuple[str, int], ...], *seeds: int
 ) -> tuple[dict[str, dict[str, Any]], ...]:
-    """Return the inputs of ``TICKS`` ticks; kept, because many instances of a block get equal ones."""
+    """Return the inputs of ``TICKS`` ticks; kept, because many instances of a block get equal
+    ones."""
     rng, dimensions = np.random.default_rng(seeds), dict(sizes)
     return tuple(random_inputs(block_type, dimensions, rng) for _ in range(TICKS))
 

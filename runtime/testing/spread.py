@@ -22,7 +22,7 @@ from ..language.block import Metric
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph, ClockSpec
 from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
-from ..placement.placed import PlacedGraph, place
+from ..placement.placed import PlacedGraph, split_over_machines
 from ..running.run_result import RunResult, merge_metrics
 from ..running.sink import Sink
 from ..running.ticker import Ticker
@@ -92,7 +92,7 @@ def run_spread(
     hub = Hub()
     hub.interfere = interfere
     return run_parts_of(
-        place(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
+        split_over_machines(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
         **options,
     )  # fmt: skip
 
@@ -146,7 +146,8 @@ _RUNTIME = (COORDINATOR, PREPARED, STARTED)
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """Result of a run: whether it succeeded and why, its metrics, its parts, and its duration [s]."""
+    """Result of a run: whether it succeeded and why, its metrics, its parts, and its duration
+    [s]."""
 
     success: bool
     reason: str
@@ -237,7 +238,7 @@ def run_virtual(
     Raises:
         AloftError: the graph names no machines, or a part fails.
     """
-    placed = place(graph)
+    placed = split_over_machines(graph)
     time = _Time()
     network = _Network(time, travel)
     parts = {
@@ -270,8 +271,8 @@ def run_virtual(
         for path, block in part.blocks.items()
         if path in [spec.path for spec in placed.blocks_on(name)]
     }
-    metrics, unmet, praise = merge_metrics(own)
-    reason = unmet or praise or stopped or "ran to its end"
+    metrics, unmet, success_reason = merge_metrics(own)
+    reason = unmet or success_reason or stopped or "ran to its end"
     began = 1_000_000_000
     return VirtualRun(unmet is None, reason, metrics, parts, (time.time - began) * 1e-9)
 

@@ -5,7 +5,8 @@ the machine or observer of that name: its certificate and key, the authority's c
 ``session.json5``, the configuration of its Zenoh session. A run takes its own folder and refuses
 one that was made for another graph.
 
-Certificates are for sessions with mutual TLS, and their keys are those of NIST P-256. An authority signs only what is made here.
+Certificates are for sessions with mutual TLS, and their keys are those of NIST P-256. An authority
+signs only what is made here.
 """
 
 from __future__ import annotations
@@ -168,7 +169,8 @@ def _builder(subject: Any, issuer: Any, public_key: Any, days: int) -> Any:
 
 
 def _usage(*, sign: bool) -> Any:
-    """Return the usage of a key: signing certificates, or else signing the messages of a session."""
+    """Return the usage of a key: signing certificates, or else signing the messages of a
+    session."""
     x509, _, _ = _library()
     return x509.KeyUsage(
         digital_signature=not sign, key_cert_sign=sign, crl_sign=sign, content_commitment=False,

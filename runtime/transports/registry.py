@@ -33,7 +33,7 @@ def endpoint_pattern() -> str:
     return f"^({'|'.join(TRANSPORTS)})/.+:[0-9]+$"
 
 
-def endpoint_fault(text: str) -> str:
+def endpoint_problem(text: str) -> str:
     """Describe the fault of an endpoint; empty if there is none."""
     match = _ENDPOINT.match(text)
     if match is None or match["scheme"] not in TRANSPORTS:

@@ -107,7 +107,8 @@ def rows_key(machine: str) -> str:
 
 
 def window_key(machine: str) -> str:
-    """Return the key under which a machine shows its signals and the times of its blocks to a page."""
+    """Return the key under which a machine shows its signals and the times of its blocks to a
+    page."""
     return f"watch/{machine}/window"
 
 

@@ -233,7 +233,7 @@ def _stop(workers: list[_Worker]) -> None:
 
 
 class _StoppedError(BaseException):
-    """Raised in a worker that is told to stop."""
+    """Raised in a worker that receives the signal to stop."""
 
 
 _stopping = False

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.task.files import Key, PlacedFile, read_placed, remove_abandoned, write_whole
+from ...planner.task.files import Key, LocatedFile, read_located, remove_abandoned, write_whole
 from ...planner.task.plan import PlanFileError, PlannedJump
 from ...planner.task.task import JumpTask, JumpTaskError, make_task
 from ...robots.description import RobotDescription, find_robot
@@ -51,7 +51,7 @@ def read_grid(path: str | Path) -> list[JumpTask]:
         JumpTaskError: the file cannot be read, or one of its tasks is wrong.
     """
     path = Path(path)
-    source = read_placed(path, "grid: {rise: [10 cm, 15 cm]}")
+    source = read_located(path, "grid: {rise: [10 cm, 15 cm]}")
     data, axes = source.values, source.values.get("grid")
     for key in data:
         if key not in ("name", "task", "grid"):
@@ -79,7 +79,7 @@ def read_grid(path: str | Path) -> list[JumpTask]:
 
 
 @dataclass(frozen=True)
-class _Point(PlacedFile):
+class _Point(LocatedFile):
     """The position of the values of one task of a grid: in its list on an axis, or under ``task``."""
 
     numbers: Mapping[str, int]
@@ -92,7 +92,7 @@ class _Point(PlacedFile):
         return super().place(inside, key=key)
 
 
-def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
+def _values(source: LocatedFile, key: str, given: Any) -> list[Any]:
     """Return the values of one parameter of a grid."""
     if isinstance(given, list) and given:
         return given
@@ -107,7 +107,7 @@ def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
     )
 
 
-def _number(source: PlacedFile, key: str, given: Mapping[str, Any], which: str) -> float:
+def _number(source: LocatedFile, key: str, given: Mapping[str, Any], which: str) -> float:
     """Return an end of an axis in the unit of the task's parameter of that name."""
     others = {} if key in ("rise", "take_off_speed") else {"rise": 0.1}
     where = f"{source.place(['grid', key, which])}: {which}"

@@ -85,7 +85,7 @@ MEASURED, PLANNED = COLOURS[0], COLOURS[1]
 
 
 def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
-    """CoM, momenta, torso pitch, contact force, joint velocities and torques of one jump."""
+    """Draw CoM, momenta, torso pitch, contact force, joint velocities and torques of one jump."""
     t, flight = trace.time, trace.flight_times
     shades = [Shade(*flight)] if flight else []
     start, end = flight or (float(t[0]), float(t[-1]))
@@ -203,7 +203,7 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
 
 
 def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
-    """``axis`` is 0 for a push along x, 1 along y."""
+    """Make a column; ``axis`` is 0 for a push along x, 1 along y."""
     other, letter, about = (1, "x", "y") if axis == 0 else (0, "y", "x")
     rows: list[list[Curve]] = [[], [], [], [], []]
     shades: list[Shade] = []

@@ -244,7 +244,7 @@ def pictures(
 
 
 def _captioned(parts: Sequence[Pixels], texts: Sequence[str]) -> Image:
-    """Pictures side by side, each over its text."""
+    """Join pictures side by side, each over its text."""
     from PIL import Image as Images
     from PIL import ImageDraw, ImageFont
 

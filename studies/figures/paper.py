@@ -360,7 +360,7 @@ def _somersault(results: Results) -> str:
 
 
 def table(rows: Sequence[tuple[str, str, str]]) -> str:
-    """Rows of quantity, the paper's value and ours."""
+    """Format rows of quantity, the paper's value and ours."""
     lines = ["| | paper | ours |", "|---|---|---|"]
     return "\n".join([*lines, *(f"| {what} | {paper} | {ours} |" for what, paper, ours in rows)])
 

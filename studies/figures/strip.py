@@ -92,7 +92,8 @@ def draw_strip(
 
 
 def moments_of(start: float, lift_off: float, touchdown: float, end: float) -> list[Moment]:
-    """Two frames before lift-off, two between it and touchdown, two of the landing until rest."""
+    """Choose two frames before lift-off, two between it and touchdown, two of the landing until
+    rest."""
     flight = touchdown - lift_off
     chosen = (
         (start, "stand"),

@@ -96,7 +96,8 @@ def make_trace(task_and_job: tuple[str, Job]) -> Trace:
 
 
 def pitch_and_roll(quaternions: Array) -> tuple[Array, Array]:
-    """Pitch about y and roll about x [rad] of quaternions x, y, z, w (n, 4): yaw, pitch, roll."""
+    """Compute pitch about y and roll about x [rad] of quaternions x, y, z, w (n, 4): yaw, pitch,
+    roll."""
     x, y, z, w = np.moveaxis(np.asarray(quaternions, float), -1, 0)
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))

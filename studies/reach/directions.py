@@ -33,7 +33,7 @@ LOOSEST: Mapping[str, Any] = {"effort": 1.0, "margins": None, "foot_clearance": 
 ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """The lengths that are taken for steps, times a power of ten."""
 LONGEST = 2.0
-"""m, of a jump onto or off a step."""
+"""Largest length of a jump onto or off a step [m]."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class JumpSizes:
 
 
 def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[Direction, ...]:
-    """Up, ahead, back, aside, turned, and onto and off a step."""
+    """Return up, ahead, back, aside, turned, and onto and off a step."""
     rise, onto, off = sizes.rise, sizes.onto, sizes.off
     over = 0.5 * rise  # above a step; and so much of the rise is left off one
     down = rise / 1.5
@@ -162,7 +162,7 @@ DIRECTIONS: tuple[Direction, ...] = (
           lambda s: {"rise": 0.06 + s * GOALS["step up"], "distance_x": s * GOALS["ahead"],
                      "landing_height": s * GOALS["step up"]}, 5),
 )  # fmt: skip
-"""BRUCE's directions, in the order in which they are told."""
+"""BRUCE's directions, in the order of the report."""
 
 
 def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -> JumpSizes:

@@ -1,4 +1,4 @@
-"""The frontier: how far jumps in every direction land at 95 %, against what the motors could give.
+"""The frontier: the reach of jumps that land at 95 % in every direction, against that of the motors.
 
 Along each of a robot's directions three ends are looked for on one ladder of values:
 
@@ -106,8 +106,8 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
 
 
 def _failed(tries: Tries, runs: int) -> dict[int, str]:
-    """Every rung that failed and why, in their order: the runs' most frequent reason, or what kept
-    the planner from a plan."""
+    """Return every rung that failed with its reason, in their order: the runs' most frequent one,
+    or the obstacle to a plan."""
     found = {
         rung: f"no plan: {outcome.reason}"
         for rung, outcome in tries.recipe.items()

@@ -24,10 +24,10 @@ SEEDS = tuple(range(9000, 9004))
 MINUTES = 10.0
 """Minutes of two cores for all directions; the shares below are for these."""
 PLANNED_CPU, RUNS_CPU, THEORY_CPU = 45.0, 75.0, 30.0
-"""s; after so much processor time no further solve, or run, is begun along one direction. The rest of the ten minutes
+"""Processor time after which no further solve, or run, is begun along one direction [s]. The rest of the ten minutes
 is for those that are under way then, and for what is compiled first."""
 QUARTER_TURN = 90.0
-"""deg; counts as one length of a leg."""
+"""Turn that counts as one length of a leg [deg]."""
 BRUCE = Path(__file__).with_name("bruce.json")
 """Written by ``docs/refresh.py frontier``, with the table in docs/frontier.md."""
 
@@ -107,6 +107,7 @@ def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
 
 
 def bruce_reach() -> dict[str, Any]:
-    """BRUCE's reach: what the benchmark ``frontier`` has found with 20 seeds, for jumps of the same sizes."""
+    """Read BRUCE's reach: the results of the benchmark ``frontier`` with 20 seeds, for jumps of the
+    same sizes."""
     found: dict[str, Any] = json.loads(BRUCE.read_text(encoding="utf-8"))
     return found

@@ -1,4 +1,4 @@
-"""The search along one direction of the frontier: what is tried next, given the results so far.
+"""The search along one direction of the frontier: the next try, given the results so far.
 
 How far up a ladder something works is found with few tries. The searches are generators: they yield
 the rung to try, are sent whether it works, and return the highest that does, 0 for none. So they know
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...planner.checking.plan_tests import active_limits
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import JumpTaskError, PlanError
@@ -110,7 +110,7 @@ class JumpGraph:
     settings: Mapping[str, Any]
 
     def run(self, task: JumpTask, plans: Path, seed: int) -> Outcome:
-        """One run of a task that is planned in a folder."""
+        """Make one run of a task that is planned in a folder."""
         given = task.model_dump(mode="json", exclude_unset=True)
         sets = {"plan.task": given, "plan.library": str(plans.absolute()), "robot.seed": seed}
         result = load(self.path, {**self.settings, **sets}).run(log=False)
@@ -167,7 +167,7 @@ def make_plan(job: PlanJob) -> Outcome:
         near = None if job.near is None else library.find(job.near)
         plan = solve_and_check(job.task, robot, near)
     except (InvalidPlanError, PlanError, JumpTaskError) as error:
-        return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
+        return Outcome(False, failure_text(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
     library.add(plan)
     return Outcome(True, "", metrics={"cpu_s": spent, "binds": list(active_limits(plan, robot))})
@@ -188,7 +188,7 @@ def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:
 
 
 def do(job: PlanJob | RunJob) -> Outcome | list[tuple[int, Outcome]]:
-    """One job of either kind."""
+    """Do one job of either kind."""
     return make_plan(job) if isinstance(job, PlanJob) else run_rung(job)
 
 

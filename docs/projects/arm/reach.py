@@ -41,7 +41,7 @@ class Reach(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """One target for every joint, inside its limits."""
+        """Require one target for every joint, inside its limits."""
         robot = context.robot
         count = len(robot.joints)
         if len(params.target) != count:

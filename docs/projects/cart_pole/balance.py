@@ -84,7 +84,7 @@ class Balance(Block):
         return gains
 
     def step(self) -> None:
-        """Torques from the measured state."""
+        """Compute torques from the measured state."""
         n, command = len(self._state) // 2, self.command
         self._state[:n] = self.joints.position
         self._state[n:] = self.joints.velocity

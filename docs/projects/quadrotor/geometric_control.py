@@ -53,7 +53,7 @@ class Airframe(Signal):
 
 
 class FlightScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     rotation = Field((3, 3), text="R")
     wanted = Field((3, 3), text="R_d")
@@ -210,7 +210,8 @@ class GeometricController(Block):
 
 
 def wrenches(robot) -> np.ndarray:
-    """Force along z [N] and moments about the centre of mass [N m] for each newton of every thruster, (4, n)."""
+    """Compute force along z [N] and moments about the centre of mass [N m] for each newton of every
+    thruster, (4, n)."""
     com, columns = np.array(robot.links[0].com), []
     for each in robot.thrusters.values():
         axis = np.array(each.axis)

@@ -57,7 +57,7 @@ class Flown(Signal):
 
 
 class MissionScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     goal = Field(3, text="where a motion ends")
     speed = Field(3, text="how fast it ends")
@@ -104,7 +104,7 @@ class Mission(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Rotors that give the boost and the flip, with some to spare for steering."""
+        """Require rotors that give the boost and the flip, with some to spare for steering."""
         robot, about = context.robot, 0 if params.axis == "roll" else 1
         most = np.array([each.max_thrust for each in robot.thrusters.values()])
         speed = 0.5 * GRAVITY * params.flip
@@ -198,7 +198,7 @@ class Mission(Block):
 
 @kernel
 def advance(base: BaseState, p: Progress, params: Mission.Params) -> None:
-    """Go on to the next phase where the present one is over."""
+    """Enter the next phase where the present one has ended."""
     over = False
     if p.phase == FlightPhase.WAIT:
         over = p.time >= params.wait

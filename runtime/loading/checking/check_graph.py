@@ -11,25 +11,25 @@ from ....files.problems import Code, Position, Problems, nearest
 from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.importing import BlockImportError, UnknownModuleError
 from ...language.registry import find_block, nearest_names
 from ...language.requirements import fix_without_robot
 from ...language.schedule import ScheduleBlock, find_loops, order_blocks
 from ...language.signals import Signal
 from ...language.stages import BlockSpec, CheckedGraph, Wire
-from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
-from .faults import insert_faults
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_references import resolve_references
 from .parameters import check_parameters
 from .settings import Settings, read_settings
+from .signal_errors import insert_signal_errors
 from .wire_check import WireCheck
 
 LONGEST_RING = 8
@@ -38,7 +38,7 @@ LONGEST_RING = 8
 
 def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check the whole graph. Returns ``None`` if there is any problem, also one noted before."""
-    settings = read_settings(graph, problems)
+    settings, flat = read_settings(graph, problems), graph
     graph = resolve_references(graph, settings, problems)
     if graph.empty:
         where = Position(graph.file, 1, 1)
@@ -48,7 +48,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
-    drafts = insert_faults(graph, drafts, settings, problems)
+    drafts = insert_signal_errors(graph, drafts, settings, problems)
     drafts = resolve_composite_wires(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
@@ -66,7 +66,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if len(problems) or settings.base_rate is None:
         return None
     checked = _assemble(graph, settings, settings.base_rate, drafts, values)
-    checked = replace(on_machines(checked, graph, machines), links=links)
+    checked = replace(on_machines(checked, graph, machines), links=links, flat=flat, resolved=graph)
     check_paths(checked, graph, problems)
     check_watchdog(checked, graph, problems)
     return None if len(problems) else checked
@@ -154,7 +154,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
         str(unknown),
         flat.use_where,
         at=flat.path,
-        expected=_places_of_modules(flat, graph)
+        expected=_folders_of_modules(flat, graph)
         if isinstance(unknown, UnknownModuleError)
         else "a block of `aloft blocks`, module:Class, or a file.yaml",
         found=flat.use,
@@ -164,7 +164,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
     return None
 
 
-def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
+def _folders_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
     """Return the places where the module of a ``module:Class`` may lie."""
     file = f"{flat.use.partition(':')[0].replace('.', '/')}.py"
     folders = dict.fromkeys(str(folder) for folder in (flat.folder, graph.folder, Path()))
@@ -351,7 +351,6 @@ def _assemble(
         robot=settings.robot,
         clock=settings.clock,
         file=graph.file,
-        text=graph.text,
         overrides=graph.overrides,
         unchecked=tuple(unchecked_wires(drafts)),
     )

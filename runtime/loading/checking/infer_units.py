@@ -154,7 +154,8 @@ def quantity_at_input(
 
 
 def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity:
-    """Return the quantity of a constant: that of the input's field; a plain number if it takes any."""
+    """Return the quantity of a constant: that of the input's field; a plain number if it takes
+    any."""
     field = draft.inputs[name].signal.fields[field_name]
     declared = quantity_of(field)
     node = draft.flat.wires[name].constant

@@ -18,13 +18,13 @@ from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Block, Input, Output
 from ...language.delay import DelayParameters, copy_call, delay_block_type
 from ...language.errors import UnitError
+from ...language.flat_graph import FlatWire
 from ...language.parameters import Parameters, parameter
 from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities, Quantity
 from ...language.signals import Field, Signal
 from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
 from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
-from ..flattening.flat import FlatWire
 from .block_check import BlockDraft
 
 
@@ -117,7 +117,7 @@ def gather_block_type(
     ``wire_text`` is the wire as the graph has it, and ``reads_truth`` whether its reader may do that.
     """
     ports: dict[str, Any] = {
-        name: Input(signal, text="what is selected from", reads_truth=reads_truth)
+        name: Input(signal, text="the vector to select from", reads_truth=reads_truth)
         for name, signal in inputs.items()
     }
     body = {
@@ -131,7 +131,7 @@ def gather_block_type(
     return type("Gather", (Gather,), body)
 
 
-def part_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
+def selected_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
     """Return a signal whose fields have these shapes and types, and carry their units."""
     body: dict[str, Any] = {
         field: Field(shape, dtype=dtype, inferred=True, text="what was selected")

@@ -16,9 +16,9 @@ from ....robots.description import (
     find_robot,
     robot_names,
 )
+from ...language.flat_graph import FlatGraph
 from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
-from ..flattening.flat import FlatGraph
 from ..reading.graph_file import ClockKeys, read_section
 from ..reading.written import read_quantity
 
@@ -135,7 +135,7 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
         except LookupError as error:
             message = str(error)
         except RobotError as error:
-            _report_faults(error, node.where, problems)
+            _report_description_errors(error, node.where, problems)
             return None
         except Exception as error:  # noqa: BLE001  such as a name that no file can have
             reason = " ".join(str(error).split())
@@ -156,19 +156,23 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
     return None
 
 
-def _report_faults(error: RobotError, where: Position, problems: Problems) -> None:
-    """Report every fault of a robot's description at its place in the robot's file."""
-    for fault in error.faults:
+def _report_description_errors(error: RobotError, where: Position, problems: Problems) -> None:
+    """Report every error of a robot's description at its place in the robot's file."""
+    for description_error in error.errors:
         problems.add(
             Code.ROBOT,
-            fault.message,
-            Position(fault.file or error.file, fault.line, fault.column),
-            at=".".join(map(str, fault.path)),
+            description_error.message,
+            Position(
+                description_error.file or error.file,
+                description_error.line,
+                description_error.column,
+            ),
+            at=".".join(map(str, description_error.path)),
             other="robot",
             other_where=where,
-            expected=fault.expected,
-            found=fault.found,
-            fix=fault.fix,
+            expected=description_error.expected,
+            found=description_error.found,
+            fix=description_error.fix,
         )
 
 

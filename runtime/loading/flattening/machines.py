@@ -14,10 +14,10 @@ from dataclasses import replace
 
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from ....files.problems import Code, Problems, listing, nearest
-from ...language.fault import FOLDER
+from ...language.flat_graph import FlatBlock, FlatGraph
+from ...language.signal_error import FOLDER
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
-from ...transports.registry import EXAMPLE, endpoint_fault, transport_type
-from .flat import FlatBlock, FlatGraph
+from ...transports.registry import EXAMPLE, endpoint_problem, transport_type
 from .subgraphs import Instance
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
@@ -155,7 +155,7 @@ def _read_machine(entry: Entry, problems: Problems) -> MachineSpec | None:
         )
         return None
     text = entry.value.value if isinstance(entry.value, ScalarNode) else None
-    reason = endpoint_fault(text) if isinstance(text, str) else "it is no text"
+    reason = endpoint_problem(text) if isinstance(text, str) else "it is no text"
     if reason:
         problems.add(
             Code.MACHINE,

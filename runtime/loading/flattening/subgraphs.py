@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
 from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
-from ..reading.selection import WHOLE, Selection
+from ...language.flat_graph import FlatBlock, FlatWire, WireElement, WireSlice
+from ...language.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
-from .flat import FlatBlock, FlatWire, WireElement, WirePart
 from .written_wires import WrittenWire
 
 UNWIRED = "unwired"
@@ -114,7 +114,7 @@ class Resolver:
                 total = replace(total, delay=link.delay, initial=link.initial)
             if link.truth:
                 total = replace(total, truth=True)
-            if link.parts:
+            if link.slices:
                 return self._resolve_composite(
                     link, replace(total, where=start.where), selection, at
                 )
@@ -138,7 +138,7 @@ class Resolver:
             elif selection:
                 inner = FlatWire(link.source, start.where, truth=total.truth)
                 item = WireElement(start.where, inner, selection)
-                return replace(total, parts=(WirePart("", start.where, (item,)),))
+                return replace(total, slices=(WireSlice("", start.where, (item,)),))
             else:
                 return replace(total, source=link.source)
             if following is None or isinstance(following, str):
@@ -149,22 +149,24 @@ class Resolver:
         self, link: WrittenWire, total: FlatWire, selection: Selection, at: str
     ) -> FlatWire | None:
         """Return the wire of a link with parts, of which ``selection`` takes something."""
-        parts = link.parts
+        slices = link.slices
         if selection.field:
-            parts = tuple(part for part in parts if part.field == selection.field)
-            if not parts:
-                names = listing(part.field for part in link.parts if part.field)
+            slices = tuple(
+                wire_slice for wire_slice in slices if wire_slice.field == selection.field
+            )
+            if not slices:
+                names = listing(wire_slice.field for wire_slice in link.slices if wire_slice.field)
                 self._selection(
                     f"there is no field {selection.field!r}; there is {names}", link, at
                 )
                 return None
-        if selection.indices and (len(parts) > 1 or parts[0].is_list):
+        if selection.indices and (len(slices) > 1 or slices[0].is_list):
             self._selection("elements cannot be selected of several sources", link, at)
             return None
         resolved = []
-        for part in parts:
+        for wire_slice in slices:
             items = []
-            for each in part.items:
+            for each in wire_slice.items:
                 if each.literal is not None:
                     items.append(WireElement(each.where, literal=each.literal))
                     continue
@@ -175,15 +177,17 @@ class Resolver:
                     self._selection("a part comes from an input that is not wired", each, at)
                     return None
                 items += self._pieces(wire, selection, total)
-            resolved.append(WirePart(part.field, part.where, tuple(items), part.is_list))
+            resolved.append(
+                WireSlice(wire_slice.field, wire_slice.where, tuple(items), wire_slice.is_list)
+            )
         if selection.field:
             resolved = [replace(resolved[0], field="")]
-        return replace(total, parts=tuple(resolved))
+        return replace(total, slices=tuple(resolved))
 
     def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[WireElement]:
         """Return the pieces that a resolved wire adds to a part."""
         rest = Selection("", selection.indices)
-        if not wire.parts:
+        if not wire.slices:
             inner = replace(wire, truth=wire.truth or total.truth)
             return [WireElement(wire.where, inner, rest)]
         return [
@@ -199,8 +203,8 @@ class Resolver:
                 if item.wire is not None
                 else None,
             )
-            for part in wire.parts
-            for item in part.items
+            for wire_slice in wire.slices
+            for item in wire_slice.items
         ]
 
     def _of_constant(
@@ -213,7 +217,7 @@ class Resolver:
             return None
         node = (entry or constant.entries[0]).value
         item = WireElement(start.where, literal=node)
-        return FlatWire("", start.where, parts=(WirePart("", start.where, (item,)),))
+        return FlatWire("", start.where, slices=(WireSlice("", start.where, (item,)),))
 
     def _selection(self, message: str, link: WrittenWire, at: str) -> None:
         self.problems.add(

@@ -16,7 +16,7 @@ from ....files.nodes import MapNode, kind, plain
 from ....files.problems import Code, Problems
 from ....files.validation import find_mistakes, info_at, path_text
 from ...language.errors import UnitError
-from ...language.fault import FaultKind
+from ...language.signal_error import SignalErrorKind
 from ...language.stages import ClockKind, LinkMode, Overrun, WhenLate
 from ...language.units import parse_quantity
 
@@ -197,13 +197,13 @@ class GraphValues(_Keys):
     actuators: str = _key("the robot's actuator profile in use; by default its first")
 
 
-class FaultKeys(_Keys):
+class SignalErrorKeys(_Keys):
     """A fault on a wire; which keys it has depends on its kind."""
 
     on: Source | list[Source] = Field(
         description="an output, an input, or elements of one: where it is"
     )
-    kind: FaultKind = Field(description="what goes wrong")
+    kind: SignalErrorKind = Field(description="what goes wrong")
     when: str = _key("the event that it begins after: block.port.field == value")
     start: Seconds = _key("when it begins, after the start or its event")
     start_spread: Seconds = _key("up to so much later, drawn by the seed")
@@ -225,7 +225,7 @@ class GraphSections(_Keys):
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")
-    faults: dict[str, FaultKeys] = _key("faults on wires, by name")
+    faults: dict[str, SignalErrorKeys] = _key("faults on wires, by name")
 
 
 class SubgraphKeys(_Keys):

@@ -35,7 +35,7 @@ class Override:
     where: Position
 
 
-def place_of(text: str) -> Position:
+def location_of(text: str) -> Position:
     """Return the place of an override: the override itself."""
     return Position(f"--set {text}", 0, 0)
 
@@ -49,12 +49,12 @@ def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, 
                 pairs.append((str(key), value.value, value.key_where))
                 continue
             shown = value.tolist() if hasattr(value, "tolist") else value
-            where = place_of(f"{key}={_short(shown)}")
+            where = location_of(f"{key}={_short(shown)}")
             pairs.append((str(key), from_plain(value, where), where))
     else:
         for text in overrides:
             key, equals, value_text = text.partition("=")
-            where = place_of(text)
+            where = location_of(text)
             if not equals:
                 problems.add(
                     Code.OVERRIDE,

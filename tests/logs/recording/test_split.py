@@ -12,7 +12,7 @@ from aloft.logs import RecordingError, read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.running.sink import Sink
@@ -40,7 +40,7 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
                     time.sleep(0.01)
                 os.kill(recorder.link.process_id, signal.SIGKILL)
 
-    result = Executor(load(folder / "graph.yaml"), sinks=[recorder, Kill()], log=True).run()
+    result = Executor(checked_file(folder / "graph.yaml"), sinks=[recorder, Kill()], log=True).run()
     return recorder, result
 
 

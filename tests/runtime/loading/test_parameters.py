@@ -5,8 +5,8 @@ import pytest
 from aloft.files.problems import LoadError
 from aloft.runtime.language.registry import find_block
 from aloft.runtime.language.stages import CheckedGraph
+from aloft.runtime.loading.checked import checked_text
 from aloft.runtime.loading.checking.parameters import adjust, entries, plain_parameters
-from aloft.runtime.loading.load import load_text
 from aloft.runtime.running.memory import BoundGraph
 
 TEXT = """
@@ -22,7 +22,7 @@ robot: bruce
 
 @pytest.fixture(scope="module")
 def graph() -> BoundGraph:
-    checked: CheckedGraph = load_text(TEXT, "test.yaml")
+    checked: CheckedGraph = checked_text(TEXT, "test.yaml")
     return BoundGraph(checked)
 
 
@@ -49,7 +49,7 @@ def test_entries_have_everything_but_what_loading_inserted(graph: BoundGraph) ->
 def test_mistakes_read_as_they_do_at_load(graph: BoundGraph) -> None:
     text = report(graph, "contacts.hold=-1", "contacts.hodl=1", "gian.gain=3", "wave.frequency=2 m")
     assert "--set contacts.hold=-1: bad-parameter: contacts.hold cannot be -1" in text
-    assert "at least 0 s (how long a point stays active after its switch opens)" in text
+    assert "at least 0 s (time for which a point stays active after its switch opens)" in text
     assert "no parameter 'hodl'" in text and "nearest    hold" in text
     assert "there is no block 'gian' in the running graph" in text and "nearest    gain" in text
     assert "wave.frequency cannot be 2 m" in text

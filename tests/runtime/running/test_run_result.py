@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from aloft.runtime.graph import Graph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.running.run_result import ExitCode, RunResult, merge_metrics
 
 
 def test_names_of_several_blocks_are_told_apart() -> None:
-    merged, failure, praise = merge_metrics({"a": {"x": 1, "y": 2}, "b": {"x": 3}, "c": {}})
+    merged, failure, success_reason = merge_metrics({"a": {"x": 1, "y": 2}, "b": {"x": 3}, "c": {}})
     assert merged == {"a.x": 1, "b.x": 3, "y": 2}
-    assert failure is None and praise is None
+    assert failure is None and success_reason is None
 
 
 def test_the_first_block_that_judges_without_success_gives_the_reason() -> None:
@@ -25,8 +25,8 @@ def test_the_first_block_that_judges_without_success_gives_the_reason() -> None:
         "bad": {"success": False, "reason": "it fell"},
         "worse": {"success": False},
     }
-    merged, failure, praise = merge_metrics(blocks)
-    assert (failure, praise) == ("it fell", "it stands")
+    merged, failure, success_reason = merge_metrics(blocks)
+    assert (failure, success_reason) == ("it fell", "it stands")
     assert list(merged) == ["tilt", "speed"], "those of blocks that judge come first"
     assert merge_metrics({"worse": {"success": False}})[1] == "block 'worse' reports no success"
     assert merge_metrics({"quiet": {"success": True}})[1:] == (None, None)
@@ -55,7 +55,7 @@ def test_a_result_as_text_and_plain_data() -> None:
 def test_the_times_and_values_of_a_logged_run() -> None:
     text = "rate: 100 Hz\nduration: 0.25 s\nblocks:\n  r: {use: blocks.Ramp, with: {slope: 2}}\n"
 
-    found = Graph(load_text(text, Path("ramp.yaml"))).run(log=True)
+    found = Graph(checked_text(text, Path("ramp.yaml"))).run(log=True)
     assert found.ticks == 25 and found.duration_s == pytest.approx(0.25)
     np.testing.assert_allclose(found.time, 0.01 * np.arange(25))
     values = found.signal("r.y.value")

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.transports import registry
 from aloft.runtime.transports.registry import (
     EXAMPLE,
     TRANSPORTS,
-    endpoint_fault,
     endpoint_pattern,
+    endpoint_problem,
     open_endpoints,
     silent_endpoint,
     transport_type,
@@ -28,9 +28,9 @@ ENDPOINTS = {scheme: f"{scheme}/127.0.0.1:7450" for scheme in TRANSPORTS}
 
 def test_every_scheme_is_taken_and_has_its_class() -> None:
     for scheme, endpoint in ENDPOINTS.items():
-        assert endpoint_fault(endpoint) == "" and re.match(endpoint_pattern(), endpoint)
+        assert endpoint_problem(endpoint) == "" and re.match(endpoint_pattern(), endpoint)
         assert transport_type([MachineSpec("a", endpoint)]) is TRANSPORTS[scheme]
-    assert endpoint_fault(EXAMPLE) == ""
+    assert endpoint_problem(EXAMPLE) == ""
 
 
 @pytest.mark.parametrize(
@@ -46,8 +46,10 @@ def test_every_scheme_is_taken_and_has_its_class() -> None:
     ],
 )
 def test_a_wrong_endpoint_is_explained(endpoint: str, fault: str) -> None:
-    assert endpoint_fault(endpoint).startswith(fault)
-    assert endpoint_fault("tcp/[::1]:7450") == "" and endpoint_fault("tls/robot.local:7450") == ""
+    assert endpoint_problem(endpoint).startswith(fault)
+    assert (
+        endpoint_problem("tcp/[::1]:7450") == "" and endpoint_problem("tls/robot.local:7450") == ""
+    )
 
 
 def test_endpoints_that_anybody_reaches_are_named() -> None:
@@ -80,7 +82,7 @@ def test_why_a_machine_is_silent() -> None:
 
 
 def test_the_schemes_are_listed() -> None:
-    text = endpoint_fault("nonsense")
+    text = endpoint_problem("nonsense")
     assert all(f"{scheme}/ADDRESS:PORT" in text for scheme in TRANSPORTS)
     assert " or " in text
 
@@ -97,16 +99,16 @@ blocks:
   a: {use: blocks.Constant, with: {value: [1]}}
 """
     with pytest.raises(LoadError) as found:
-        load_text(graph, Path("graph.yaml"))
+        checked_text(graph, Path("graph.yaml"))
     text = str(found.value)
     assert "machines 'near' and 'far' use different transports" in text
     assert "tcp/127.0.0.1:7450" in text and "pigeon/127.0.0.1:7451" in text
-    assert load_text(graph.replace("pigeon/", "tls/"), Path("graph.yaml")).machines
+    assert checked_text(graph.replace("pigeon/", "tls/"), Path("graph.yaml")).machines
 
 
 @pytest.mark.parametrize("transport", list(dict.fromkeys(TRANSPORTS.values())))
 def test_endpoints_for_a_run_on_this_machine(transport: type[ZenohTransport]) -> None:
     endpoints = transport.local_endpoints(3)
     assert len(set(endpoints)) == 3
-    assert all(endpoint_fault(endpoint) == "" for endpoint in endpoints)
+    assert all(endpoint_problem(endpoint) == "" for endpoint in endpoints)
     assert {transport_type([MachineSpec("a", e)]) for e in endpoints} == {transport}

@@ -8,15 +8,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from ....files.nodes import Entry, MapNode, Node, plain, text_of
-from ....files.problems import Position
-from ....robots.description import ROBOT_FILES
-from ....robots.importing.package_files import SCHEME
-from ...language.stages import HasSource
-from ..reading.selection import WHOLE, Selection
+from ...files.nodes import Entry, MapNode, Node, plain, text_of
+from ...files.problems import Position
+from ...robots.description import ROBOT_FILES
+from ...robots.importing.package_files import SCHEME
+from .selection import WHOLE, Selection
 
 _WIDTH = 100
 Item = TypeVar("Item")
+
+
+class HasSource:
+    """The base of every stage's wire, which has a ``source``: an output ``block.port``."""
+
+    source: str
+
+    @property
+    def source_block(self) -> str:
+        """The path of the block that writes."""
+        return self.source.rpartition(".")[0]
+
+    @property
+    def source_port(self) -> str:
+        """The name of the output."""
+        return self.source.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -37,7 +52,7 @@ class WireElement:
 
 
 @dataclass(frozen=True)
-class WirePart(Generic[Item]):
+class WireSlice(Generic[Item]):
     """Source of one field of an input: one item, or a list of several one behind another.
 
     ``field`` is empty for the input's only field. Items are wires as they are written, and elements
@@ -52,7 +67,7 @@ class WirePart(Generic[Item]):
 
 @dataclass(frozen=True)
 class FlatWire(HasSource):
-    """Source of one input: the output ``source`` (``block.port``), a ``constant``, or ``parts``
+    """Source of one input: the output ``source`` (``block.port``), a ``constant``, or ``slices``
     that are put together."""
 
     source: str
@@ -61,7 +76,7 @@ class FlatWire(HasSource):
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
-    parts: tuple[WirePart[WireElement], ...] = ()
+    slices: tuple[WireSlice[WireElement], ...] = ()
     shown: str = ""
     """Text in the graph in place of ``source``, where loading has put a block between."""
 
@@ -75,17 +90,17 @@ class FlatWire(HasSource):
         constant."""
         if self.constant is not None:
             return ()
-        items = [item for part in self.parts for item in part.items]
-        return tuple(i.wire for i in items if i.wire is not None) if self.parts else (self,)
+        items = [item for wire_slice in self.slices for item in wire_slice.items]
+        return tuple(i.wire for i in items if i.wire is not None) if self.slices else (self,)
 
     def plain(self) -> Any:
         """Return the wire as written in a graph file."""
         if self.constant is not None:
             return {"value": plain(self.constant)}
         source: Any = self.source
-        if self.parts:
-            one = len(self.parts) == 1 and not self.parts[0].field
-            fields = {part.field: plain_part(part) for part in self.parts}
+        if self.slices:
+            one = len(self.slices) == 1 and not self.slices[0].field
+            fields = {wire_slice.field: plain_slice(wire_slice) for wire_slice in self.slices}
             source = fields[""] if one else fields
         if not self.delay and not self.truth:
             return source
@@ -99,10 +114,10 @@ class FlatWire(HasSource):
         return data
 
 
-def plain_part(part: WirePart[WireElement]) -> Any:
+def plain_slice(wire_slice: WireSlice[WireElement]) -> Any:
     """Return the part as written in a graph file."""
-    items = [item.plain() for item in part.items]
-    return items if part.is_list else items[0]
+    items = [item.plain() for item in wire_slice.items]
+    return items if wire_slice.is_list else items[0]
 
 
 @dataclass(frozen=True)

@@ -17,24 +17,24 @@ from numpy.typing import NDArray
 from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.errors import UnitError
-from ...language.fault import (
+from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire, WireElement, WireSlice
+from ...language.selection import Selection, read_selection, select
+from ...language.signal_error import (
     CONDITION,
     FOLDER,
     HOLDING,
     OPTIONS,
     SIGNS,
     Comparison,
-    Fault,
-    FaultParameters,
+    SignalError,
+    SignalErrorParameters,
     chirp_lines,
-    fault_block_type,
+    signal_error_type,
 )
 from ...language.signals import Field, Signal
 from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
-from ..reading.selection import Selection, read_selection, select
 from .block_check import BlockDraft
-from .inserted import part_signal
+from .inserted import selected_signal
 from .parameters import check_parameters
 from .settings import Settings
 
@@ -42,14 +42,14 @@ COMMON = ("on", "kind", "when", "start", "start_spread", "duration", "seed")
 """The keys of every fault."""
 
 
-def insert_faults(
+def insert_signal_errors(
     graph: FlatGraph, drafts: dict[str, BlockDraft], settings: Settings, problems: Problems
 ) -> dict[str, BlockDraft]:
     """Return the drafts with a block for every fault, and the wires of its readers moved to it."""
     latest: dict[str, str] = {}
     for entry in graph.faults or ():
         if isinstance(entry.value, MapNode):
-            made = _FaultReader(
+            made = _SignalErrorReader(
                 graph, drafts, settings, problems, entry, entry.value, latest
             ).read()
             if made is not None:
@@ -66,7 +66,7 @@ def insert_faults(
     return drafts
 
 
-class _FaultReader:
+class _SignalErrorReader:
     def __init__(
         self, graph: FlatGraph, drafts: Mapping[str, BlockDraft], settings: Settings,
         problems: Problems, entry: Entry, node: MapNode, latest: dict[str, str],
@@ -175,7 +175,7 @@ class _FaultReader:
                 return None
             return port, (draft, draft.outputs[name].signal), selection
         wire = draft.flat.wires.get(name)
-        if wire is None or wire.constant is not None or wire.parts:
+        if wire is None or wire.constant is not None or wire.slices:
             what = "not wired" if wire is None else "a constant" if wire.constant is not None else "composed of parts"  # fmt: skip
             self._report(f"{self.at} is on the input {port}, which is {what}", where, found=what,
                          expected="an input that is wired to one output, or an output")  # fmt: skip
@@ -231,7 +231,7 @@ class _FaultReader:
                 found[name] = np.unique(np.concatenate([found.get(name, chosen[:0]), chosen]))
         return found
 
-    def _parameters(self, kind_of: str, fields: list[Field]) -> FaultParameters | None:
+    def _parameters(self, kind_of: str, fields: list[Field]) -> SignalErrorParameters | None:
         """Read the parameters, in which a value with a unit is a number in that of the field."""
         entries = []
         for entry in self.node:
@@ -258,8 +258,8 @@ class _FaultReader:
             entries.append(replace(entry, value=node))
         flat = FlatBlock(self.at, self.where, "", self.where, self.graph.folder,
                          MapNode(tuple(entries), self.node.where))  # fmt: skip
-        params = check_parameters(flat, Fault, self.problems, self.settings.robot)
-        if not isinstance(params, FaultParameters):
+        params = check_parameters(flat, SignalError, self.problems, self.settings.robot)
+        if not isinstance(params, SignalErrorParameters):
             return None
         widest = (
             8 * np.dtype(fields[0].dtype_name).itemsize if fields[0].dtype_name != "bool" else 1
@@ -277,7 +277,7 @@ class _FaultReader:
 
     def _draft(
         self, port: str, source: tuple[BlockDraft, type[Signal]],
-        elements: dict[str, NDArray[np.int64]], params: FaultParameters, target: str,
+        elements: dict[str, NDArray[np.int64]], params: SignalErrorParameters, target: str,
     ) -> BlockDraft | None:  # fmt: skip
         draft, signal = source
         path, _, name = port.rpartition(".")
@@ -304,7 +304,7 @@ class _FaultReader:
                              expected=f"below {highest:g} Hz, half the rate at which {port} is written",
                              found=f"{params.high:g} Hz")  # fmt: skip
                 return None
-        block_type = fault_block_type(
+        block_type = signal_error_type(
             signal, target, elements, params, delay, compared, event_signal, reads_truth=truth
         )
         wires = {"u": FlatWire(written, self.where)}
@@ -375,9 +375,9 @@ class _FaultReader:
         where = entry.value.where
         element = WireElement(where, FlatWire(port, where, truth=output.truth), Selection(field_name, selection.indices))  # fmt: skip
         wire = FlatWire(
-            "", where, delay=1, parts=(WirePart("", where, (element,)),), truth=output.truth
+            "", where, delay=1, slices=(WireSlice("", where, (element,)),), truth=output.truth
         )
-        signal = part_signal("Event", {field_name: ((), field.dtype_name)})
+        signal = selected_signal("Event", {field_name: ((), field.dtype_name)})
         return Comparison(SIGNS.index(match["sign"]), number), signal, wire, output.truth
 
     def _report(self, message: str, where: Position, code: Code = Code.BAD_VALUE, **details: Any) -> None:  # fmt: skip
@@ -386,15 +386,15 @@ class _FaultReader:
 
 def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
     """Return the wire, or its parts, from another output where it came from ``source``."""
-    if wire.parts:
-        parts = tuple(
-            replace(part, items=tuple(
+    if wire.slices:
+        slices = tuple(
+            replace(wire_slice, items=tuple(
                 item if item.wire is None else replace(item, wire=_moved(item.wire, source, target))
-                for item in part.items
+                for item in wire_slice.items
             ))
-            for part in wire.parts
+            for wire_slice in wire.slices
         )  # fmt: skip
-        return replace(wire, parts=parts)
+        return replace(wire, slices=slices)
     if wire.constant is not None or wire.source != source:
         return wire
     return replace(wire, source=target, shown=wire.shown or source)

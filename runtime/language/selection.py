@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from ....files.problems import nearest
+from ...files.problems import nearest
 
 _TEXT = re.compile(
     r"(?P<block>[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*)\.(?P<port>[A-Za-z_][A-Za-z0-9_]*)"
@@ -51,7 +51,8 @@ WHOLE = Selection()
 
 
 def read_selection(text: str) -> tuple[str, Selection] | None:
-    """Read the ``block.port`` and the selection in a source's text; ``None`` if it is not a source."""
+    """Read the ``block.port`` and the selection in a source's text; ``None`` if it is not a
+    source."""
     match = _TEXT.match(text)
     if match is None:
         return None
@@ -70,7 +71,7 @@ def select(
     selected.
 
     Raises:
-        ValueError: an index cannot be read, is outside, or selects nothing; the text says which.
+        ValueError: an index cannot be read, is outside, or selects nothing; the text tells which.
     """
     places = np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
     own_names: Sequence[str] = names

@@ -37,7 +37,7 @@ class InjectedFault(Parameters):
     value: float = parameter(0.0, text="a low voltage [V], a high temperature [deg C]")
 
 
-class Faults:
+class InjectedFaults:
     """The faults at an instant. For a fault that befalls only a share, draws follow from the seed, the exchange and the
     place, so that they do not depend on those before."""
 
