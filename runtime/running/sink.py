@@ -10,8 +10,6 @@ if TYPE_CHECKING:  # so that the command line starts without NumPy
     from ..language.block import Metric
     from ..language.parameter_change import ParameterChange
     from .memory import BoundGraph
-    from .run_result import RunResult
-    from .ticker import Ticker
 
 
 @dataclass(frozen=True)
@@ -58,8 +56,8 @@ class Sink:
     def open(self, bound: BoundGraph) -> None:
         """Prepare, once, before the first tick."""
 
-    def watch_ticker(self, ticker: Ticker) -> None:
-        """Take what measures the times of blocks, after ``open`` and before the first tick."""
+    def watch_ticker(self, ticker: Any) -> None:  # Ticker's file needs this one
+        """Take the ``Ticker``, which measures the times of blocks, before the first tick."""
 
     def record(self, tick: int) -> None:
         """Copy the bus of this tick. The control thread calls this, so it must do no more."""
@@ -83,9 +81,9 @@ class Sink:
         """Return measures of the run, with ``success`` and ``reason`` where it judges; see ``name``."""
         return {}
 
-    def finish(self, result: RunResult) -> list[str]:
-        """Take the result, after everything else is closed. Returns warnings for the user."""
+    def finish(self, result: Any) -> list[str]:  # RunResult's file needs this one
+        """Take the ``RunResult``, after everything else is closed. Returns warnings for the user."""
         return []
 
-    def abandoned(self, result: RunResult) -> None:
-        """Take the result of a run that hangs; when all sinks have it, the process ends."""
+    def abandoned(self, result: Any) -> None:
+        """Take the ``RunResult`` of a run that hangs; when all sinks have it, the process ends."""
