@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,7 @@ from ...mathematics.compiling.chain_code import (
 )  # fmt: skip
 from ..language.block import Block
 from ..language.errors import RunError
-
-Calls = Literal["kernel_calls", "update_calls"]
-"""The calls of a block's ``step`` or ``emit``, or those of its ``update``."""
+from .tick_calls import Calls
 
 
 def can_be_chained(block: Block, which: Calls = "kernel_calls") -> bool:

@@ -19,12 +19,13 @@ from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
-from .chain import Calls, Chain, can_be_chained
+from .chain import Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
 from .sink import Note, Sink
+from .tick_calls import TickCall, tick_calls
 from .timing import BlockTimes, Program
 
 
@@ -92,13 +93,14 @@ class Ticker:
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
         """Return the different programs, and for each tick of the hyperperiod the program it
         runs."""
-        graph = self.bound.graph
-        specs = [graph.block(path) for path in graph.order]
+        outputs, updates = tick_calls(self.bound.graph, self.bound.blocks)
         programs: dict[tuple[int, ...], Program] = {}
         table = []
-        for active in phases([(spec.period_ticks, spec.offset_ticks) for spec in specs]):
+        for active in phases([(call.period, call.offset) for call in outputs]):
             if active not in programs:
-                programs[active] = self._make_program([specs[i].path for i in active])
+                due = [outputs[i] for i in active]
+                paths = {call.path for call in due}
+                programs[active] = self._make_program(due, [c for c in updates if c.path in paths])
             table.append(programs[active])
         return list(programs.values()), table
 
@@ -116,50 +118,31 @@ class Ticker:
             self.programs, self._table = self._make_programs()
         return self._fused
 
-    def _make_program(self, active: Sequence[str]) -> Program:
-        calls: list[Callable[[], Any]] = []
-        owners: list[str | Chain] = []
-        updates: list[tuple[str | Chain, Callable[[], Any]]] = []
-        for path, chain in self._in_chains(active):
-            block: Any = self.bound.blocks[path]
-            if chain is not None:
-                calls.append(chain.run)
-                owners.append(chain)
-                continue
-            if type(block).is_moore():
-                calls.append(block.emit)
-            else:
-                calls.append(block.step)
-            owners.append(path)
-        moore = [path for path in active if type(self.bound.blocks[path]).is_moore()]
-        for path, chain in self._in_chains(moore, "update_calls"):
-            block = self.bound.blocks[path]
-            updates.append((path, block.update) if chain is None else (chain, chain.run))
+    def _make_program(self, outputs: Sequence[TickCall], updates: Sequence[TickCall]) -> Program:
+        made = self._in_chains(outputs)
         if self._finite is not None:
-            calls.append(self._finite.check)
-            owners.append("")
-        for owner, update in updates:
-            calls.append(update)
-            owners.append(owner)
+            made.append(("", self._finite.check))
+        made += self._in_chains(updates)
+        owners, calls = [owner for owner, _ in made], [call for _, call in made]
         sampled = self.pacer is None and any(isinstance(owner, Chain) for owner in owners)
         return Program(calls, owners, self._now if self._timing else None, sampled=sampled)
 
-    def _in_chains(
-        self, active: Sequence[str], which: Calls = "kernel_calls"
-    ) -> list[tuple[str, Chain | None]]:
-        """Return the blocks, those that follow each other in a chain only once, with their
-        chain."""
+    def _in_chains(self, calls: Sequence[TickCall]) -> list[tuple[str | Chain, Callable[[], Any]]]:
+        """The calls with their owners; those of kernels that follow each other are one call of a chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
-        found: list[tuple[str, Chain | None]] = []
-        pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path], which))
+        found: list[tuple[str | Chain, Callable[[], Any]]] = []
+        pieces = groupby(
+            calls, lambda call: self._fused and can_be_chained(blocks[call.path], call.calls)
+        )
         for chained, group in pieces:
-            paths = list(group)
+            piece = list(group)
             if not chained:
-                found += [(path, None) for path in paths]
+                found += [(call.path, getattr(blocks[call.path], call.method)) for call in piece]
                 continue
-            members = [blocks[path] for path in paths]
-            chain = Chain(members, [numbers[path] for path in paths], self.bound.running, which)
-            found.append((paths[0], chain))
+            members = [blocks[call.path] for call in piece]
+            places = [numbers[call.path] for call in piece]
+            chain = Chain(members, places, self.bound.running, piece[0].calls)
+            found.append((chain, chain.run))
         return found
 
     def advance(self, ticks: int | None = None) -> int:
