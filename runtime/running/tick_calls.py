@@ -51,3 +51,12 @@ def tick_calls(graph: CheckedGraph, blocks: Mapping[str, Block]) -> TickCalls:
         if is_moore:
             updates.append(TickCall(path, "update", *rate))
     return TickCalls(tuple(outputs), tuple(updates))
+
+
+def can_be_chained(block: Block, which: Calls = "kernel_calls") -> bool:
+    """Return whether a block's step, or its update, is nothing but compiled kernels."""
+    calls = getattr(block, which)
+    names = {"update"} if which == "update_calls" else {"step", "emit"}
+    if names & type(block).overridden_steps:
+        return False  # there is Python around the calls
+    return bool(calls) and all(call.compiled is not None for call in calls)

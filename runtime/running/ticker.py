@@ -11,21 +11,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import groupby
 from typing import Any, Protocol
 
+from ...mathematics.compiling.call_sequence import CallSequence, Owner
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
-from .chain import Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
 from .sink import Note, Sink
-from .tick_calls import TickCall, tick_calls
+from .tick_calls import TickCall, can_be_chained, tick_calls
 from .timing import BlockTimes, Program
 
 
@@ -124,13 +125,15 @@ class Ticker:
             made.append(("", self._finite.check))
         made += self._in_chains(updates)
         owners, calls = [owner for owner, _ in made], [call for _, call in made]
-        sampled = self.pacer is None and any(isinstance(owner, Chain) for owner in owners)
+        sampled = self.pacer is None and any(isinstance(owner, CallSequence) for owner in owners)
         return Program(calls, owners, self._now if self._timing else None, sampled=sampled)
 
-    def _in_chains(self, calls: Sequence[TickCall]) -> list[tuple[str | Chain, Callable[[], Any]]]:
+    def _in_chains(
+        self, calls: Sequence[TickCall]
+    ) -> list[tuple[str | CallSequence, Callable[[], Any]]]:
         """The calls with their owners; those of kernels that follow each other are one call of a chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
-        found: list[tuple[str | Chain, Callable[[], Any]]] = []
+        found: list[tuple[str | CallSequence, Callable[[], Any]]] = []
         pieces = groupby(
             calls, lambda call: self._fused and can_be_chained(blocks[call.path], call.calls)
         )
@@ -139,9 +142,9 @@ class Ticker:
             if not chained:
                 found += [(call.path, getattr(blocks[call.path], call.method)) for call in piece]
                 continue
-            members = [blocks[call.path] for call in piece]
-            places = [numbers[call.path] for call in piece]
-            chain = Chain(members, places, self.bound.running, piece[0].calls)
+            owners = [_owner(blocks[call.path], numbers[call.path], call) for call in piece]
+            chain = CallSequence(owners=owners, running=self.bound.running)
+            _prepare(chain)
             found.append((chain, chain.run))
         return found
 
@@ -208,7 +211,7 @@ class Ticker:
         """Take over the calls of kernels that changed parameters have made anew, between two ticks."""
         for program in self.programs:
             for chain in program.chains:
-                chain.refresh()
+                _prepare(chain)
 
     def _record_last(self, tick: int) -> None:
         """Record the tick whose values are wrong, because it is the one to be looked at."""
@@ -271,13 +274,29 @@ class Ticker:
             )
 
 
+def _owner(block: Block, number: int, call: TickCall) -> Owner:
+    event = None if call.method == "update" else block.event
+    return Owner(
+        block, call.path, number, partial(getattr, block, call.calls), event, block.on_event
+    )
+
+
+def _prepare(chain: CallSequence) -> None:
+    """Raises ``RunError`` where a call of a chain is not compiled."""
+    chain.prepare()
+    for owner in chain.owners if not chain.native else ():
+        if any(getattr(call, "compiled", None) is None for call in owner.calls()):
+            text = f"block '{owner.name}' has a kernel that did not compile"
+            raise RunError(text, block=owner.name)
+
+
 def owner_of(call: Callable[..., Any] | None) -> object:
     """Return the block that makes a call, or the part of the runtime; of a chain the block that
     runs."""
     owner: object = getattr(call, "__self__", None)
     if isinstance(owner, RobotDriven):
         return owner.block
-    return owner.current if isinstance(owner, Chain) else owner
+    return owner.current if isinstance(owner, CallSequence) else owner
 
 
 class WorkerBlock(Block):
