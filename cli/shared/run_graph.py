@@ -17,7 +17,7 @@ from .output import (
     number,
     print_error,
     print_json,
-    print_place,
+    print_location,
     print_warning,
     say,
     stopped_by_signals,
@@ -152,7 +152,7 @@ def run_once(
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=options.traceback)
+            print_location(result.error, traceback=options.traceback)
     if problem:
         print_error(problem)
     return code

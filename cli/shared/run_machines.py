@@ -37,7 +37,7 @@ from .output import (
     number,
     print_error,
     print_json,
-    print_place,
+    print_location,
     print_warning,
     say,
     table,
@@ -123,7 +123,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=options.traceback)
+            print_location(result.error, traceback=options.traceback)
     if problem:
         print_error(problem)
     return code
