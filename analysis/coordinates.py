@@ -17,7 +17,7 @@ from ..logs.viewing.signal_names import element_names, unit_of_element
 from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import multiply
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.reading.selection import WHOLE, Selection, read_selection, select
+from ..runtime.language.selection import WHOLE, Selection, read_selection, select
 from ..runtime.running.memory import BoundGraph, Region
 
 _AXES = "xyz"

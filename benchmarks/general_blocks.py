@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runtime.loading import load_text
+from ..runtime.loading import checked_text
 from ..runtime.running.executor import Executor
 from ..runtime.running.timing import FIRST_TIMED
 from .loading import chain
@@ -76,7 +76,7 @@ Case = Callable[[int], object]
 def executor(name: str) -> Executor:
     """Return the chain, ready to start: with times and the check for finite values, as every run
     has."""
-    graph = load_text(chain(COUNT, BLOCKS[name], SOURCE), Path("chain.yaml"))
+    graph = checked_text(chain(COUNT, BLOCKS[name], SOURCE), Path("chain.yaml"))
     return Executor(graph, log=False, run_hash=False)
 
 

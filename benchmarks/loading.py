@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from ..runtime.loading import load_text
+from ..runtime.loading import checked_text
 from .rows import Row
 
 FEW, MANY = 1_000, 4_900
@@ -30,7 +30,7 @@ def chain(
 def loading(rounds: int = 5) -> list[Row]:
     """Measure the processor time in which two chains load, the least of ``rounds``."""
     few, many = chain(FEW), chain(MANY)
-    load_text(chain(1), "chain.yaml")  # imports the blocks
+    checked_text(chain(1), "chain.yaml")  # imports the blocks
     times: dict[str, list[float]] = {"few": [], "many": [], "yaml": []}
     for _ in range(rounds):
         times["few"].append(_time_to_load(few))
@@ -56,5 +56,5 @@ def loading(rounds: int = 5) -> list[Row]:
 
 def _time_to_load(text: str) -> float:
     start = time.process_time()
-    load_text(text, Path("chain.yaml"))
+    checked_text(text, Path("chain.yaml"))
     return time.process_time() - start

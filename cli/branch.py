@@ -38,7 +38,7 @@ def branch(
     with errors_reported(as_json):
         opened = opened_recording(recording, folder)
         rate = opened.file.header.base_rate
-        graph = opened.load(overrides) if overrides else opened.graph
+        graph = opened.changed(overrides) if overrides else opened.graph
         end = None if until is None else round(until * rate)
         done = branch_run(opened, round(at * rate), graph, until=end)
         path = output or recording.with_name(f"{recording.stem}-branch.rrd")

@@ -20,7 +20,7 @@ def check(
     ] = False,
 ) -> None:
     """Report every mistake in a graph at once: where, what is expected, what is found, the fix."""
-    from ..runtime.loading import load
+    from ..runtime.loading import checked_file
 
     if schema:
         from ..runtime.loading.schema import schema_text
@@ -30,7 +30,7 @@ def check(
     if graph is None:
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
-        checked = load(graph, overrides or [])
+        checked = checked_file(graph, overrides or [])
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints

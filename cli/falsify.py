@@ -102,7 +102,7 @@ def show(
 ) -> dict[str, Any]:
     """Print the simplest failure as a graph, after running it once more, and keep it if asked to."""
     from ..runtime.graph import Graph
-    from ..runtime.loading import load_text
+    from ..runtime.loading import checked_text
     from ..studies import falsification
 
     folder = Path()
@@ -113,7 +113,7 @@ def show(
     outcome = simplest.worst.outcome
     assert outcome is not None
     text = falsification.graph_text(study, simplest, folder)
-    again = Graph(load_text(text, folder / "falsified.yaml")).run(log=False)
+    again = Graph(checked_text(text, folder / "falsified.yaml")).run(log=False)
     same = again.run_hash == outcome.run_hash
     if not same:
         print_warning("the graph gave other bytes than the run of the search")

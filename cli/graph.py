@@ -83,7 +83,7 @@ def graph(
     then. With --live the page shows a running graph: values, times of blocks and what is late, now; of a
     graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
     """
-    from ..runtime.loading import load, picture
+    from ..runtime.loading import checked_file, picture
     from ..runtime.placement.placed import placement_json, split_over_machines
 
     shown = form.web or showing.live
@@ -106,10 +106,10 @@ def graph(
             from ..logs.replay.opened_run import OpenedRun, TickValues
 
             opened = OpenedRun.of(graph)
-            checked = opened.load(overrides or [])
+            checked = opened.changed(overrides or [])
             values = TickValues(opened.file)
         else:
-            checked = load(graph, overrides or [])
+            checked = checked_file(graph, overrides or [])
         if form.svg or form.png:
             draw_files(checked, closed or (), form.svg, form.png, dark=form.dark)
     if form.as_json:

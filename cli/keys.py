@@ -29,13 +29,13 @@ def keys(
     as_json: AsJson = False,
 ) -> None:
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
-    from ..runtime.loading import load
+    from ..runtime.loading import checked_file
     from ..runtime.placement.placed import split_over_machines
     from ..runtime.transports.keys import make_keys
     from ..runtime.transports.zenoh_session import keys_from
 
     with errors_reported(as_json):
-        placed = split_over_machines(load(graph, overrides or []))
+        placed = split_over_machines(checked_file(graph, overrides or []))
         observers = list(observer or [])
         made = make_keys(placed, output, observers, days=days, anew=anew)
     machines = [spec.name for spec in placed.machines]

@@ -23,8 +23,8 @@ from .shared.output import errors_reported
 if TYPE_CHECKING:
     from pygls.lsp.server import LanguageServer
 
+    from ..runtime.language.flat_graph import FlatBlock, FlatGraph
     from ..runtime.language.reference import BlockReference
-    from ..runtime.loading.flattening.flat import FlatBlock, FlatGraph
 
 WORD = re.compile(r"[\w.:/*-]+")
 KEYS = ("rate:", "blocks:", "include:", "inputs:", "wires:")
@@ -40,10 +40,10 @@ def language_server() -> None:
 def problems_of(text: str, path: Path) -> tuple[Problem, ...]:
     """Return the problems that ``aloft check`` would report on the text if it were the file
     ``path``."""
-    from ..runtime.loading.load import load_text
+    from ..runtime.loading.checked import checked_text
 
     try:
-        load_text(text, path)
+        checked_text(text, path)
     except LoadError as error:
         return error.report.problems
     except AloftError as error:

@@ -142,7 +142,7 @@ def execute(
             f"beginning, e.g. --from {first} --until {first + 100}"
         )
     settings = [text for texts in changed.values() for text in texts]
-    graph = opened.load(settings) if settings else opened.graph
+    graph = opened.changed(settings) if settings else opened.graph
     end = min(until or int(opened.ticks[-1]) + 1, int(opened.ticks[-1]) + 1)
     total = end - max(int(opened.ticks[0]), first or 0)
     with progress_bar(out, f"replaying {graph.name}", total) as (progress, task):

@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 
 from ..runtime.language.errors import AloftError
+from ..runtime.language.flat_graph import FlatBlock, FlatGraph, FlatWire
 from ..runtime.language.quantities import Quantity
 from ..runtime.language.signals import Field
 from ..runtime.language.stages import BlockSpec, CheckedGraph
 from ..runtime.language.units import parse_unit
-from ..runtime.loading import flatten
-from ..runtime.loading.flattening.flat import FlatBlock, FlatGraph, FlatWire
-from ..runtime.loading.load import load
+from ..runtime.loading.checked import checked_file
 
 _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m", "W", "V", "A")
 """Units by the names that people know; a unit may have been multiplied up to a longer text."""
@@ -49,13 +48,23 @@ class Terminal:
 
 @dataclass(frozen=True)
 class Cut:
-    """A sub-graph that can run alone: its text, its terminals, and its blocks as they were."""
+    """A sub-graph that can run alone: its graph, what stands for the blocks outside it, its terminals, and its
+    blocks as they were.
 
-    text: str
+    ``outside`` has the lines of ``blocks`` for those outside.
+    """
+
+    flat: FlatGraph
+    outside: str
     inputs: tuple[Terminal, ...]
     outputs: tuple[Terminal, ...]
     graph: CheckedGraph
     inside: tuple[FlatBlock, ...]
+
+    @property
+    def text(self) -> str:
+        """The sub-graph as the text of a graph file."""
+        return self.flat.text + self.outside
 
 
 def cut(
@@ -83,7 +92,9 @@ def cut(
         LoadError: the graph may not run.
         AloftError: there is no such part, or it cannot be cut out; the message says why.
     """
-    flat, graph = flatten(path, overrides), load(path, overrides)
+    graph = checked_file(path, overrides)
+    flat = graph.resolved
+    assert flat is not None
     specs = {spec.path: spec for spec in graph.blocks}
     inside = [b for b in flat.blocks if not part or f"{b.path}/".startswith(f"{part}/")]
     if not inside:
@@ -125,7 +136,7 @@ def cut(
         f"  {path}: {{use: fmi.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
         for path, ports in stubs.items()
     ]
-    return Cut(without.text + "".join(lines), tuple(inputs), tuple(results), graph, blocks)
+    return Cut(without, "".join(lines), tuple(inputs), tuple(results), graph, blocks)
 
 
 Read = dict[str, dict[str, "dict[str, None] | None"]]

@@ -25,7 +25,7 @@ from ..planner.library.library import shipped_folder
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.flattening.flat import FlatGraph
+from ..runtime.language.flat_graph import FlatGraph
 from ..runtime.loading.reading.files import settings_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results

@@ -26,7 +26,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
-        "processes", "runtime/language", "runtime/loading/reading/selection", "robots", "mathematics/compiling",
+        "processes", "runtime/language", "robots", "mathematics/compiling",
     ),
     "runtime/loading": (
         "files", "runtime/background", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",
@@ -90,7 +90,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
-    "logs/replay": ("logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/replay": ("files", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
         "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "ros2",
         "runtime/language",

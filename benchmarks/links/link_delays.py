@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...runtime.loading import load
+from ...runtime.loading import checked_file
 from ...runtime.loading.reading.files import FOLDER
 from ...runtime.testing.spread import VirtualRun, run_virtual
 from ..rows import Row
@@ -40,7 +40,7 @@ def jump(delay: float, seed: int, jitter: float = 0.0, loss: float = 0.0) -> Vir
     """Make one jump with links that take from ``delay`` to ``delay + jitter`` each way [s], and
     lose the share ``loss`` of their messages."""
     settings = [*SETTINGS, f"robot.seed={seed}", f"delay.nominal={expected_delay(delay, jitter)!r}"]
-    graph = load(GRAPH, settings)
+    graph = checked_file(GRAPH, settings)
     phase = float(np.random.default_rng(seed).random())
     return run_virtual(graph, travel(delay, jitter, loss, seed), {"ground": phase})
 

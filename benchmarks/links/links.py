@@ -30,7 +30,7 @@ from ...runtime.links.free_link import LatestReceiver, LinkHealth
 from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
-from ...runtime.loading import load_text
+from ...runtime.loading import checked_text
 from ...runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from ...runtime.running.memory import Memory
 from ...runtime.transports.transport import Transport, data_key
@@ -89,7 +89,7 @@ blocks:
 {there}
   end: {{use: blocks.Gain, with: {{n: {NUMBERS}}}, in: {{u: reader0.y}}}}
 """
-    return split_over_machines(load_text(text, Path("links.yaml")))
+    return split_over_machines(checked_text(text, Path("links.yaml")))
 
 
 class _Known:

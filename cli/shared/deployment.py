@@ -160,7 +160,8 @@ def _destinations(graph: CheckedGraph, bound: BoundGraph, problems: list[str]) -
 
 
 def _write_graph(graph: CheckedGraph, folder: Path) -> None:
-    text = with_robot_beside(graph, graph.text, folder)
+    assert graph.resolved is not None
+    text = with_robot_beside(graph.resolved, graph.robot, folder).text
     (folder / f"{graph.name}.yaml").write_text(text, encoding="utf-8")
     for spec in graph.blocks:
         name = getattr(spec, "use", "") or spec.block_type.__module__

@@ -93,7 +93,7 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
         AloftError: the graph is wrong, or none of its parts was heard.
     """
     from ...runtime.live.spread_run import SpreadRun
-    from ...runtime.loading import load
+    from ...runtime.loading import checked_file
     from ...runtime.placement.placed import split_over_machines
     from .running_graphs import settings_of
 
@@ -101,7 +101,7 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
         return settings_of(remote.graph, remote.process)
 
     known = settings()
-    graph = load(remote.graph, [*known, *remote.overrides])
+    graph = checked_file(remote.graph, [*known, *remote.overrides])
     if not graph.machines:
         return None
     placed = split_over_machines(graph)
@@ -112,7 +112,7 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
             if settings() == known:
                 return None
             known = settings()
-            return split_over_machines(load(remote.graph, [*known, *remote.overrides]))
+            return split_over_machines(checked_file(remote.graph, [*known, *remote.overrides]))
         except AloftError:
             return None
 

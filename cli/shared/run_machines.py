@@ -25,7 +25,7 @@ from ...runtime.links.observer import StatusPublisher
 from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
-from ...runtime.loading import load
+from ...runtime.loading import checked_file
 from ...runtime.placement.placed import PlacedGraph, split_over_machines
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
@@ -82,7 +82,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     from ...logs.recording.output_file import cause_of, remedy
     from .viewing import how_to_view
 
-    placed = split_over_machines(load(path, options.settings))
+    placed = split_over_machines(checked_file(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
         files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}

@@ -30,7 +30,7 @@ from aloft.mathematics.compiling.foreign_call import ForeignCall
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.planner.task.phase import Phase
 from aloft.robots.surfaces import robot_surfaces
-from aloft.runtime.loading.load import load
+from aloft.runtime.loading.checked import checked_file
 from aloft.runtime.running.memory import BoundGraph
 
 TO_MUJOCO, FROM_MUJOCO = (
@@ -83,7 +83,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
         NeedsPython: blocks beside the robot need Python.
         StartError: the robot does not stand.
     """
-    graph = load(graph_file, overrides)
+    graph = checked_file(graph_file, overrides)
     bound = BoundGraph(graph)
     blocks = tuple(path for path in graph.order if path != "robot")
     reasons = [
@@ -122,7 +122,8 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
-    part = SubGraph(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
+    assert graph.resolved is not None
+    part = SubGraph(Cut(graph.resolved, "", (), (), graph, ()), graph, bound, blocks, (), ())
     module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
 
     def told(each: str | ForeignCall) -> Any:

@@ -8,7 +8,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -130,8 +130,9 @@ def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -
 
 def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:
     """Write the graph, its interface, and the files and modules that it names."""
-    graph, text = cut_out.graph, cut_out.text
-    text = with_robot_beside(graph, text, folder)
+    graph = cut_out.graph
+    beside = with_robot_beside(cut_out.flat, graph.robot, folder)
+    text = replace(cut_out, flat=beside).text
     overrides: dict[str, Any] = {}
     for block in cut_out.inside:
         spec = graph.block(block.path)

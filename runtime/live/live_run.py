@@ -12,7 +12,7 @@ from typing import Any
 from ..language.errors import AloftError
 from ..language.layout import Layout
 from ..language.stages import CheckedGraph
-from ..loading import LoadError, load, load_text
+from ..loading import LoadError, checked_file, checked_text
 from ..running.memory import Memory
 from .parameter_endpoint import EndpointError, answers, ask, ask_to_watch, set_parameters
 from .texts import ValueTexts, tick_text, time_texts
@@ -256,10 +256,10 @@ def _load(about: dict[str, Any]) -> CheckedGraph:
         file = file.relative_to(Path.cwd())  # so that places in it are short
     if file.is_file():
         try:
-            graph = load(file, about["overrides"])
+            graph = checked_file(file, about["overrides"])
         except LoadError:
             pass
         else:
             if graph.text == text:
                 return graph
-    return load_text(text, file)
+    return checked_text(text, file)

@@ -50,7 +50,7 @@ def test_without_a_change_it_has_the_bytes_of_the_recording_and_goes_on(
 def test_with_a_change_it_is_a_run_that_was_changed_in_that_tick(
     graph: aloft.Graph, recorded: OpenedRun
 ) -> None:
-    done = branch(recorded, 73, recorded.load(["pid.kp=3.0"]), until=200)
+    done = branch(recorded, 73, recorded.changed(["pid.kp=3.0"]), until=200)
     assert done.first is not None
     assert (done.first.tick, done.first.block) == (73, "pid")
     with graph.open() as before, graph.changed({"pid.kp": 3.0}).open() as after:
@@ -68,6 +68,6 @@ def test_what_cannot_go_on_is_said(recorded: OpenedRun) -> None:
         ReplayError, match="tick 150 lies not within the recording: it has 0 to 149"
     ):
         branch(recorded, 150)
-    longer = recorded.load(["d.samples=5"])
+    longer = recorded.changed(["d.samples=5"])
     with pytest.raises(ReplayError, match=r"does not fit this graph: state d.x.values"):
         branch(recorded, 73, longer)

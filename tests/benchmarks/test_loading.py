@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from aloft.benchmarks.loading import chain, loading
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 
 
 def test_the_chain_has_its_source_and_as_many_gains() -> None:
-    graph = load_text(chain(3), "chain.yaml")
+    graph = checked_text(chain(3), "chain.yaml")
     assert graph.order == ("g0", "g1", "g2", "g3")
 
 

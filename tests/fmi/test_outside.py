@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from aloft.fmi.outside import Outside
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.testing import BlockBench
 
 
@@ -36,4 +36,4 @@ def test_outputs_hold_what_was_set() -> None:
 def test_wrong_fields_are_reported(field: dict[str, Any], message: str) -> None:
     text = f"rate: 100 Hz\nblocks:\n  a: {{use: fmi.Outside, with: {{ports: {{y: {{value: {field}}}}}}}}}\n"
     with pytest.raises(LoadError, match=message):
-        load_text(text, "graph.yaml")
+        checked_text(text, "graph.yaml")

@@ -13,7 +13,7 @@ from aloft.benchmarks.courses import course
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.mathematics.rotations import to_matrix
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
@@ -77,7 +77,7 @@ TICKS = 450
 
 def hash_of(seed: int) -> str:
     """The run hash of the beginning of a course."""
-    graph = load(GRAPH, overrides={"robot.seed": seed})
+    graph = checked_file(GRAPH, overrides={"robot.seed": seed})
     result = run(graph, TICKS)
     assert result.signal("planner.part.number")[-1] == 1
     return result.run_hash
@@ -93,7 +93,7 @@ def test_bytes_are_equal_in_workers() -> None:
 
 @pytest.mark.long
 def test_bytes_are_equal_on_two_machines_in_lockstep() -> None:
-    graph = load(GRAPH, overrides={"robot.seed": 1})
+    graph = checked_file(GRAPH, overrides={"robot.seed": 1})
     machines = {"onboard": "tcp/127.0.0.1:7470", "desk": "tcp/127.0.0.1:7471"}
     placed = spread(graph, machines, {"planner": "desk", "commands": "desk"})
     spread_out = run_spread(placed, TICKS, timeout=60.0, wall_time=300.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aloft.ros2.publish import SLOTS, Publish
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.testing.bench import BlockBench
 
 from ..needed import needs
@@ -105,7 +105,7 @@ def graph(
     topic: str = "/joint_states",
 ) -> Any:  # fmt: skip
     text = GRAPH.format(type=type_, wires=wires, more=more, topic=topic, ten=[0.1] * 10)
-    return load_text(text, "graph.yaml")
+    return checked_text(text, "graph.yaml")
 
 
 def test_a_graph_checks_units_frames_and_types() -> None:

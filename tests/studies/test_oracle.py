@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.graph import Graph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.studies.oracle import CALIBRATED, CONSUMER, CalibrationErrors, oracle_values
 
 GRAPHS = Path(__file__).parents[2] / "graphs"
@@ -17,7 +17,7 @@ GRAPHS = Path(__file__).parents[2] / "graphs"
 def graph_of(overrides, trial="real"):
     files = ["jump.yaml", f"trials/{trial}.yaml", CONSUMER]
     text = "include: [" + ", ".join(files) + "]\n"
-    return Graph(load_text(text, GRAPHS / "told.yaml", {"robot.seed": 4, **overrides}))
+    return Graph(checked_text(text, GRAPHS / "told.yaml", {"robot.seed": 4, **overrides}))
 
 
 @pytest.fixture(scope="module")

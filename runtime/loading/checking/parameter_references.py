@@ -14,10 +14,10 @@ from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain
 from ....files.problems import Code, Problems, listing, nearest
 from ....files.validation import unit_of
 from ...language.block import Block, Clock, Context, UnmetRequirement
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.parameters import Parameters
 from ...language.registry import find_block
 from ...language.requirements import unmet_requirements
-from ..flattening.flat import FlatBlock, FlatGraph
 from .parameters import check_parameters, plain_parameters
 from .settings import Settings
 

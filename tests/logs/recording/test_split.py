@@ -12,7 +12,7 @@ from aloft.logs import RecordingError, read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
@@ -46,7 +46,7 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
         def close(self) -> None:
             """Nothing."""
 
-    result = Executor(load(folder / "graph.yaml"), sinks=[recorder, Kill()], log=True).run()
+    result = Executor(checked_file(folder / "graph.yaml"), sinks=[recorder, Kill()], log=True).run()
     return recorder, result
 
 

@@ -16,7 +16,7 @@ from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import Keyframes, replay
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
@@ -67,7 +67,9 @@ class Tune:
 def record(folder: Path, **settings: Any) -> RunResult:
     (folder / "sum.yaml").write_text(GRAPH)
     (folder / "parts.py").write_text(PARTS)
-    graph = load(folder / "sum.yaml", {f"gain.{key}": value for key, value in settings.items()})
+    graph = checked_file(
+        folder / "sum.yaml", {f"gain.{key}": value for key, value in settings.items()}
+    )
     keyframes = Keyframes(100)
     result = Executor(graph, sinks=[keyframes, Tune()]).run()
     log = result.log

@@ -39,7 +39,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunResult, OpenedRun]
 @pytest.fixture
 def base(ran: tuple[RunResult, OpenedRun]) -> Iterator[str]:
     _, opened = ran
-    server = page_server(opened.load(), values=TickValues(opened.file))
+    server = page_server(opened.graph, values=TickValues(opened.file))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_address[1]}"
     server.shutdown()
@@ -75,7 +75,7 @@ def test_the_page_asks_for_the_values_of_a_tick(
 
 
 def test_a_page_without_a_run_has_no_slider(ran: tuple[RunResult, OpenedRun]) -> None:
-    server = page_server(ran[1].load())
+    server = page_server(ran[1].graph)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     base = f"http://127.0.0.1:{server.server_address[1]}"
     try:

@@ -13,7 +13,7 @@ from aloft.runtime.drawing.layout import draw
 from aloft.runtime.drawing.page import page, page_server, policy
 from aloft.runtime.drawing.render import save_png, svg
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 
 INNER = """\
 inputs: {wish: required, is: required}
@@ -38,7 +38,7 @@ blocks:
 def graph(tmp_path: Path) -> CheckedGraph:
     (tmp_path / "inner.yaml").write_text(INNER)
     (tmp_path / "outer.yaml").write_text(OUTER)
-    return load(tmp_path / "outer.yaml")
+    return checked_file(tmp_path / "outer.yaml")
 
 
 def test_what_loading_inserts_is_not_drawn(graph: CheckedGraph) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from aloft.runtime.drawing.diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire, diagram
 from aloft.runtime.drawing.layout import Drawing, draw, size_of
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 
 from .test_layers import NAMES, diagram_of
 
@@ -68,7 +68,7 @@ def test_any_graph_can_be_drawn(edges: list[tuple[str, str]]) -> None:
 
 @cache
 def jump() -> Drawing:
-    return drawn(diagram(load("aloft:jump")))
+    return drawn(diagram(checked_file("aloft:jump")))
 
 
 def test_the_jump_fits_on_one_screen() -> None:
@@ -119,7 +119,7 @@ def test_a_thousand_blocks_are_drawn_in_seconds() -> None:
 
 @pytest.mark.long
 def test_a_graph_of_another_robot_is_drawn() -> None:
-    drawn(diagram(load("aloft:robots/go2_jump")))
+    drawn(diagram(checked_file("aloft:robots/go2_jump")))
 
 
 def test_a_block_is_as_wide_as_its_longest_names_and_as_high_as_its_ports() -> None:

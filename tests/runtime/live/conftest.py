@@ -11,7 +11,7 @@ import pytest
 from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
@@ -55,7 +55,7 @@ class Running:
 
 def start(file: Path, path: Path, *, paused: bool = False) -> Running:
     """Run the graph in ``file``; it answers at ``path``, and may begin ``paused``."""
-    bound = BoundGraph(load(file))
+    bound = BoundGraph(checked_file(file))
     executor = Executor(
         bound, log=False, plain=True, sinks=[ParameterEndpoint(path, paused=paused)]
     )

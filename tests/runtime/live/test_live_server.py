@@ -11,7 +11,7 @@ import pytest
 
 from aloft.runtime.live.live_run import LiveRun
 from aloft.runtime.live.live_server import LONGEST_BODY, LiveServer
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 
 from ...logs.viewing.browser import PROGRAM, Browser
 from .conftest import Running, serving, start, write_graph
@@ -65,7 +65,7 @@ def test_what_it_answers(server: LiveServer) -> None:
     assert status == 200 and done["changes"][0]["new"] == 5.0
     status, done = ask(server, "POST", "/save")
     assert (status, done["count"]) == (200, 1)
-    assert load(server.save).block("wave").params.frequency == 5.0  # type: ignore[attr-defined]
+    assert checked_file(server.save).block("wave").params.frequency == 5.0  # type: ignore[attr-defined]
 
 
 @pytest.fixture(scope="module")
@@ -232,7 +232,7 @@ def test_a_run_is_watched_and_tuned(server: LiveServer, running: Running, tmp_pa
         wait_until(lambda: running.bound.blocks["pid"].params.kp == [1, 2])  # type: ignore[attr-defined]
         page.ask("document.getElementById('save').click()")
         page.wait("document.getElementById('saved').textContent", f"1 values are in {server.save}")
-        assert load(server.save).block("wave").params.frequency == 1.0  # type: ignore[attr-defined]
+        assert checked_file(server.save).block("wave").params.frequency == 1.0  # type: ignore[attr-defined]
         # closing a sub-graph keeps the token
         page.ask("toggle('inner')")
         page.wait("location.search.includes('closed=inner')")

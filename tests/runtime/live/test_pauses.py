@@ -10,7 +10,7 @@ from aloft.runtime.language.block import Block
 from aloft.runtime.live.live_run import LiveRun, paused_text
 from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import EndpointError, ask
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 
 from ...logs.viewing.browser import PROGRAM, Browser
@@ -197,7 +197,9 @@ def test_pause_go_back_move_a_slider_go_on(
         page.wait(STATE, "has ended")
         assert page.ask("document.getElementById('pause').disabled")
     assert gain.params.gain == 2.0
-    assert running.results[0].run_hash == Executor(load(graph_file), plain=True).run().run_hash
+    assert (
+        running.results[0].run_hash == Executor(checked_file(graph_file), plain=True).run().run_hash
+    )
 
 
 @needs_browser

@@ -19,7 +19,7 @@ from aloft.runtime.live.parameter_endpoint import EndpointError
 from aloft.runtime.live.part_feed import packed
 from aloft.runtime.live.spread_run import SpreadRun
 from aloft.runtime.live.window import WindowLayout
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.placement.placed import PlacedGraph, split_over_machines
 
 from ...logs.viewing.browser import PROGRAM, Browser
@@ -64,7 +64,7 @@ def parts(graph: Path) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
 
 @pytest.fixture
 def run(graph: Path) -> Iterator[SpreadRun]:
-    made = SpreadRun(split_over_machines(load(graph)))
+    made = SpreadRun(split_over_machines(checked_file(graph)))
     yield made
     made.close()
 
@@ -127,9 +127,9 @@ def ticks(found: dict[str, Any]) -> list[int]:
 
 
 def test_a_run_that_is_started_anew_at_other_endpoints_is_followed(graph: Path) -> None:
-    first = split_over_machines(load(graph))
+    first = split_over_machines(checked_file(graph))
     moved = [f"machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("near", "far")]
-    second = split_over_machines(load(graph, moved))
+    second = split_over_machines(checked_file(graph, moved))
     there: list[PlacedGraph | None] = [None]
     run = SpreadRun(first, find=lambda: there[0])
     try:

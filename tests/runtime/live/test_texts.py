@@ -5,7 +5,7 @@ import pytest
 
 from aloft.runtime.language.signals import DTYPES
 from aloft.runtime.live.texts import ValueTexts, duration, tick_text, time_texts
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.memory import Memory
 
 MICROSECOND = 1000
@@ -36,7 +36,7 @@ def test_the_time_of_a_block_is_that_of_all_its_calls() -> None:
 
 
 def test_values_have_units_and_names() -> None:
-    graph = load("aloft:jump")
+    graph = checked_file("aloft:jump")
     bus = Memory(graph.blocks, graph.robot).bus
     bus.field("robot.joints.position")[:] = 0.12345678
     bus.field("phase.phase.phase")[...] = 2

@@ -10,7 +10,7 @@ from aloft.runtime.language.block import Block, Context, Output, UnmetRequiremen
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
-from aloft.runtime.loading import LoadError, load, load_text
+from aloft.runtime.loading import LoadError, checked_file, checked_text
 
 PATH = Path(__file__).parent / "graph.yaml"
 
@@ -46,7 +46,7 @@ HERE = f"{Path(__file__).stem}:Teller"
 
 def graph(first: str, second: str, more: Mapping[str, Any] | None = None) -> Any:
     text = f"rate: 10 Hz\nblocks:\n  a: {{use: '{HERE}', with: {first}}}\n  b: {{use: '{HERE}', with: {second}}}\n"
-    return load_text(text, PATH, more or {})
+    return checked_text(text, PATH, more or {})
 
 
 def problems(first: str, second: str) -> list[str]:
@@ -120,7 +120,7 @@ def test_a_broken_teller_is_the_only_problem() -> None:
 
 
 def test_a_value_set_inside_a_named_file_changes_what_is_in_it(tmp_path: Path) -> None:
-    checked = load(
+    checked = checked_file(
         "graphs/jump.yaml", ["plan.task=tasks/in_situ.yaml", "plan.task.distance_x=20 cm"]
     )
     task = checked.block("plan").params.model_dump()["task"]

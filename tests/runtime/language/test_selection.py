@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.runtime.loading.reading.selection import WHOLE, Selection, read_selection, runs, select
+from aloft.runtime.language.selection import WHOLE, Selection, read_selection, runs, select
 
 NAMES = ("left_hip", "left_knee", "right_hip", "right_knee")
 

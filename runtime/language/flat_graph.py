@@ -8,15 +8,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from ....files.nodes import Entry, MapNode, Node, plain, text_of
-from ....files.problems import Position
-from ....robots.description import ROBOT_FILES
-from ....robots.importing.package_files import SCHEME
-from ...language.stages import HasSource
-from ..reading.selection import WHOLE, Selection
+from ...files.nodes import Entry, MapNode, Node, plain, text_of
+from ...files.problems import Position
+from ...robots.description import ROBOT_FILES
+from ...robots.importing.package_files import SCHEME
+from .selection import WHOLE, Selection
 
 _WIDTH = 100
 Item = TypeVar("Item")
+
+
+class HasSource:
+    """The base of every stage's wire, which has a ``source``: an output ``block.port``."""
+
+    source: str
+
+    @property
+    def source_block(self) -> str:
+        """The path of the block that writes."""
+        return self.source.rpartition(".")[0]
+
+    @property
+    def source_port(self) -> str:
+        """The name of the output."""
+        return self.source.rpartition(".")[2]
 
 
 @dataclass(frozen=True)

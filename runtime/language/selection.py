@@ -10,7 +10,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
-from ....files.problems import nearest
+from ...files.problems import nearest
 
 _TEXT = re.compile(
     r"(?P<block>[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*)\.(?P<port>[A-Za-z_][A-Za-z0-9_]*)"

@@ -1,4 +1,4 @@
-"""The public functions that load a graph file or text: into a checked graph, or a report."""
+"""From a graph file, a text or a changed graph to a checked graph, or to a report."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...files.problems import LoadError, Problems, Report
+from ..language.flat_graph import FlatGraph
 from ..language.stages import CheckedGraph
 from .checking.check_graph import check_graph
-from .flattening.flat import FlatGraph
+from .flattening.change import change
 from .flattening.flatten import flatten_file, flatten_text
 from .reading.files import graph_path
 from .reading.overrides import Overrides
 
 
-def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
+def checked_file(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
     """Load and check the graph in a file, ready to be bound and run.
 
     Args:
@@ -32,7 +33,7 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
     return _result(graph, problems, str(path))
 
 
-def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
+def checked_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
     """Load and check the graph in a text; files it names are searched for as if the text were the
     file ``path``.
 
@@ -43,6 +44,18 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
     with _collector_paused():
         graph = check_graph(flatten_text(text, Path(path), overrides, problems), problems)
     return _result(graph, problems, str(path))
+
+
+def checked_again(graph: FlatGraph, overrides: Overrides) -> CheckedGraph:
+    """Check a flat graph with other parameters and keys; those it had before stay.
+
+    Raises:
+        LoadError: the changed graph is wrong; the error carries the report of all problems.
+    """
+    problems = Problems()
+    with _collector_paused():
+        checked = check_graph(change(graph, overrides, problems), problems)
+    return _result(checked, problems, graph.file)
 
 
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
@@ -62,6 +75,19 @@ def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
     problems = Problems()
     with _collector_paused():
         graph = flatten_file(graph_path(path), overrides, problems)
+    if len(problems):
+        raise LoadError(problems.report(str(path)))
+    return graph
+
+
+def flattened_text(text: str, path: str | Path) -> FlatGraph:
+    """Flatten the graph in a text that stands for the file ``path``.
+
+    Raises:
+        LoadError: the text cannot be read or expanded. Wires and values are not checked here.
+    """
+    problems = Problems()
+    graph = flatten_text(text, Path(path), (), problems)
     if len(problems):
         raise LoadError(problems.report(str(path)))
     return graph
