@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -27,11 +27,13 @@ class Teller(Block):
         count: int = parameter(2, text="a number")
 
     params: Params
+    asked: ClassVar[dict[str, frozenset[str]]] = {}
     y = Output(Level, text="the height")
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         assert isinstance(params, cls.Params)
+        cls.asked[context.path] = context.asked
         if params.height == 99.0:
             raise AloftError("99 is too much")
         low = UnmetRequirement("nothing is below the ground", fix="height: 1 m")
@@ -126,3 +128,12 @@ def test_a_value_set_inside_a_named_file_changes_what_is_in_it(tmp_path: Path) -
     task = checked.block("plan").params.model_dump()["task"]
     assert task == {"file": "tasks/in_situ.yaml", "distance_x": "20 cm"}
     assert checked.block("score").params.model_dump()["distance"] == [0.2, 0.0]
+
+
+def test_a_block_is_told_which_of_its_values_are_asked_for() -> None:
+    found = graph("{height: 2.0}", "{height: {from: a.twice}, count: {from: a.count}}")
+    asked = found.block("a").block_type.asked
+    assert asked["a"] == {"twice", "count"}
+    asked.clear()
+    graph("{height: 2.0}", "{height: 3.0}")
+    assert not asked
