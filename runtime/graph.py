@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -133,12 +134,12 @@ class Graph:
         return Graph(checked_again(self.checked.flat, overrides))
 
     def _repr_html_(self) -> str:
-        """Draw the block diagram, for notebooks."""
-        from .drawing.diagram import diagram
-        from .drawing.layout import draw
-        from .drawing.render import svg
+        """The block diagram, for notebooks; without the extension ``studio`` the text of the graph."""
+        from .language.extensions import is_provided, provided
 
-        return svg(draw(diagram(self.checked)), self.checked.name)
+        if is_provided("diagram_svg"):
+            return str(provided("diagram_svg")(self.checked))
+        return f"<pre>{escape(self.checked.text)}</pre>"
 
     def about(self) -> Mapping[str, Any]:
         """Return the additional result fields of a run: none."""

@@ -511,26 +511,36 @@ UNUSED |= {
     for each in vars(elementwise).values()
     if is_kernel(each) and each.__module__ == elementwise.__name__
 }
-UNUSED["aloft.blocks.jumping.moved_landing.move_landing"] = (
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.move_landing"] = (
     *records(STEERED_JUMP, TURNED_ROBOT, MOVED, MOTION_ROOM),
 )
-UNUSED["aloft.blocks.jumping.moved_landing.turn_body"] = (
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.turn_body"] = (
     0.1, 0.5, 2.0, *records(STEERED_JUMP, TURNED_ROBOT, MOTION_ROOM),
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.moved_landing.turn_feet"] = (
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.turn_feet"] = (
     *records(STEERED_JUMP, MOVED, MOTION_ROOM),
 )
-UNUSED["aloft.blocks.jumping.moved_landing.thrust_motion"] = *records(MOVED), 1, 1.0, 0.95
-UNUSED["aloft.blocks.jumping.moved_landing.fastest_change"] = 0.5, 3.0, 0.15
-UNUSED["aloft.blocks.jumping.moved_landing.add_velocity_change"] = (
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.thrust_motion"] = (
+    *records(MOVED),
+    1,
+    1.0,
+    0.95,
+)
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.fastest_change"] = 0.5, 3.0, 0.15
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.add_velocity_change"] = (
     *records(MOVED), 0, 0.04, *records({**STEERED_JUMP, "time": 0.85}, RETARGETED), 0.05,
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.moved_landing.move_footholds"] = *records(MOVED), 1, 0.05, 0.03
-UNUSED["aloft.blocks.jumping.moved_landing.begin_swing"] = records(MOVED, STEERED_JUMP)
-UNUSED["aloft.blocks.jumping.moved_landing.swing_motion"] = (
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.move_footholds"] = (
+    *records(MOVED),
+    1,
+    0.05,
+    0.03,
+)
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.begin_swing"] = records(MOVED, STEERED_JUMP)
+UNUSED["aloft.extensions.hopping.blocks.moved_landing.swing_motion"] = (
     *records(MOVED), 2, *records(STEERED_JUMP), 1.0,
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
+UNUSED["aloft.extensions.hopping.blocks.steered_plan.retarget"] = (
     *records(
         {"placed": False, "ahead": 0.12, "aside": -0.01, "turn": 0.1, "up": 0.0, "number": 4},
         {"phase": 3}, STEERED_JUMP, RETARGETED,
@@ -539,10 +549,10 @@ UNUSED["aloft.blocks.jumping.steered_plan.retarget"] = (
     ),
 )  # fmt: skip
 STANDING = {"foot_position": NORMAL((2, 3)), "com": np.array([0.1, 0.0, 0.4])}
-UNUSED["aloft.blocks.jumping.steered_plan.has_moved"] = (
+UNUSED["aloft.extensions.hopping.blocks.steered_plan.has_moved"] = (
     np.array([0.11, 0.02, 0.0]), 0.3, 0.05, *records({"asked_from": np.zeros(3), "asked_heading": 0.1}),
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.steered_plan.is_at_rest"] = (
+UNUSED["aloft.extensions.hopping.blocks.steered_plan.is_at_rest"] = (
     *records({**STANDING, "com_velocity": NORMAL(3)}, STANDING), 0.05,
     *records({"middle": np.zeros(3), "middle_rate": np.zeros(3), "vector": np.zeros(3)}),
 )  # fmt: skip
@@ -562,14 +572,18 @@ ROWS_OF_SPEEDS = TableRows(
 HOPPING = {
     "jump": 2, "landed": 3, "skipped": 0.5, "place": 0.3, "before": 0.05, "way": 0.1, "goal": 0.4, "begun": 4,
 }  # fmt: skip
-UNUSED["aloft.blocks.jumping.speed_plan.tell_goal"] = records(
+UNUSED["aloft.extensions.hopping.blocks.speed_plan.tell_goal"] = records(
     HOPPING, {"position": np.zeros(2), "heading": 0.0, "height": 0.0, "number": 0, "outcome": 0}
 )
-UNUSED["aloft.blocks.jumping.speed_plan.triangle_weight"] = np.array([0.0, 0.1, 0.2]), 1, 0.07
-UNUSED["aloft.blocks.jumping.speed_plan.begin_next_jump"] = (
+UNUSED["aloft.extensions.hopping.blocks.speed_plan.triangle_weight"] = (
+    np.array([0.0, 0.1, 0.2]),
+    1,
+    0.07,
+)
+UNUSED["aloft.extensions.hopping.blocks.speed_plan.begin_next_jump"] = (
     0.12, 0.05, 30, ROWS_OF_SPEEDS, *records(HOPPING),
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.speed_plan.mix_rows"] = (
+UNUSED["aloft.extensions.hopping.blocks.speed_plan.mix_rows"] = (
     1.9, 0.002, 0.002, ROWS_OF_SPEEDS, np.array([0.0, 8.0]), np.array([0.0, 0.1]),
     *records(
         HOPPING,

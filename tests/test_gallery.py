@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from aloft import RunResult, load
-from aloft.fmi.exporting.write import export
+from aloft.extensions.export.fmi.exporting.write import export
 from aloft.runtime.loading import checked_file
 
 ROOT = Path(__file__).parent.parent

@@ -1,7 +1,7 @@
 """The simulated robot without its ports: rigid bodies, contact, sensors, and a standing start.
 
-``MujocoRobot`` puts a graph's ports around it, and the twin the buses of the real robot. Whoever
-owns a plant says which torques its drives give, and lets it simulate so many physics steps.
+``MujocoRobot`` puts a graph's ports around it, and the twin the buses of the real robot. The
+owner of a plant gives the torques of its drives, and lets it simulate so many physics steps.
 """
 
 from __future__ import annotations
@@ -199,21 +199,22 @@ def _addresses() -> tuple[int, int]:
 
 
 SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
-"""How long a robot settles before it is checked whether it stands, and the last part of it, in which the load is averaged [s]."""
+"""Time for which a robot settles before the check that it stands, and the last part of it, in which the load is
+averaged [s]."""
 
 
 class JointTorques(Protocol):
     """The drives of a plant, as its physics sees them."""
 
     limits: MotorLimits
-    """What the motors can do, and what is asked of them within that."""
+    """Limits of the motors, and their commanded torques within them."""
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
     ) -> Call:
-        """The call that writes the joint torques [N m] during the physics step ``step``, a count
-        without a dimension, to ``out``, from the reading of the drives' encoders [rad, rad/s] and the true
-        joint velocities ``speed`` [rad/s]. All arrays keep their place in memory."""
+        """Return the call that writes the joint torques [N m] during the physics step ``step``, a count without a
+        dimension, to ``out``, from the reading of the drives' encoders [rad, rad/s] and the true joint velocities
+        ``speed`` [rad/s]. All arrays keep their place in memory."""
 
 
 class Plant:
@@ -242,7 +243,7 @@ class Plant:
         clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         step1, step2: the two parts of a physics step, see ``step_calls``.
-        late: by how much [s] the physics steps begin after the control clock's ticks.
+        late: delay [s] of the physics steps after the control clock's ticks.
     """
 
     def __init__(
@@ -295,7 +296,7 @@ class Plant:
 
     @staticmethod
     def state_dimensions(params: SimulatorParameters, robot: RobotDescription) -> Mapping[str, int]:
-        """The sizes of the simulator's state and of the random streams'."""
+        """Return the sizes of the simulator's state and of the random streams'."""
         import mujoco
 
         model = build_world(params, robot, Variation())
@@ -458,7 +459,7 @@ class Plant:
         self, drives: JointTorques, steps: int, push: ExternalForce | None = None,
         thrusters: Sequence[Call] = (),
     ) -> CallSequence:  # fmt: skip
-        """Calls that simulate physics steps; afterwards all derived quantities are up to date.
+        """Return the calls that simulate physics steps; afterwards all derived quantities are up to date.
 
         ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
         pulls, too: it is put on when the robot stands. ``thrusters`` are what those do in every step.
@@ -559,17 +560,17 @@ class Plant:
         return found
 
     def voltage(self, supply: float) -> float:
-        """The voltage of the pack [V], or of the ``supply`` where none is simulated."""
+        """Return the voltage of the pack [V], or of the ``supply`` where none is simulated."""
         return supply if self.battery is None else float(self.battery.voltage[0])
 
     def temperature(self, motor: int) -> float:
-        """The temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
+        """Return the temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
         if self.windings is None:
             return NOMINAL
         return float(self.physics.winding_temperature[motor])
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed."""
+        """Return the values that were drawn from the seed."""
         x, y, z = (1e3 * float(value) for value in self.variation.base_com_offset)
         return {
             "robot_base_com_x_mm": x,
@@ -595,5 +596,5 @@ class Plant:
 
 
 def _noisy_fields(robot: RobotDescription) -> dict[str, int]:
-    """How many fields with noise every mounted sensor has."""
+    """Return the number of fields with noise of every mounted sensor."""
     return {sensor.name: len(sensor.signal.fields) for sensor in mounted_sensors(robot)}

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from ...files.nodes import plain
 from ...robots.description import RobotDescription, RobotError, find_robot
-from ...runtime.drawing.page import shown
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.flat_graph import FlatGraph
 from ...runtime.language.layout import Layout
@@ -35,6 +34,7 @@ from ..file.dependencies import digests, files_read, named_file, other_files, un
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
+from ..viewing.signal_names import value_text
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
@@ -282,6 +282,6 @@ class TickValues:
         row = int(known.searchsorted(tick, side="right")) - 1
         _, rows = self._run.window(int(known[row]), int(known[row]) + 1)
         return {
-            name: shown(self._layout.view(rows, name)[0], signal.unit or "")
+            name: value_text(self._layout.view(rows, name)[0], signal.unit or "")
             for name, signal in self._signals.items()
         }

@@ -1,4 +1,4 @@
-"""From a graph file, a text or a changed graph to a checked graph, or to a report."""
+"""Checks of a graph from a file, a text or changes: a checked graph, or a report."""
 
 from __future__ import annotations
 

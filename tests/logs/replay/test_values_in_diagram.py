@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.extensions.studio.diagram.page import page_server
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun, TickValues
-from aloft.runtime.drawing.page import page_server, shown
+from aloft.logs.viewing.signal_names import value_text
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\
@@ -110,4 +111,4 @@ def test_a_browser_shows_the_values(base: str, tmp_path: Path) -> None:
     ],
 )
 def test_how_numbers_are_shown(value: np.ndarray, text: str) -> None:
-    assert shown(value, "m") == text
+    assert value_text(value, "m") == text

@@ -2,14 +2,11 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
-from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
 from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
@@ -72,16 +69,6 @@ def write_graph(folder: Path) -> Path:
     return folder / "waves.yaml"
 
 
-@contextmanager
-def serving(live: LiveRun, save: Path) -> Iterator[LiveServer]:
-    """The page of a graph that runs, served in a thread."""
-    made = LiveServer(live, save)
-    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
-    yield made
-    made.shutdown()
-    made.server_close()
-
-
 @pytest.fixture
 def graph_file(tmp_path: Path) -> Path:
     return write_graph(tmp_path)
@@ -98,17 +85,3 @@ def running(graph_file: Path, socket_path: Path) -> Iterator[Running]:
     run = start(graph_file, socket_path)
     yield run
     run.stop()
-
-
-@pytest.fixture
-def live(running: Running) -> Iterator[LiveRun]:
-    run = LiveRun(running.path)
-    yield run
-    run.close()
-
-
-@pytest.fixture
-def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
-    """The page of the graph that runs, served in a thread."""
-    with serving(live, tmp_path / "waves-tuned.yaml") as made:
-        yield made

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from aloft.runtime.drawing.diagram import diagram
+from aloft.extensions.studio.diagram.diagram import diagram
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import checked_text
 from aloft.runtime.loading.picture import mermaid, table, table_json
