@@ -134,7 +134,8 @@ class Graph:
         return Graph(checked_again(self.checked.flat, overrides))
 
     def _repr_html_(self) -> str:
-        """The block diagram, for notebooks; without the extension ``studio`` the text of the graph."""
+        """Draw the block diagram, for notebooks; without the extension ``studio`` return the text
+        of the graph."""
         from .language.extensions import is_provided, provided
 
         if is_provided("diagram_svg"):

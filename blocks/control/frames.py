@@ -53,7 +53,7 @@ class FrameModel:
         self._tree, self._motion = body_tree(robot), body_motion(len(robot.joints))
         self._frames: dict[tuple[str, Vector], Frame] = {}
         self.calls: list[KernelCall] = []
-        """What updates all frames in a tick, in this order."""
+        """Calls that update all frames in a tick, in their order."""
 
     def frame(self, name: str, offset: Vector = (0.0, 0.0, 0.0)) -> Frame:
         """Return the frame called ``name``, moved by ``offset`` [m] in its own axes.
