@@ -97,7 +97,7 @@ def print_warning(message: str) -> None:
     typer.echo(message, err=True)
 
 
-def print_place(error: RunError, *, traceback: bool) -> None:
+def print_location(error: RunError, *, traceback: bool) -> None:
     """Print, on standard error, where a block failed: the line, or the whole traceback."""
     if traceback and error.traceback:
         typer.echo(error.traceback, err=True)
@@ -126,7 +126,7 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
         else:
             print_error(str(error))
             if traceback and isinstance(error, RunError):
-                print_place(error, traceback=True)
+                print_location(error, traceback=True)
         raise typer.Exit(code) from error
 
 

@@ -17,7 +17,7 @@ from .output import (
     number,
     print_error,
     print_json,
-    print_place,
+    print_location,
     print_warning,
     say,
     stopped_by_signals,
@@ -195,7 +195,7 @@ def report_run(
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=traceback)
+            print_location(result.error, traceback=traceback)
     if problem:
         print_error(problem)
     return code

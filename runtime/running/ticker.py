@@ -131,7 +131,7 @@ class Ticker:
     def _in_chains(
         self, calls: Sequence[TickCall]
     ) -> list[tuple[str | CallSequence, Callable[[], Any]]]:
-        """The calls with their owners; those of kernels that follow each other are one call of a chain."""
+        """Pair the calls with their owners; kernels that follow each other are one call of a chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
         found: list[tuple[str | CallSequence, Callable[[], Any]]] = []
         pieces = groupby(
@@ -282,7 +282,7 @@ def _owner(block: Block, number: int, call: TickCall) -> Owner:
 
 
 def _prepare(chain: CallSequence) -> None:
-    """Raises ``RunError`` where a call of a chain is not compiled."""
+    """Prepare a chain. Raises ``RunError`` where a call in it is not compiled."""
     chain.prepare()
     for owner in chain.owners if not chain.native else ():
         if any(getattr(call, "compiled", None) is None for call in owner.calls()):
