@@ -25,7 +25,7 @@ from .loading import checked_again, checked_file, checked_text
 from .running.executor import Executor
 from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
-from .running.sinks import Sink
+from .running.sink import Sink
 from .running.stepping import SteppedRun
 
 

@@ -13,10 +13,10 @@ from ...mathematics.body_dynamics import (
     acceleration_at,
     body_motion,
     move_bodies,
-    place_bodies,
     point_jacobian,
     point_position,
     rotation_jacobian,
+    set_body_poses,
     velocity_at,
 )
 from ...mathematics.compiling.kernel_call import KernelCall
@@ -105,7 +105,7 @@ def move_model(
             linear += turn * terms.velocity[column]
             angular += turn * terms.velocity[3 + column]
         motion.velocity[0, row], motion.velocity[0, 3 + row] = linear, angular
-    place_bodies(tree, joints.position, motion)
+    set_body_poses(tree, joints.position, motion)
     move_bodies(tree, terms.velocity[6:], motion)
 
 

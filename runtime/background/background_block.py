@@ -30,8 +30,8 @@ from ..language.quantities import InputQuantities, OutputQuantities
 from ..language.registry import block_name
 from ..language.signals import Field, Signal
 from ..language.stages import ClockSpec, WhenLate
-from ..running.sinks import Note
-from ..running.ticker import Ticker
+from ..running.sink import Note
+from ..running.ticker import Ticker, WorkerBlock
 from ..running.timing import KEPT_TICKS, BlockTimes, times_of
 from .job_memory import Copies, copies, copy, record_size
 from .worker import views
@@ -58,7 +58,7 @@ class Background:
     initial: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
-class BackgroundBlock(Block):
+class BackgroundBlock(WorkerBlock):
     """Stands for a block that works in the background; see the module's text.
 
     Subclasses made by ``background_block_type`` have the ports, states and parameters of the block, and
