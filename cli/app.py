@@ -114,7 +114,7 @@ def _extension_verbs() -> tuple[str, ...]:
 
 
 def _why_unknown(arguments: list[str]) -> str:
-    """The sentence about a verb that an extension has which is not here; empty for any other."""
+    """Return the sentence about a verb of an extension that is not here; empty for any other."""
     from ..runtime.language.extensions import SHIPPED, missing_extension, own_extensions
 
     for name, verbs in SHIPPED.items():

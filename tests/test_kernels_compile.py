@@ -12,6 +12,7 @@ import linecache
 import math
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +29,13 @@ from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import expand, kernel, kernels
 from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
+from aloft.runtime.language.extensions import own_extensions
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import random_inputs, unmet_messages
 
+from . import kernel_samples
 from .hal.sensors.mounting import bruce_with
-from .kernel_samples import UNUSED
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("mathematics", "blocks", "hal")
@@ -101,6 +103,16 @@ SENSORS = {
 
 PYTHON = {bool, int, float}
 """Other numbers, such as those of an enumeration, are made plain ones."""
+
+UNUSED = kernel_samples.UNUSED | {
+    name: arguments
+    for each in own_extensions().values()
+    if (each.folder / "tests" / "kernel_samples.py").is_file()
+    for name, arguments in import_module(
+        f"extensions.{each.name}.tests.kernel_samples"
+    ).SAMPLES.items()
+}
+"""Arguments of the kernels that a jump does not call, those of extensions, too."""
 
 
 def copy(arguments):

@@ -187,7 +187,7 @@ class DriveEffects:
         constant = self.torque_constant if self.windings is None else self.windings.warm.constant
         band = motors.current_bandwidth
         self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
-        """By how much [s] a drive's loop is late beside that of an ideal drive."""
+        """Lag of a drive's loop behind that of an ideal drive [s]."""
         limit = math.inf if motors.torque_limit is None else motors.torque_limit
         self._motors = DrawnMotors(
             np.ascontiguousarray(robot.joint_to_motor),

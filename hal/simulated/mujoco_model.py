@@ -155,7 +155,7 @@ def _surface(variation: Variation) -> dict[str, Any]:
 
 
 def _sole(variation: Variation) -> dict[str, Any]:
-    """Those of a contact point: rubber decides alone how soft its contacts are."""
+    """Return the settings of a contact point: rubber decides alone how soft its contacts are."""
     surface = _surface(variation)
     if variation.sole is not None:
         surface |= {"solref": list(variation.sole), "priority": 1}

@@ -57,7 +57,7 @@ from .stance import (
     holding_gains,
     holding_torque,
     passive_joints,
-    place_standing,
+    set_standing_pose,
 )
 from .state import (
     PhysicsState,
@@ -392,7 +392,7 @@ class Plant:
         model, data, base, robot = self.model, self.data, self._base, self._robot
         tilt, level = attitude * params.initial_attitude_error, bool(self.variation.link_length)
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
-        place_standing(model, data, base, robot, tilt, level, normal)
+        set_standing_pose(model, data, base, robot, tilt, level, normal)
         if self.gantry is not None and params.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.gantry.height]))
             mujoco.mj_kinematics(model, data)

@@ -14,7 +14,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Input, Output, Port, State, UnmetRequirement
 from ...runtime.language.context import Context
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.terrain import Terrain
+from ...runtime.language.terrain import Terrain, WorldParameters
 from ..drive_control import DriveGains
 from ..robot import Robot
 from ..sensors.sensor import MountedSensor
@@ -39,7 +39,7 @@ from .state import PhysicsState, SensorMemory
 from .tiles import UnevenParameters
 
 
-class SimulatorParameters(DriveGains):
+class SimulatorParameters(DriveGains, WorldParameters):
     """The parameters of ``MujocoRobot``; by default there are no disturbances.
 
     A *spread* is half the width of a uniform distribution around the nominal value, from which one
