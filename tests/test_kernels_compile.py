@@ -38,7 +38,14 @@ from . import kernel_samples
 from .hal.sensors.mounting import bruce_with
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("mathematics", "blocks", "hal")
+ROOMS = (
+    "mathematics",
+    "blocks",
+    "hal",
+    "extensions/hopping/blocks",
+    "extensions/commissioning/blocks",
+    "extensions/export/blocks",
+)
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
@@ -69,13 +76,7 @@ NOT_HOT = {
     "mathematics.whole_body_solution.active_set_program": "memory, when a block is set up",
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
-    "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.imu_step._angle_between": "of a bring-up, with nothing under power",
     "hal.bear.configuration.imu_rotation_of": "when a file of the hardware is written",
-    "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
-    "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.check_slope": "checks a scene, when a graph is loaded",
