@@ -39,7 +39,7 @@ from ...robots.kinematics import ball_feet, contact_centres
 from ...runtime.language.terrain import Ground, HeightField, Terrain
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .simulated_robot import SimulatorParameters
+from .parameters import SimulatorParameters
 from .thrusters import add_thrusters
 from .unsupported import shared_motors, unsupported_motor
 from .variation import Variation

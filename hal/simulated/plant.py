@@ -49,8 +49,8 @@ from .gears import YieldingGears
 from .imu_effects import ImuModel
 from .joint_effects import falling_friction
 from .mujoco_model import body_name, build_world, number_of_soles
+from .parameters import SimulatorParameters
 from .sensors import SimulatedSensors
-from .simulated_robot import SimulatorParameters
 from .stance import (
     StartCheck,
     centre_on_origin,
@@ -152,9 +152,9 @@ class ExternalForces:
     def pulling(self, params: SimulatorParameters) -> list[Call]:
         """In every physics step, what a cable does: the first call goes before that of a push, which
         it makes begin anew, the second after it."""
-        assert params.cable is not None
+        assert params.body.cable is not None
         base = self._points.wrenches[self._base, :3]
-        force = np.array(draw_pull(params.cable, params.seed, self._robot))
+        force = np.array(draw_pull(params.body.cable, params.seed, self._robot))
         return [self.releasing(), KernelCall(add_force, force, base)]
 
     def check(self, push: ExternalForce) -> None:
@@ -265,25 +265,27 @@ class Plant:
         self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
         self._samples_per_tick = samples_per_tick
         self.imu = None
-        if not params.imu.ideal:
-            self.imu = ImuModel(params.imu, params.seed, params.timestep, physics)
+        if not params.sensors.imu.ideal:
+            self.imu = ImuModel(params.sensors.imu, params.seed, params.timestep, physics)
         self.drives = DriveEffects(
-            robot, params.encoders, params.motors, params.seed, params.timestep, physics,
-            params.windings,
+            robot, params.sensors.encoders, params.actuators.motors, params.seed, params.timestep, physics,
+            params.actuators.windings,
         )  # fmt: skip
         self.windings, self.battery = self.drives.windings, None
-        if params.battery is not None:
+        if params.actuators.battery is not None:
             warm = None if self.windings is None else self.windings.warm
-            self.battery = Battery(params.battery, robot, params.timestep, physics, warm)
+            self.battery = Battery(params.actuators.battery, robot, params.timestep, physics, warm)
         self.switches = None
-        if params.switches != SwitchEffects():
-            self.switches = SwitchDelays(params.switches, params.timestep, physics)
+        if params.sensors.switches != SwitchEffects():
+            self.switches = SwitchDelays(params.sensors.switches, params.timestep, physics)
         self.gears = None
-        if params.gears is not None:
+        if params.actuators.gears is not None:
             rotors = self.variation.rotors(robot)
-            self.gears = YieldingGears(params.gears, robot, rotors, params.timestep, physics)
+            self.gears = YieldingGears(
+                params.actuators.gears, robot, rotors, params.timestep, physics
+            )
         whole = self.model
-        if params.gears is not None:
+        if params.actuators.gears is not None:
             whole = build_world(params, robot, replace(self.variation, rotor_share=1.0))
         self.stiffness, self.damping = holding_gains(whole, robot, self.drives.lag)
         self._passive = passive_joints(robot)
@@ -304,14 +306,20 @@ class Plant:
             "n_integration": mujoco.mj_stateSize(model, everything),
             "n_random": RandomStreams(params.seed_of_noise, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
-            **ImuModel.dimensions(params.imu, params.timestep),
+            **ImuModel.dimensions(params.sensors.imu, params.timestep),
             **DriveEffects.dimensions(
-                robot, params.encoders, params.motors, params.timestep, params.windings
+                robot,
+                params.sensors.encoders,
+                params.actuators.motors,
+                params.timestep,
+                params.actuators.windings,
             ),
-            "n_rotors": 0 if params.gears is None else len(robot.joints),
-            "n_gantry": 0 if params.gantry is None else 4,
-            "n_battery": 0 if params.battery is None else 4,
-            "n_late_switches": 0 if params.switches == SwitchEffects() else len(robot.contacts),
+            "n_rotors": 0 if params.actuators.gears is None else len(robot.joints),
+            "n_gantry": 0 if params.start.gantry is None else 4,
+            "n_battery": 0 if params.actuators.battery is None else 4,
+            "n_late_switches": 0
+            if params.sensors.switches == SwitchEffects()
+            else len(robot.contacts),
         }
 
     def _attach(self, data: MjData) -> None:
@@ -356,19 +364,19 @@ class Plant:
             read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
-        if self._params.contact_bias:
+        if self._params.ground.contact_bias:
             self.step1 = LibraryCall(ContactBias(model, data).begin_step, 0)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(
                 self.velocity, model.dof_frictionloss[base.velocities :],
-                self.variation.static_friction, self._params.joints.stribeck_velocity,
+                self.variation.static_friction, self._params.actuators.joints.stribeck_velocity,
             ))  # fmt: skip
         self.forces = ExternalForces(model, data, self._robot)
         self.gantry = None
-        if self._params.gantry is not None and base.velocities:
+        if self._params.start.gantry is not None and base.velocities:
             self.gantry = Gantry(
-                self._params.gantry, self._robot, model, data, physics, self._params.timestep
+                self._params.start.gantry, self._robot, model, data, physics, self._params.timestep
             )
 
     def stand(self, step: CallSequence, hold: Callable[[Array, Array], None]) -> None:
@@ -389,11 +397,14 @@ class Plant:
         attitude = stream(params.seed_of_noise, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
-        tilt, level = attitude * params.initial_attitude_error, bool(self.variation.link_length)
+        tilt, level = (
+            attitude * params.start.initial_attitude_error,
+            bool(self.variation.link_length),
+        )
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
         place_standing(model, data, base, robot, tilt, level, normal)
-        if self.gantry is not None and params.gantry is not None:
-            base.shift(np.array([0.0, 0.0, params.gantry.height]))
+        if self.gantry is not None and params.start.gantry is not None:
+            base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
             self.gantry.begin()
         rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
@@ -403,7 +414,7 @@ class Plant:
         torque = holding_torque(model, data, base, robot, hangs)
         hold(self.position + self.sensors.encoder_offset, torque)
         phase = 0.0
-        if params.random_start_phase:
+        if params.start.random_start_phase:
             phase = float(stream(params.seed_of_noise, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
         self.start_delay = phase - early * params.timestep
@@ -482,7 +493,7 @@ class Plant:
             one.append(self.gears.turning(self.position, self.velocity, torque))
         if self.gantry is not None:
             one.append(self.forces.releasing())
-        if push is not None and self._params.cable is not None:
+        if push is not None and self._params.body.cable is not None:
             release, pull = self.forces.pulling(self._params)
             one += [release, self.forces.pushing(push), pull]
         elif push is not None:

@@ -21,7 +21,7 @@ from ..sensors.built_in import JointSensors, SwitchSensors
 from ..sensors.imu import Imu
 from ..sensors.noise import FieldErrors, NoiseModel, delay_sample
 from ..sensors.sensor import MountedSensor, mounted_sensors
-from .simulated_robot import SimulatorParameters
+from .parameters import SimulatorParameters
 from .state import SensorMemory, TickRecord
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class SimulatedSensor:
             start = part.stop
             true_values[name] = now[part].reshape(field.resolve({}))
             self._averaged[part] = name in sensor.averaged
-            noise = sensor.noise(name).scaled(params.sensor_errors)
+            noise = sensor.noise(name).scaled(params.sensors.sensor_errors)
             if name in sensor.averaged:
                 noise = noise.model_copy(
                     update={"noise": noise.noise * math.sqrt(samples_per_tick)}
@@ -153,12 +153,13 @@ class SimulatedSensors:
         self._robot, self._params, self._streams = robot, params, streams
         self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
         self._imu = Imu("imu", MountedSensorPart(kind="imu", link=robot.base))
+        errors = params.sensors
         gyroscope = NoiseModel(
-            noise=params.gyro_noise, bias=params.gyro_bias, range=params.gyro_range
+            noise=errors.gyro_noise, bias=errors.gyro_bias, range=errors.gyro_range
         )
         accelerometer = NoiseModel(
-            noise=params.accelerometer_noise, bias=params.accelerometer_bias,
-            range=params.accelerometer_range,
+            noise=errors.accelerometer_noise, bias=errors.accelerometer_bias,
+            range=errors.accelerometer_range,
         )  # fmt: skip
         self._imu_errors = {
             "angular_velocity": FieldErrors(
@@ -170,8 +171,8 @@ class SimulatedSensors:
             ),
         }  # fmt: skip
         self._joints = JointSensors("joints", robot.dimensions)
-        encoders = NoiseModel(bias=params.encoder_offset, resolution=params.encoder_resolution)
-        velocity = NoiseModel(noise=params.joint_velocity_noise)
+        encoders = NoiseModel(bias=errors.encoder_offset, resolution=errors.encoder_resolution)
+        velocity = NoiseModel(noise=errors.joint_velocity_noise)
         self._joint_errors = {
             "position": FieldErrors(encoders, n, stream(seed, Purpose.ENCODER_OFFSET), None),
             "velocity": FieldErrors(
@@ -181,17 +182,17 @@ class SimulatedSensors:
         }
         self.encoder_offset = self._joint_errors["position"].bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
-        limits, points = params.switch_threshold, max(1, len(robot.contacts))
-        if params.switches.threshold is not None:
+        limits, points = errors.switch_threshold, max(1, len(robot.contacts))
+        if errors.switches.threshold is not None:
             load = robot.weight / points
-            limits = [load * share for share in params.switches.threshold]
+            limits = [load * share for share in errors.switches.threshold]
         self.switch_threshold = SwitchSensors.draw_thresholds(
             limits, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
         )
         """The force that closes every switch [N]."""
         self.ground_force = -self.switch_threshold
         """The vertical force on the ground up to which every switch is closed [N]."""
-        self.bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
+        self.bounce_steps = math.ceil(errors.switch_bounce / params.timestep - 1e-9)
         self._kinds = mounted_sensors(robot)
         self.memory = memory or SensorMemory.allocate(self.dimensions(params, self._kinds))
         self.mounted: tuple[SimulatedSensor, ...] = ()

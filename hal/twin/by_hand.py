@@ -16,7 +16,7 @@ from ...mathematics.constants import GRAVITY
 from ...robots.robot_description import RobotDescription
 from ..bear.bring_up.session import PACKET_TIME, Request
 from ..simulated.effects import GantryParameters
-from ..simulated.simulated_robot import SimulatorParameters
+from ..simulated.parameters import SensorParameters, SimulatorParameters, StartParameters
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .twin import Twin
 from .wiring import Wiring
@@ -157,10 +157,14 @@ class RobotByHand:
         errors = self._errors
         params = SimulatorParameters(
             seed=self._seed, timestep=PACKET_TIME if lower_after is None else 0.0005,
-            gyro_noise=errors.gyro, gyro_bias=errors.gyro_bias,
-            accelerometer_noise=errors.force, accelerometer_bias=errors.force_bias,
-            joint_velocity_noise=0.05 if errors.gyro else 0.0,
-            gantry=GantryParameters(height=height, lower_after=lower_after),
+            sensors=SensorParameters(
+                gyro_noise=errors.gyro, gyro_bias=errors.gyro_bias,
+                accelerometer_noise=errors.force, accelerometer_bias=errors.force_bias,
+                joint_velocity_noise=0.05 if errors.gyro else 0.0,
+            ),
+            start=StartParameters(
+                gantry=GantryParameters(height=height, lower_after=lower_after)
+            ),
         )  # fmt: skip
         return self.wiring.twin(self.robot, params, held=held)
 

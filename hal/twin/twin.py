@@ -16,8 +16,8 @@ from ..bear.protocol import BROADCAST, Instruction, frame_bytes
 from ..random_streams import Purpose
 from ..sensors.sensor import mounted_sensors
 from ..simulated.drives import SimulatedDrives
+from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
-from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
@@ -65,9 +65,11 @@ class Twin:
         sensed: SensorMemory | None = None,
     ) -> None:  # fmt: skip
         period = hardware.bus.period
-        finer = {"accelerometer_noise": params.accelerometer_noise * math.sqrt(tick / period)}
+        errors = params.sensors
+        finer = {"accelerometer_noise": errors.accelerometer_noise * math.sqrt(tick / period)}
+        changed = {"sensors": errors.model_copy(update=finer)}
         self.plant = Plant(
-            robot, params.model_copy(update=finer), tick, physics, record, sensed, tick / period
+            robot, params.model_copy(update=changed), tick, physics, record, sensed, tick / period
         )
         self._names = robot.transmission.motors
         self.actuators = [EmulatedActuator(hardware.motors[name].id) for name in self._names]

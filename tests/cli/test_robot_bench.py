@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot

@@ -16,7 +16,7 @@ from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.driver import DriveLaw, Driver, check_ready, configure
 from aloft.hal.bear.motor_loop import MotorThread
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.twin import Twin, standing_twin
 from aloft.hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from aloft.robots.description import find_robot

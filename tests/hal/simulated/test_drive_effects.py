@@ -297,7 +297,7 @@ def test_copper_heat_follows_from_speeds_where_no_winding_is_known() -> None:
 def test_a_robot_whose_supply_nobody_described_has_no_pack() -> None:
     graph = Path(aloft.__file__).parent / "graphs" / "robots" / "a1_stand.yaml"
     with pytest.raises(LoadError) as caught:
-        aloft.load(graph, overrides={"robot.battery": {}})
+        aloft.load(graph, overrides={"robot.actuators.battery": {}})
     text = str(caught.value)
     assert "the description of a1 does not say what feeds it" in text
     assert "supply: {rated_voltage: ..., open_voltage:" in text

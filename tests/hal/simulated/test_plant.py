@@ -10,14 +10,15 @@ import pytest
 from aloft.hal.random_streams import Purpose
 from aloft.hal.simulated import plant
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.plant import Plant, PushPoints, apply_push, clear_wrenches
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices
 from aloft.mathematics.compiling.library_call import LibraryCall
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
 from .simulated_bruce import hold
 
 ROBOT = find_robot("bruce")
@@ -46,7 +47,7 @@ class HoldingDrives:
 
 
 def plant_of(robot: RobotDescription, **params: object) -> Plant:
-    chosen = SimulatorParameters.model_validate(params)
+    chosen = SimulatorParameters.model_validate(grouped(params))
     sizes = {**robot.dimensions, **Plant.state_dimensions(chosen, robot)}
     return Plant(robot, chosen, PERIOD, PhysicsState.allocate(sizes), TickRecord.allocate(sizes))
 
@@ -93,7 +94,7 @@ GEARS = {"gears": {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}}
 
 def run(ticks: int = 20, **options: Any) -> tuple[BlockBench[MujocoRobot], list[bytes]]:
     """A robot with every disturbance that is pushed at two points; its ports in every tick."""
-    params = {**MujocoRobot.example_parameters(), "seed": 7, **GEARS}
+    params = grouped({**MujocoRobot.example_parameters(), "seed": 7, **GEARS})
     robot: BlockBench[MujocoRobot] = BlockBench(MujocoRobot, params, robot="bruce", **options)
     hold(robot)
     seen = []

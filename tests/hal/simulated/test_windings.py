@@ -101,7 +101,7 @@ def test_a_hot_robot_reports_it_and_goes_on_from_a_snapshot() -> None:
 def test_the_drives_of_the_twin_report_their_windings() -> None:
     graph = aloft.load(
         GRAPHS / "jump_twin.yaml",
-        overrides={"robot.windings": {"temperature": 60.0}, "duration": "0.2 s"},
+        overrides={"robot.actuators.windings": {"temperature": 60.0}, "duration": "0.2 s"},
     )
     found = graph.run(log=True)
     temperature = found.signal("robot.health.temperature")
@@ -120,5 +120,7 @@ def test_windings_that_nobody_described_are_refused(
     graph: str, windings: dict[str, float], text: str
 ) -> None:
     with pytest.raises(LoadError) as caught:
-        aloft.load(GRAPHS / "robots" / f"{graph}.yaml", overrides={"robot.windings": windings})
+        aloft.load(
+            GRAPHS / "robots" / f"{graph}.yaml", overrides={"robot.actuators.windings": windings}
+        )
     assert text.replace("a `supply`", "`supply`") in str(caught.value)

@@ -157,4 +157,4 @@ def test_ground_that_cannot_be_built_is_refused(values: dict[str, Any], words: s
         scene(**values)
     assert "landing_height: " in str(caught.value)
     assert words in str(caught.value)
-    assert "robot.scene" in str(caught.value)
+    assert "robot.ground.scene" in str(caught.value)
