@@ -6,32 +6,22 @@ owns a plant says which torques its drives give, and lets it simulate so many ph
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState, RobotHealth
 from ...mathematics.arrays import (
     Array,
-    Array1D,
-    Array2D,
     Flags,
-    Flags1D,
     Indices,
-    Indices0D,
-    Indices1D,
-    Vector3,
 )
 from ...mathematics.compiling.call_sequence import Call, CallSequence
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.compiling.library_call import LibraryCall, address_of
-from ...mathematics.kernel import kernel
+from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
@@ -44,12 +34,14 @@ from .contact_bias import ContactBias
 from .drive_effects import DriveEffects
 from .drives import MotorLimits
 from .effects import SwitchEffects
+from .external_forces import ExternalForces
 from .gantry import Gantry
 from .gears import YieldingGears
 from .imu_effects import ImuModel
 from .joint_effects import falling_friction
 from .mujoco_model import body_name, build_world, number_of_soles
 from .parameters import SimulatorParameters
+from .physics_step import step_calls
 from .sensors import SimulatedSensors
 from .stance import (
     StartCheck,
@@ -71,131 +63,11 @@ from .state import (
 )
 from .switch_effects import SwitchDelays
 from .truth import TruthReport
-from .variation import Variation, draw_pull, draw_variation
+from .variation import Variation, draw_variation
 from .windings import NOMINAL, read_temperatures
 
 if TYPE_CHECKING:
-    from mujoco import MjData, MjModel
-
-
-class PushPoints(NamedTuple):
-    """The points that a force may act at, in the simulator's memory.
-
-    ``sites`` and ``bodies`` (n_points,) are the numbers of the points and of their bodies, ``places``
-    and ``centres`` (n, 3) [m, world] where all points and all bodies' centres of mass are, ``wrenches``
-    (n, 6) [N, N m, world] what acts on all bodies. ``missing`` (1,) becomes true where a force acts at
-    a point that there is not.
-    """
-
-    sites: Indices1D
-    bodies: Indices1D
-    places: Array2D
-    centres: Array2D
-    wrenches: Array2D
-    missing: Flags1D
-
-
-@kernel
-def clear_wrenches(wrenches: Array2D) -> None:
-    """Nothing acts on any body."""
-    wrenches[:, :] = 0.0
-
-
-@kernel
-def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
-    """Let the ``force`` (3,) [N, world] act at the ``point``, without a dimension, of its body, which
-    moves with the body."""
-    fx, fy, fz = force[0], force[1], force[2]
-    if fx == 0.0 and fy == 0.0 and fz == 0.0:
-        return
-    number = point[()]
-    if number < 0 or number >= points.sites.shape[0]:
-        points.missing[0] = True
-        return
-    site, body = points.sites[number], points.bodies[number]
-    x = points.places[site, 0] - points.centres[body, 0]
-    y = points.places[site, 1] - points.centres[body, 1]
-    z = points.places[site, 2] - points.centres[body, 2]
-    wrench = points.wrenches
-    wrench[body, 0], wrench[body, 1], wrench[body, 2] = fx, fy, fz
-    wrench[body, 3], wrench[body, 4] = y * fz - z * fy, z * fx - x * fz
-    wrench[body, 5] = x * fy - y * fx
-
-
-@kernel
-def add_force(force: Vector3, total: Vector3) -> None:
-    """Add a ``force`` [N, world] to what acts on the centre of mass of a body."""
-    total[:] += force
-
-
-class ExternalForces:
-    """Lets forces act on the robot's named points."""
-
-    def __init__(self, model: MjModel, data: MjData, robot: RobotDescription) -> None:
-        self._robot = robot
-        self._base = int(model.body(body_name(robot.base)).id)
-        sites = [int(model.site(f"point/{name}").id) for name in robot.points]
-        bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
-        self._points = PushPoints(
-            np.array(sites, np.int64), np.array(bodies, np.int64), data.site_xpos, data.xipos,
-            data.xfrc_applied, np.zeros(1, np.bool_),
-        )  # fmt: skip
-
-    def releasing(self) -> KernelCall:
-        """Nothing acts any more."""
-        return KernelCall(clear_wrenches, self._points.wrenches)
-
-    def pushing(self, push: ExternalForce) -> KernelCall:
-        """The push acts in the next physics step; ``check`` says whether it has a point."""
-        return KernelCall(apply_push, push.force, push.point, self._points)
-
-    def pulling(self, params: SimulatorParameters) -> list[Call]:
-        """In every physics step, what a cable does: the first call goes before that of a push, which
-        it makes begin anew, the second after it."""
-        assert params.body.cable is not None
-        base = self._points.wrenches[self._base, :3]
-        force = np.array(draw_pull(params.body.cable, params.seed, self._robot))
-        return [self.releasing(), KernelCall(add_force, force, base)]
-
-    def check(self, push: ExternalForce) -> None:
-        """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
-        if self._points.missing[0]:
-            self._points.missing[0] = False
-            raise IndexError(
-                f"push at point {int(push.point)}; {self._robot.name} has "
-                f"{len(self._points.sites)}: " + ", ".join(self._robot.points)
-            )
-
-
-def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
-    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
-    and ``data`` must stay alive.
-
-    Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the
-    simulator, such as no memory left for contacts, ends the process in machine code, and is an exception in Python.
-    Of the simulator's memory a jump uses less than a hundredth.
-    """
-    import mujoco
-
-    first, second = _addresses()
-    memory = model._address, data._address
-    return (
-        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
-        LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
-    )
-
-
-@cache
-def _addresses() -> tuple[int, int]:
-    """Of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros where it is not found."""
-    import mujoco
-
-    folder, version = Path(mujoco.__file__).parent, mujoco.mj_versionString()
-    for name in (f"libmujoco.so.{version}", f"libmujoco.{version}.dylib"):
-        if (folder / name).is_file():
-            library = ctypes.CDLL(str(folder / name))
-            return address_of(library.mj_step1), address_of(library.mj_step2)
-    return 0, 0
+    from mujoco import MjData
 
 
 SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02

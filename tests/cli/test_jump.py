@@ -112,8 +112,8 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
         .checked.block("robot")
         .params
     )
-    assert standard.model_dump()["mass_spread"] == 0.0
-    assert standard.model_dump()["gyro_noise"] == 0.02
+    assert standard.model_dump()["body"]["mass_spread"] == 0.0
+    assert standard.model_dump()["sensors"]["gyro_noise"] == 0.02
     with pytest.raises(
         AloftError,
         match="--trial windy: there is nominal, pushed, real, robust, standard, uneven, warm",

@@ -54,9 +54,14 @@ def test_show_lists_the_effects_that_can_be_simulated() -> None:
     assert bandwidth["unit"] == "Hz" and bandwidth["default"] is None
     assert bandwidth["trial"] == "100 Hz"
     assert bandwidth["source"] == "data sheets of MEMS units: 5 to 400 Hz to choose from"
-    assert rows["sensors.switch_threshold"]["trial"] == ["0.5 N", "3 N"], "from a trial that it includes"
+    assert rows["sensors.switch_threshold"]["trial"] == ["0.5 N", "3 N"], (
+        "from a trial that it includes"
+    )
     assert rows["sensors.gyro_noise"]["trial"] == "0.02 rad/s", "of an included trial"
-    assert rows["actuators.gears.stiffness"]["required"] and rows["actuators.gears.stiffness"]["group_is_off"]
+    assert (
+        rows["actuators.gears.stiffness"]["required"]
+        and rows["actuators.gears.stiffness"]["group_is_off"]
+    )
     assert rows["actuators.gears.stiffness"]["trial"] is None
     taken = {
         f"robot.{name}": row["trial"] for name, row in rows.items() if row["trial"] is not None

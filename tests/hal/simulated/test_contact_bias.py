@@ -10,7 +10,7 @@ from aloft.hal.simulated.base import BASES
 from aloft.hal.simulated.contact_bias import ContactBias
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.simulated.plant import step_calls
+from aloft.hal.simulated.physics_step import step_calls
 from aloft.hal.simulated.stance import place_standing
 from aloft.hal.simulated.variation import Variation
 from aloft.mathematics.arrays import Array

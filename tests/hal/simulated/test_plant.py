@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from aloft.hal.random_streams import Purpose
-from aloft.hal.simulated import plant
+from aloft.hal.simulated import physics_step
+from aloft.hal.simulated.external_forces import PushPoints, apply_push, clear_wrenches
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.simulated.plant import Plant, PushPoints, apply_push, clear_wrenches
+from aloft.hal.simulated.plant import Plant
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices
 from aloft.mathematics.compiling.library_call import LibraryCall
@@ -120,7 +121,7 @@ def test_machine_code_and_python_simulate_the_same_bytes() -> None:
 def test_without_the_address_of_its_functions_python_calls_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(plant, "_addresses", lambda: (0, 0))
+    monkeypatch.setattr(physics_step, "_addresses", lambda: (0, 0))
     robot, seen = run(5)
     assert not robot.block._ticking.native
     monkeypatch.undo()
